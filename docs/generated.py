@@ -40,7 +40,7 @@ def commands() -> str:
         "# Command line",
         NOTE,
         "Results go to standard output, messages to standard error. The exit code is 0 for success, 1 for a failure "
-        "and 2 for a mistake of the user. `--json` prints a document for other programs.",
+        "and 2 for a mistake of the user (3: see verify). `--json` prints a document for other programs.",
     ]
     for name, command in _commands(root, "simnav"):
         help_text = re.sub(r"\s+", " ", command.help or "").strip()

@@ -8,7 +8,11 @@ A row is a class without a body::
 
 Every piece is a class, or a function that makes one. Its constructor defines the parameters, and its docstring
 documents them, in this one place only. `piece` changes a piece for a row: it fixes parameters, or gives parameters
-another default or another name.
+another default. Where two pieces have a parameter of the same name, the row has it twice, with the keyword of the
+piece before it: ``adaptation__dof`` and ``smoother__dof``.
+
+The constructor of a row is made when the class is defined. Type checkers and editors read it from the stub file
+beside the module, which `simnav.estimators.stubs` writes.
 """
 
 from __future__ import annotations
@@ -17,12 +21,14 @@ import contextlib
 import inspect
 import re
 import typing
+from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from typing import Any, ClassVar
 
 from simnav.estimator import Estimator, Needs
+from simnav.estimator.parameters import former_names, under_present_names
 from simnav.types import Estimate, InitialState, Instruments, Measurements, NavigationStates
 
 if typing.TYPE_CHECKING:
@@ -89,14 +95,11 @@ class Piece:
         Parameters with a value that the row fixes; they are not parameters of the row.
     defaults : mapping
         Defaults of the row, in place of those of the constructor.
-    rename : mapping of str to str
-        Names of parameters in the row, by their names in the constructor.
     """
 
     make: Callable[..., Any]
     fixed: Mapping[str, Any] = field(default_factory=dict)
     defaults: Mapping[str, Any] = field(default_factory=dict)
-    rename: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def label(self) -> str:
@@ -104,23 +107,22 @@ class Piece:
         return getattr(self.make, "__name__", repr(self.make))
 
     def parameters(self) -> dict[str, inspect.Parameter]:
-        """What a row takes for it, by the constructor's names; named as the row names them.
+        """What a row takes for it, by the constructor's names, with the types of the constructor.
 
         Raises
         ------
         TypeError
-            If a parameter that is fixed, renamed or given a default is none of the constructor's.
+            If a parameter that is fixed or given a default is none of the constructor's.
         """
         known = {p.name: p for p in inspect.signature(self.make).parameters.values() if p.kind in _NAMED}
-        for name in (*self.fixed, *self.defaults, *self.rename):
+        for name in (*self.fixed, *self.defaults):
             if name not in known:
                 raise TypeError(f"{self.label} has no parameter {name!r}; it has {', '.join(known) or 'none'}")
-        inner = getattr(self.make, "pieces", ())
+        inner, types = getattr(self.make, "pieces", ()), _hints(self.make)
         return {
             name: p.replace(
-                name=self.rename.get(name, name),
                 kind=inspect.Parameter.KEYWORD_ONLY,
-                annotation=getattr(p.annotation, "__forward_arg__", p.annotation),
+                annotation=types.get(name, p.annotation),
                 default=self.defaults.get(name, p.default),
             )
             for name, p in known.items()
@@ -128,13 +130,8 @@ class Piece:
         }
 
     def build(self, values: Mapping[str, Any], **pieces: Any) -> Any:
-        """The piece, with those of a row's parameters that are its own."""
-        own = {
-            name: values.get(p.name, p.default)
-            for name, p in self.parameters().items()
-            if p.name in values or name in self.defaults
-        }
-        return self.make(**pieces, **self.fixed, **own)
+        """The piece, with values of its parameters."""
+        return self.make(**pieces, **{**self.fixed, **self.defaults, **values})
 
 
 _NAMED = (inspect.Parameter.POSITIONAL_OR_KEYWORD, inspect.Parameter.KEYWORD_ONLY)
@@ -144,7 +141,6 @@ def piece(
     make: Callable[..., Any],
     *,
     defaults: Mapping[str, Any] | None = None,
-    rename: Mapping[str, str] | None = None,
     **fixed: Any,
 ) -> Piece:
     """A piece of a row, changed for it.
@@ -155,8 +151,6 @@ def piece(
         The class of the piece, or a function that returns one.
     defaults : mapping, optional
         Defaults of the row, by the names of the constructor's parameters.
-    rename : mapping, optional
-        Names of parameters in the row, by their names in the constructor; for two pieces with a common parameter name.
     **fixed
         Parameters with a value that the row fixes; they are not parameters of the row.
 
@@ -167,7 +161,7 @@ def piece(
     >>> slow.build({}).memory, slow.build({"memory": 60.0}).memory
     (5000.0, 60.0)
     """
-    return Piece(make, fixed, defaults or {}, rename or {})
+    return Piece(make, fixed, defaults or {})
 
 
 class Row(Estimator):
@@ -186,14 +180,17 @@ class Row(Estimator):
     Raises
     ------
     TypeError
-        When the class is defined: if the solver does not take a piece, or cannot work with it, or two pieces have a
-        parameter of one name. When it is made: if the solver needs a piece that the row does not name.
+        When the class is defined: if the solver does not take a piece, or cannot work with it. When it is made: if the
+        solver needs a piece that the row does not name.
     """
 
     recipe: ClassVar[Mapping[str, Piece]] = {}
     solver: Estimator
 
-    def __init_subclass__(cls, **pieces: Any):
+    def __init__(self, **parameters: Any):  # type checkers see it where a row has no stub
+        raise TypeError(f"{type(self).__name__} names no solver")
+
+    def __init_subclass__(cls, **pieces: Callable[..., Any] | Piece):
         super().__init_subclass__()
         if not pieces:
             return
@@ -259,23 +256,17 @@ def _equip(cls: type[Row]) -> None:
     recipe = cls.recipe
     order = [name for name in ("adaptation", "weighting", "isolation") if name in recipe]
     order += [name for name in recipe if name not in (*order, "solver")]
+    inner = {keyword: recipe[keyword].parameters() for keyword in (*order, "solver")}
+    count = Counter(name for own in inner.values() for name in own)
     parameters: dict[str, inspect.Parameter] = {}
-    owner: dict[str, str] = {}
-    hints: dict[str, Any] = {}
+    place: dict[str, tuple[str, str]] = {}  # keyword of the piece, and name in its constructor
     documentation: list[tuple[str, str, str]] = []
-    for each in [recipe[name] for name in (*order, "solver")]:
-        types, meanings = _hints(each.make), documented(each.make)
-        for inner, parameter in each.parameters().items():
-            name = parameter.name
-            if name in parameters:
-                raise TypeError(
-                    f"{cls.__name__}: {owner[name]} and {each.label} both have a parameter {name!r}; "
-                    f"rename one: piece({each.label}, rename={{{inner!r}: ...}})"
-                )
-            parameters[name], owner[name] = parameter, each.label
-            if inner in types:
-                hints[name] = types[inner]
-            sort, meaning = meanings.get(inner, ("", ""))
+    for keyword, own in inner.items():
+        meanings = documented(recipe[keyword].make)
+        for each, parameter in own.items():
+            name = each if count[each] == 1 else f"{keyword}__{each}"
+            parameters[name], place[name] = parameter.replace(name=name), (keyword, each)
+            sort, meaning = meanings.get(each, ("", ""))
             if documentation and documentation[-1][1:] == (sort, meaning):  # documented together
                 documentation[-1] = f"{documentation[-1][0]}, {name}", sort, meaning
             else:
@@ -284,24 +275,28 @@ def _equip(cls: type[Row]) -> None:
     lacking = [name for name in _required(recipe["solver"]) if name not in recipe]
 
     def __init__(self: Row, **values: Any) -> None:  # noqa: N807 (it becomes the class's)
-        for name in values:
-            if name not in parameters:
-                raise TypeError(f"{cls.__name__} has no parameter {name!r}; it has {', '.join(parameters) or 'none'}")
-        parts = {name: p.build(values) for name, p in recipe.items() if name != "solver"}
+        values = under_present_names(former_names(type(self)), values, type(self).__name__)
+        given: dict[str, dict[str, Any]] = {keyword: {} for keyword in recipe}
+        for name, value in values.items():
+            if name not in place:
+                raise TypeError(f"{cls.__name__} has no parameter {name!r}; it has {', '.join(place) or 'none'}")
+            keyword, each = place[name]
+            given[keyword][each] = value
+        parts = {name: p.build(given[name]) for name, p in recipe.items() if name != "solver"}
         for name, part in parts.items():
             if part is not None and not isinstance(recipe[name].make, type):  # a function has made it
                 _require_fit(type(self), name, type(part))
         for name in lacking:
             raise TypeError(f"{cls.__name__} names no {name}, and {recipe['solver'].label} needs one")
-        self.solver = recipe["solver"].build(values, **parts)
+        self.solver = recipe["solver"].build(given["solver"], **parts)
         if isinstance(self.solver, Solver):
             self.solver.row = type(self).name
 
     __init__.__qualname__, __init__.__module__ = f"{cls.__qualname__}.__init__", cls.__module__
-    __init__.__annotations__ = hints
-    own = inspect.Parameter("self", inspect.Parameter.POSITIONAL_OR_KEYWORD)
-    __init__.__signature__ = inspect.Signature([own, *parameters.values()])  # type: ignore[attr-defined]
-    cls.__init__ = __init__  # type: ignore[assignment]
+    __init__.__annotations__ = {n: p.annotation for n, p in parameters.items() if p.annotation is not p.empty}
+    own_self = inspect.Parameter("self", inspect.Parameter.POSITIONAL_OR_KEYWORD)
+    __init__.__signature__ = inspect.Signature([own_self, *parameters.values()])  # type: ignore[attr-defined]
+    cls.__init__ = __init__  # type: ignore[method-assign]
     text = inspect.cleandoc(vars(cls).get("__doc__") or "")
     if documentation:
         text += "\n\nParameters\n----------"

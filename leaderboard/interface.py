@@ -285,6 +285,7 @@ def campaign(
     sealed: str | os.PathLike[str] | None = None,
     oracle: bool = True,
     minutes: float | None = None,
+    by_version: bool = False,
     progress: CampaignProgress = None,
 ) -> CampaignReport:
     """Run estimators on scenarios and seeds. Started again, the campaign continues.
@@ -328,6 +329,8 @@ def campaign(
         True: also run the oracles on simulated scenarios; they are not ranked.
     minutes : float, optional
         Time after which no further run is started. The same call continues.
+    by_version : bool
+        True: results are known by declared versions of simnav, and by the user's own files, as in a submission.
 
     Returns
     -------
@@ -362,7 +365,7 @@ def campaign(
             summaries.append(_run(some, beside, seeds_of(seed, count), folder, workers, time_limit, memory_limit,
                                   progress, retry=retry, force=anew, keep_trials=keep_trials,
                                   covariance_interval=covariance_interval, confinement=confinement, seal=seal,
-                                  backend=backend, scheduler=scheduler, shard=shard,
+                                  backend=backend, scheduler=scheduler, shard=shard, by_version=by_version,
                                   minutes=None if end is None else max(0.0, (end - time.monotonic()) / 60.0)))
     # fmt: on
     results = results_of(folder)

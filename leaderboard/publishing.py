@@ -198,7 +198,7 @@ def submit(
             raise RequestError(f"{target.parent} is no folder")
         report = campaign(
             estimators=list(source.requests), output=folder, profile=profile, workers=workers, minutes=minutes,
-            confinement=confinement, oracle=False, progress=progress,
+            confinement=confinement, oracle=False, by_version=True, progress=progress,
         )  # fmt: skip
         if report.summary.left:
             raise RequestError(

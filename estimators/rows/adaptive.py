@@ -22,8 +22,8 @@ from simnav.estimators.solvers.kalman import KalmanEstimator
 __all__ = ["Adkf", "AdkfPaper", "FadingEkf", "GatedEkf", "HuberKf", "Iae", "IaeFixed", "Igg3", "Imm", "Mckf", "Rae"]
 __all__ += ["SageHusaKf", "SageHusaPaper", "VbAkf"]
 
-#: `FixedWindow` as a filter's rows have it: there is no other window.
-_WINDOW = {"innovations": "window"}
+#: `innovations` was the window of these rows, as a filter has no other.
+_FORMERLY = {"window": "innovations"}
 
 
 class _Adaptive(Row, solver=KalmanEstimator, model=Suitable, iteration=poor_heading):
@@ -60,19 +60,23 @@ class Iae(_Adaptive, adaptation=piece(InnovationBased, source="innovation")):
 
 
 @register("iae-fixed")
-class IaeFixed(_Adaptive, adaptation=piece(FixedWindow, source="innovation", rename=_WINDOW)):
+class IaeFixed(_Adaptive, adaptation=piece(FixedWindow, source="innovation")):
     """Innovation-based adaptive estimation of the measurement noise over a fixed window.
 
     Source: A. H. Mohamed and K. P. Schwarz, *Adaptive Kalman filtering for INS/GPS*, J. Geodesy 73, 1999.
     """
 
+    formerly = _FORMERLY
+
 
 @register("rae")
-class Rae(_Adaptive, adaptation=piece(FixedWindow, source="residual", newest=False, rename=_WINDOW)):
+class Rae(_Adaptive, adaptation=piece(FixedWindow, source="residual", newest=False)):
     """Residual-based adaptive estimation of the measurement noise over a fixed window.
 
     Source: A. H. Mohamed and K. P. Schwarz, *Adaptive Kalman filtering for INS/GPS*, J. Geodesy 73, 1999.
     """
+
+    formerly = _FORMERLY
 
 
 @register("adkf")

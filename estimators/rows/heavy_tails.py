@@ -2,13 +2,15 @@
 
 from simnav.estimator import register
 from simnav.estimators.adaptations.student_t import StudentT
-from simnav.estimators.composition import Row, piece
+from simnav.estimators.composition import Row
 from simnav.estimators.models.suitable import Suitable
 from simnav.estimators.solvers.iterated import poor_heading
 from simnav.estimators.solvers.kalman import KalmanEstimator
 from simnav.estimators.solvers.student_t_smoother import StudentTSmoother
 
 __all__ = ["StudentTKf", "StudentTRts"]
+
+_FORMERLY = {"dof": "adaptation__dof", "smoothed_dof": "smoother__dof"}
 
 
 @register("student-t")
@@ -21,9 +23,11 @@ class StudentTKf(Row, solver=KalmanEstimator, model=Suitable, adaptation=Student
 
 
 @register("student-t-rts")
-class StudentTRts(StudentTKf, smoother=piece(StudentTSmoother, rename={"dof": "smoothed_dof"})):
+class StudentTRts(StudentTKf, smoother=StudentTSmoother):
     """The Student-t filter with a robust smoother behind it: measurements are judged by the smoothed trajectory.
 
     Source: A. Y. Aravkin, J. V. Burke and G. Pillonetto, *Robust and trend-following Student's t Kalman smoothers*,
     SIAM J. Control and Optimization 52(5), 2014.
     """
+
+    formerly = _FORMERLY

@@ -101,6 +101,11 @@ class GtsamEstimator(Solver):
         self._blank = {f"residual.{name}": np.nan for name in observed}
         self._begin(prior, values)
 
+    def __getstate__(self) -> dict[str, Any]:
+        if hasattr(self, "_ends"):  # a run has begun
+            raise TypeError(f"{self.label}: a graph of GTSAM can be neither copied nor pickled; do so before the run")
+        return vars(self)
+
     def update(self, measurements: Measurements) -> Estimate:
         """Take one step's measurements, each at its own time."""
         graph, step = self.graph, _Step(self.graph)

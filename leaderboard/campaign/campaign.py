@@ -24,6 +24,7 @@ from typing import TYPE_CHECKING
 
 from simnav.leaderboard.campaign.cluster import ClusterError, run_on_cluster
 from simnav.leaderboard.campaign.confinement.attempt import chosen_confinement
+from simnav.leaderboard.campaign.confinement.privileges import PrivilegesWarning, kept_rights
 from simnav.leaderboard.campaign.confinement.session import Limits, ServerError
 from simnav.leaderboard.campaign.entrant import Entrant
 from simnav.leaderboard.campaign.fingerprint import recording_digest, simulator_version
@@ -32,7 +33,7 @@ from simnav.leaderboard.campaign.plan import Plan
 from simnav.leaderboard.campaign.recorder import time_limit
 from simnav.leaderboard.campaign.request import EstimatorRequest
 from simnav.leaderboard.campaign.rescoring import rescore_results
-from simnav.leaderboard.campaign.resolution import resolve, variant_of
+from simnav.leaderboard.campaign.resolution import own_files, resolve, variant_of
 from simnav.leaderboard.campaign.seal import PUBLIC, Seal
 from simnav.leaderboard.campaign.training_runs import require_unseen
 from simnav.leaderboard.campaign.worker import Unit, run_unit, start_worker
@@ -195,11 +196,17 @@ def run_campaign(
         May derive the seeds from a secret; ``seeds`` are then the numbers of the runs.
     by_version : bool
         True: results are known by their declared versions (`simnav.leaderboard.results.versions`), as what comes with
-        simnav is. False: by digests of the code, and by the libraries and the processor that computed them.
+        simnav is; of other estimators a digest of their own files counts, too. False: by digests of the code, and by
+        the libraries and the processor that computed them.
 
     Returns
     -------
     Summary
+
+    Warns
+    -----
+    PrivilegesWarning
+        If root runs the campaign, and the system does not let estimators give their capabilities up.
 
     Raises
     ------
@@ -250,6 +257,12 @@ def run_campaign(
 
     with mistakes():
         chosen = chosen_confinement(confinement)
+    if chosen == "process" and (why := kept_rights()):  # bubblewrap takes them away itself, or does not start
+        warnings.warn(
+            f"estimators keep capabilities of root ({why}), so one of them may change what belongs to others; run the "
+            "campaign as another user, or with confinement = 'bubblewrap'",
+            PrivilegesWarning, stacklevel=2,
+        )  # fmt: skip
     path = store.create(Path(folder).resolve())
     if not by_version:
         _require_local(path, [s.id for s in scenarios])
@@ -265,6 +278,7 @@ def run_campaign(
     if not seal.secret:  # the seeds of a sealed campaign are drawn from 2**63
         require_unseen(entrants, scenarios, seeds)
     if by_version:
+        entrants = [replace(e, source=own_files(e) or e.source) for e in entrants]
         recordings = dict.fromkeys((s.id for s in scenarios), declared_recording(SIMULATOR_VERSION))
     else:
         recordings = {s.id: seal.recording(recording_digest(s, simulator)) for s in scenarios}
@@ -272,8 +286,8 @@ def run_campaign(
     def variant(entrant: Entrant, scenario: str) -> str:
         if by_version:
             return declared_variant(
-                scenario, SIMULATOR_VERSION, entrant.label, entrant.version, entrant.parameters
-            )  # fmt: skip
+                scenario, SIMULATOR_VERSION, entrant.label, entrant.version, entrant.parameters, own_files(entrant)
+            )
         return variant_of(entrant, recordings[scenario])
 
     variants = {s.id: {e.label: variant(e, s.id) for e in entrants} for s in scenarios}

@@ -16,13 +16,26 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from simnav.leaderboard.campaign.own_scores import same_code, scoring_code
-from simnav.leaderboard.results.provenance import is_commit
+from simnav.leaderboard.results.impossible import impossible
+from simnav.leaderboard.results.provenance import distinct, is_commit
+from simnav.leaderboard.results.versions import is_declared
 
 if TYPE_CHECKING:
     from simnav.leaderboard.results.provenance import Provenance
     from simnav.leaderboard.results.result import Result
 
-__all__ = ["CLOSE", "Comparison", "claims", "compared", "differing", "listed", "too_quick"]
+__all__ = [
+    "CLAIMED",
+    "CLOSE",
+    "Claims",
+    "Comparison",
+    "claims",
+    "compared",
+    "differing",
+    "listed",
+    "proven",
+    "too_quick",
+]
 
 #: Relative difference of a score that was computed from a trial in single precision.
 CLOSE = 1e-6
@@ -35,8 +48,15 @@ _PART_OF_ROW = 0.1
 _LIMIT = 0.25
 #: What of a provenance says where a run was made, and cannot be seen in what came out.
 _NOT_REPEATED = ("commit", "dirty", "cpu", "system", "confinement")
-#: What may have kept an estimator from the truth; empty in results of old versions.
-CONFINEMENTS = ("bubblewrap", "landlock", "process", "none", "")
+_VERSIONS = ("simnav", "python", "numpy", "numba", "gtsam", "scipy", "filterpy")
+_LATER = ("scipy", "filterpy")  # which results of older formats do not say
+#: What says that a run was made by the code that repeats it: by declared versions, or by digests of code. Versions do
+#: not change with a wording or a comment, so results of an older commit hold.
+_VERSIONED = ("simulator_version", "estimator_version")
+_BY_DIGEST = ("scenario_digest", "estimator_digest", "simnav")
+#: What a repetition proves of a run, and what of a result nobody can prove who was not there.
+_PROVEN = "status, note, parameters, draws and scores of the runs that were repeated, and the versions"
+CLAIMED = ("commit", "dirty", "cpu", "system", "confinement", "cores", "date", "seconds", "peak_memory")
 _MACHINE = ("timeout", "out-of-memory", "no-recording")
 
 
@@ -88,7 +108,7 @@ def differing(stored: Result, again: Result) -> tuple[list[str], list[str]]:
     from simnav.scoring import SCORES
 
     different, undecided = list[str](), list[str]()
-    for name in ("scenario_digest", "estimator_digest", "simnav", "parameters", "reference"):
+    for name in (*(_VERSIONED if is_declared(stored.recording) else _BY_DIGEST), "parameters", "reference"):
         _unequal(different, name, getattr(stored, name), getattr(again, name))
     if again.learned and not stored.learned:
         undecided.append(
@@ -159,19 +179,42 @@ def too_quick(pairs: Iterable[tuple[Result, Result]]) -> list[str]:
     ]
 
 
-def claims(results: Sequence[Result], here: Provenance) -> tuple[list[str], list[str]]:
+class Claims(NamedTuple):
     """What results say of where they were made, beside where they were repeated.
 
-    Returns
-    -------
+    Attributes
+    ----------
     different : list of str
-        Versions that are not those of the repetition; commits and kinds of confinement that do not exist.
+        Versions that are not those of the repetition; values that cannot exist; commits that are not in the history.
     unconfirmed : list of str
-        Commit, processor, system and confinement that are not those of the repetition. The digests in the keys say
+        Commit, processor, system and confinement that are not those of the repetition. The address of a result says
         that the code is the same; the rest nobody can confirm elsewhere.
+    fields : list of str
+        Names of the fields in ``unconfirmed``, each once.
     """
-    different, unconfirmed = list[str](), list[str]()
-    for name in ("simnav", "python", "numpy", "numba", "gtsam", "commit", "dirty", "cpu", "system", "confinement"):
+
+    different: list[str]
+    unconfirmed: list[str]
+    fields: list[str]
+
+
+def claims(results: Sequence[Result], here: Provenance, required: Iterable[str] = ()) -> Claims:
+    """Compare the provenance of results with that of their repetition.
+
+    Parameters
+    ----------
+    results : sequence of Result
+        All of a folder or a bundle.
+    here : Provenance
+        Of the repetition.
+    required : iterable of str
+        What a bundle requires; a version that it excludes cannot be that of its results.
+    """
+    found = Claims([], [], [])
+    wanted = list(required)
+    for made in distinct(r.provenance for r in results):
+        found.different.extend(text for text in impossible(made, wanted) if text not in found.different)
+    for name in (*_VERSIONS, *_NOT_REPEATED):
         counts: dict[Any, int] = {}
         for result in results:
             value = getattr(result.provenance, name)
@@ -182,13 +225,35 @@ def claims(results: Sequence[Result], here: Provenance) -> tuple[list[str], list
             words = f"{name} {_short(value)} is stored with {count} results, {_short(mine)} is here"
             if value == mine or (name == "python" and _minor(value) == _minor(mine)):
                 continue
-            if name == "confinement" and value not in CONFINEMENTS:
-                different.append(words)
-            elif name == "commit" and value and here.commit and not is_commit(value):
-                different.append(f"{words}, and no such commit is in the history here")
+            if name == "commit" and value and here.commit and not is_commit(value):
+                found.different.append(f"{words}, and no such commit is in the history here")
+            elif name in _NOT_REPEATED or (name in _LATER and not value):
+                found.unconfirmed.append(words)
+                found.fields.extend([] if name in found.fields else [name])
             else:
-                (unconfirmed if name in _NOT_REPEATED else different).append(words)
-    return different, unconfirmed
+                found.different.append(words)
+    return found
+
+
+def proven(repeated: int, fields: Sequence[str]) -> str:
+    """What a repetition proves and what is only claimed, in one sentence.
+
+    Parameters
+    ----------
+    repeated : int
+        Runs that were repeated and hold.
+    fields : sequence of str
+        Fields that differ from those of the repetition.
+
+    Examples
+    --------
+    >>> proven(0, [])
+    'nothing is proven, for no repeated run holds'
+    """
+    if not repeated:
+        return "nothing is proven, for no repeated run holds"
+    other = f", of which {', '.join(fields)} differ from here" if fields else ""
+    return f"proven: {_PROVEN}, {repeated} in all; only claimed: {', '.join(CLAIMED)}{other}"
 
 
 def _minor(version: str) -> str:

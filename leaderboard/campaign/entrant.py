@@ -29,6 +29,8 @@ class Entrant:
         Digest of the source of the estimator.
     version : int
         Declared version of the estimator.
+    own : str
+        Digest of the user's own code alone; empty for an estimator that comes with simnav.
     code : bytes
         The class itself, where no other process can import it.
     point : str
@@ -50,6 +52,7 @@ class Entrant:
     learned_from: tuple[tuple[int, int], ...] = ()
     learned: Mapping[str, Any] = field(default_factory=dict)
     version: int = 1
+    own: str = ""
 
     def find(self) -> type[Estimator]:
         """Its class, in the process in which it is run."""

@@ -13,6 +13,8 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 from simnav.estimator import Estimator, find, make, names, register
+from simnav.estimator.lookup import former_names_of
+from simnav.estimator.parameters import former_names, under_present_names
 from simnav.leaderboard.results.admission import label_fault, lookalikes
 from simnav.leaderboard.results.errors import RequestError, mistakes
 
@@ -40,7 +42,7 @@ class EstimatorRequest:
     name : str
         Registered name, ``my.py`` or ``my.py:MyFilter``.
     parameters : mapping
-        Keyword arguments of its constructor.
+        Keyword arguments of its constructor. Former names of a row of simnav or of a class become present ones.
     label : str
         Name in tables. Default: name and parameters.
     cls : type or None
@@ -60,10 +62,17 @@ class EstimatorRequest:
     search: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
+        if self.parameters and (formerly := self._formerly()):
+            with mistakes():
+                parameters = under_present_names(formerly, self.parameters, f"estimator {self.name!r}")
+            object.__setattr__(self, "parameters", parameters)
         if not self.label:
             settings = ",".join(f"{k}={v}" for k, v in self.parameters.items())
             plain = re.sub(r"\.py(?=$|:\w+$)", "", os.path.basename(self.name))
             object.__setattr__(self, "label", f"{plain}({settings})" if settings else plain)
+
+    def _formerly(self) -> Mapping[str, str]:
+        return former_names_of(self.name) if self.cls is None else former_names(self.cls)
 
     def make(self) -> Estimator:
         """An instance; `simnav.estimator.EstimatorError` as of `simnav.estimator.make`."""
@@ -235,7 +244,8 @@ def _known(item: EstimatorLike, parameters: Mapping[str, Any]) -> dict[str, Any]
     """Those of the parameters that an estimator has."""
     from simnav.estimator import describe
 
-    known = {p.name for p in describe(request(item).name).parameters}
+    about = describe(request(item).name)
+    known = {p.name for p in about.parameters} | set(former_names(about.cls))
     return {k: v for k, v in parameters.items() if k in known}
 
 

@@ -16,14 +16,21 @@ from simnav.estimator.registry import is_own_reference, point_of
 from simnav.leaderboard.campaign.confinement.attempt import describe, prepare
 from simnav.leaderboard.campaign.confinement.session import Limits
 from simnav.leaderboard.campaign.entrant import Entrant
-from simnav.leaderboard.campaign.fingerprint import estimator_source, named_files, own_code, variant, with_library
+from simnav.leaderboard.campaign.fingerprint import (
+    digest,
+    estimator_source,
+    named_files,
+    own_code,
+    variant,
+    with_library,
+)
 from simnav.leaderboard.campaign.isolation import isolate
 from simnav.leaderboard.campaign.request import EstimatorRequest, comes_with_simnav, file_of
 from simnav.leaderboard.campaign.session_class import carry, is_session
 from simnav.leaderboard.campaign.training_runs import declared_ranges, ranges_of, record_of
 from simnav.leaderboard.results.errors import RequestError, mistakes
 
-__all__ = ["resolve", "variant_of"]
+__all__ = ["own_files", "resolve", "variant_of"]
 
 _IMPORT_TIME = 60.0  # for importing and describing an estimator [s]
 _MEMORY = 2 << 30  # likewise [bytes]
@@ -82,7 +89,7 @@ def resolve(request: EstimatorRequest, confinement: str, hidden: Sequence[Path],
         raise RequestError(f"estimator {request.name!r}: {error}") from None
     return replace(
         entrant, source=source or with_library(found["source"]), learned_from=learned_from, learned=learned,
-        version=found["version"],
+        version=found["version"], own=found["source"],
     )  # fmt: skip
 
 
@@ -106,3 +113,10 @@ def _describe(entrant: Entrant) -> dict[str, Any]:
 def variant_of(entrant: Entrant, recording: str) -> str:
     """The key of an estimator's results without the seed: of a file the name counts, not the folder."""
     return variant(recording, entrant.label, os.path.basename(entrant.name), entrant.parameters, entrant.source)
+
+
+def own_files(entrant: Entrant) -> str:
+    """Digest of the files of an estimator of others, with those that its parameters name; empty for one of simnav."""
+    if not entrant.own:
+        return ""
+    return digest(entrant.own, *(content for _, content in named_files(entrant.parameters.values())))

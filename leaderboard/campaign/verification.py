@@ -10,7 +10,17 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from simnav.leaderboard.campaign.campaign import MEMORY, run_campaign
-from simnav.leaderboard.campaign.comparison import CLOSE, Comparison, claims, compared, differing, listed, too_quick
+from simnav.leaderboard.campaign.comparison import (
+    CLAIMED,
+    CLOSE,
+    Comparison,
+    claims,
+    compared,
+    differing,
+    listed,
+    proven,
+    too_quick,
+)
 from simnav.leaderboard.campaign.fingerprint import named_files
 from simnav.leaderboard.campaign.recorder import time_limit
 from simnav.leaderboard.campaign.request import EstimatorRequest
@@ -63,6 +73,12 @@ class Verification:
         Versions, commits and kinds of confinement that are not those of the repetition, or do not exist.
     unconfirmed : tuple of str
         What the results say of commit, processor, system and confinement, and cannot be confirmed here.
+    unconfirmed_fields : tuple of str
+        Names of the fields in ``unconfirmed``.
+    claimed : tuple of str
+        Fields that no repetition proves, also where they are as here.
+    summary : str
+        What is proven and what is only claimed, in one sentence.
     set_aside : tuple of str
         Results in the folder that cannot be those of a campaign.
     missing : tuple of str
@@ -86,6 +102,9 @@ class Verification:
     set_aside: tuple[str, ...] = ()
     missing: tuple[str, ...] = ()
     finds: str = ""
+    unconfirmed_fields: tuple[str, ...] = ()
+    claimed: tuple[str, ...] = CLAIMED
+    summary: str = ""
 
     @property
     def passed(self) -> bool:
@@ -157,11 +176,12 @@ def verify_results(
                 same += 1
         report(len(chosen), len(chosen))
     used = next((a.provenance.confinement for _, a in pairs if a.tried and not a.reference), "")
-    contradicted, unconfirmed = claims(mine, here(used))
+    said_of = claims(mine, here(used))
     return Verification(
         str(folder), len(found), seal.hash, len(found) - len(mine), len(chosen), same, tuple(close),
-        (*different, *too_quick(pairs)), tuple(without), tuple(unknown), tuple(contradicted), tuple(unconfirmed),
-        set_aside, missing, findable(len(mine), len(chosen)),
+        (*different, *too_quick(pairs)), tuple(without), tuple(unknown), tuple(said_of.different),
+        tuple(said_of.unconfirmed), set_aside, missing, findable(len(mine), len(chosen)), tuple(said_of.fields),
+        summary=proven(same + len(close), said_of.fields),
     )  # fmt: skip
 
 
@@ -181,7 +201,9 @@ def missing_seeds(results: Sequence[Result]) -> tuple[str, ...]:
 
 def _same_address(stored: Result, again: Result) -> bool:
     """Whether a result is that of a run: by declared versions, if it came with simnav, otherwise by its key."""
-    if not is_declared(stored.recording):
+    from simnav.estimator.registry import is_own
+
+    if not is_declared(stored.recording) or not is_own(stored.estimator.partition("(")[0]):
         return stored.key == again.key
     return [r.key for r in declared([stored])] == [r.key for r in declared([again])]
 
@@ -195,11 +217,14 @@ def _repeat(
 ) -> Result:
     scenario = known.get(result.scenario) or catalogued_scenario(result.scenario)
     request = requests.get(result.estimator) or request_of(result)
+    by_version = is_declared(result.recording) and not seal.secret
+    folder = folder / ("by-version" if by_version else "by-digest")
     usual = time_limit(scenario)  # a run that is said to have met a tiny limit is given the usual one
     run_campaign(
         [scenario], [request], [result.seed], folder, workers=1,
         timeout=min(max(result.time_limit, usual), _MOST_TIME * usual),
         memory=min(max(result.memory_limit, MEMORY), _MOST_MEMORY * MEMORY), seal=seal,
+        by_version=by_version,
     )  # fmt: skip
     mine = (result.scenario, result.estimator, result.seed)
     found = (r for r in store.load(folder, series=False) if (r.scenario, r.estimator, r.seed) == mine)

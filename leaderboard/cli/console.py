@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 __all__ = ["Output", "ProgressBar", "session"]
 
 USER, FAILED, INTERRUPTED = 2, 1, 130
+CLAIMED = 3  # of verify: what was repeated holds, and something else is only claimed
 _WIDTH_WITHOUT_TERMINAL = 150
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from simnav.leaderboard.cli.console import FAILED, Output, session
+from simnav.leaderboard.cli.console import CLAIMED, FAILED, Output, session
 from simnav.leaderboard.cli.options import Debug, Estimators, Json, OwnScenarios
 
 if TYPE_CHECKING:
@@ -45,7 +45,10 @@ def command(
     json: Json = False,
     debug: Debug = False,
 ) -> None:
-    """Check results or a submission, and repeat some of the runs, bit for bit."""
+    """Check results or a submission, and repeat some of the runs, bit for bit.
+
+    The exit code is 0 if all holds, 3 if it holds but some fields differ from here and are only claimed, 1 otherwise.
+    """
     with session(json, debug) as out:
         if results.is_file():
             from simnav.leaderboard import publishing
@@ -80,9 +83,14 @@ def command(
         same = done.same
         more = f", {len(done.close)} more within {CLOSE:.0e}" if done.close else ""
         lines.append(f"{same} of {done.repeated} repeated runs are the same to the bit{more}")
-        lines.append(done.finds)
+        lines += [done.finds, done.summary]
         out.print(*lines)
-        out.code = 0 if done.passed else FAILED
+        out.code = _code(done.passed, done.unconfirmed_fields)
+
+
+def _code(passed: bool, unconfirmed: Sequence[str]) -> int:
+    """Exit code: a script learns whether something is left that only the results say."""
+    return (CLAIMED if unconfirmed else 0) if passed else FAILED
 
 
 def _unknown(scores: Sequence[str]) -> str:
@@ -111,7 +119,7 @@ def _print(out: Output, report: SubmissionReport) -> None:
         f"{report.identical} of {report.repeated} repeated runs are the same to the bit, {report.close} more within "
         f"{report.tolerance:.0e}"
     )
-    lines.append(report.finds)
+    lines += [report.finds, report.summary]
     lines.append("the submission holds" if report.passed else "the submission does not hold")
     out.print(*lines)
-    out.code = 0 if report.passed else FAILED
+    out.code = _code(report.passed, report.unconfirmed_fields)

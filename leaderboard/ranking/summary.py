@@ -14,6 +14,8 @@ if TYPE_CHECKING:
 __all__ = ["best_rows", "gain_text", "less", "sentence", "spread"]
 
 _NAMED = 4  # rows that a sentence names
+#: From this ratio of errors on it is written as a multiple, and beyond the largest it is not written.
+_TIMES, _MOST_TIMES = 2.0, 100
 
 
 def best_rows(track: TrackRanking) -> list[Row]:
@@ -37,8 +39,12 @@ def spread(values: Iterable[float], write: str = "{:.0f}") -> str:
     ('24 to 25', '24')
     """
     known = sorted(v for v in values if math.isfinite(v))
-    texts = list(dict.fromkeys(write.format(v + 0.0) for v in known))
+    texts = list(dict.fromkeys(_without_sign_of_zero(write.format(v)) for v in known))
     return texts[0] if len(texts) == 1 else f"{texts[0]} to {texts[-1]}" if texts else tables.MISSING
+
+
+def _without_sign_of_zero(text: str) -> str:
+    return text.removeprefix("-") if float(text) == 0.0 else text
 
 
 def gain_text(rows: Sequence[Row], part: str = "value") -> str:
@@ -64,18 +70,36 @@ def gain_text(rows: Sequence[Row], part: str = "value") -> str:
 
 
 def _less(ratios: Iterable[float]) -> str:
-    """The range of some ratios of errors, as percentages less or more than 1.
+    """The range of some ratios of errors, as percentages less or more than 1; from twice the error on, as multiples.
 
     >>> _less([0.76, 0.75]), _less([1.03, 0.8]), _less([1.1]), _less([float("nan")])
     ('24 to 25 % less', '3 % more to 20 % less', '10 % more', '')
+    >>> _less([2.5, 0.8]), _less([1.002, 2.04]), _less([500.0, 12.0])
+    ('2.5 times the error to 20 % less', '0 % to 2 times the error', '12 to over 100 times the error')
     """
-    known = [less(r) for r in ratios if math.isfinite(r)]
+    known = [r for r in ratios if math.isfinite(r)]
     if not known:
         return ""
-    low, high = min(known), max(known)
-    if low < -0.5 and high > 0.5:
-        return f"{spread([-low])} % more to {spread([high])} % less"
-    return f"{spread([low, high])} % less" if high > 0.5 or low > -0.5 else f"{spread([-high, -low])} % more"
+    best, worst = min(known), max(known)
+    if worst < _TIMES:
+        low, high = less(worst), less(best)
+        if low < -0.5 and high > 0.5:
+            return f"{spread([-low])} % more to {spread([high])} % less"
+        return f"{spread([low, high])} % less" if high > 0.5 or low > -0.5 else f"{spread([-high, -low])} % more"
+    if best >= _TIMES:
+        return f"{spread([best], '{:.2g}')} to {_multiple(worst)}" if best < worst else _multiple(worst)
+    change = less(best)
+    return (
+        f"{_multiple(worst)} to {spread([change])} % less" if change > 0.5 else f"{_more(change)} to {_multiple(worst)}"
+    )
+
+
+def _more(change: float) -> str:
+    return f"{spread([-change])} % more" if change < -0.5 else "0 %"
+
+
+def _multiple(ratio: float) -> str:
+    return f"over {_MOST_TIMES} times the error" if ratio > _MOST_TIMES else f"{ratio:.2g} times the error"
 
 
 def sentence(track: TrackRanking) -> str:

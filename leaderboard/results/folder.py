@@ -25,6 +25,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO, TypeVar
 
 from simnav.leaderboard.results.errors import StoreError
+from simnav.leaderboard.results.former_names import under_present_labels
 from simnav.leaderboard.results.provenance import BENCHMARK
 from simnav.leaderboard.results.result import FORMAT, READABLE, batches
 
@@ -140,6 +141,9 @@ def read_marker(path: Path) -> dict[str, Any]:
         content = json.loads(marker.read_bytes())
         if not isinstance(content["format"], int) or not _is_current(content.setdefault("current", {})):
             raise ValueError("no format")
+        for entry in content["current"].values():
+            if "estimators" in entry:
+                entry["estimators"] = under_present_labels(entry["estimators"])
         return dict(content)
     except (ValueError, KeyError, TypeError, RecursionError) as error:
         set_aside(marker, error)

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from simnav.leaderboard.results.admission import table_of
 from simnav.leaderboard.results.ahead import made_ahead
 from simnav.leaderboard.results.errors import printable
+from simnav.leaderboard.results.former_names import present_label, present_parameters
 from simnav.leaderboard.results.provenance import Provenance
 from simnav.leaderboard.results.stored_scores import StoredScores
 from simnav.scoring.consistency import ending
@@ -295,7 +296,7 @@ def rows(
     scores: Collection[str] | None = None,
     series: Callable[[int], Mapping[str, Series]] | None = None,
 ) -> Iterator[Result]:
-    """Results of a table; the column of series may be missing.
+    """Results of a table, parameters under their present names; the column of series may be missing.
 
     Parameters
     ----------
@@ -316,6 +317,11 @@ def rows(
     }
     plain = [name for name in table.column_names if name not in _HEAVY]
     columns = {name: listed(table.column(name), converted.get(name)) for name in plain}
+    for k, parameters in enumerate(columns["parameters"]):
+        if parameters:
+            label = columns["estimator"][k]
+            columns["parameters"][k] = present_parameters(label, parameters)
+            columns["estimator"][k] = present_label(label)
     columns["scores"] = _scores(table.column("scores"), scores)
     if "series" in table.column_names:
         found = SeriesColumn(table.column("series"))

@@ -3,7 +3,10 @@
 What comes with simnav is computed once and read for years, so a wording, a name or a comment in the code must not make
 it out of date. Its address is the version of the benchmark, the versioned id of the scenario, the version of the
 simulator, label, version and parameters of the row, and the seed. ``tests/golden`` demands a new version where a number
-changes. Folders of local campaigns have digests of code instead (`simnav.leaderboard.campaign.fingerprint`).
+changes. A submission has the same address, with a digest of the submitter's own files: of these nobody declares a
+version that others could rely on.
+
+Folders of local campaigns have digests of code instead (`simnav.leaderboard.campaign.fingerprint`).
 """
 
 from __future__ import annotations
@@ -39,7 +42,9 @@ def is_declared(recording: str) -> bool:
     return re.fullmatch(r"simulator-\d+", recording) is not None
 
 
-def declared_variant(scenario: str, simulator: int, label: str, version: int, parameters: Mapping[str, Any]) -> str:
+def declared_variant(
+    scenario: str, simulator: int, label: str, version: int, parameters: Mapping[str, Any], own: str = ""
+) -> str:
     """The key of an estimator's results without the seed.
 
     Parameters
@@ -52,8 +57,10 @@ def declared_variant(scenario: str, simulator: int, label: str, version: int, pa
         Label of the estimator.
     parameters : mapping
         That were set.
+    own : str
+        Digest of the files of an estimator that does not come with simnav.
     """
-    facts = [BENCHMARK, scenario, simulator, label, version, dict(parameters)]
+    facts = [BENCHMARK, scenario, simulator, label, version, dict(parameters), *filter(None, [own])]
     text = json.dumps(facts, sort_keys=True, default=str)
     return hashlib.blake2b(text.encode(errors="surrogatepass"), digest_size=12).hexdigest()
 

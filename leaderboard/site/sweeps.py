@@ -14,6 +14,7 @@ from typing import Any
 
 from simnav.leaderboard.results.errors import RequestError
 from simnav.leaderboard.results.files import write_whole
+from simnav.leaderboard.results.former_names import present_label
 from simnav.leaderboard.results.plain import plain
 from simnav.leaderboard.site.charts import Chart, columns, dial
 from simnav.leaderboard.site.rounding import short
@@ -116,7 +117,10 @@ def find(folder: Path) -> list[SweepFile]:
     found = []
     for path in sorted(folder.glob("*/sweep-*.json")):
         try:
-            one = SweepFile(path, json.loads(path.read_bytes()))
+            content = json.loads(path.read_bytes())
+            for entry in (*content["points"], *content["breaking_points"]):
+                entry["estimator"] = present_label(str(entry["estimator"]))
+            one = SweepFile(path, content)
             one.section(0)
         except (OSError, ValueError, KeyError, TypeError, IndexError) as error:
             raise RequestError(f"{path} is not what 'simnav sweep' writes; run the sweep again ({error!r})") from None

@@ -19,7 +19,8 @@ from simnav.leaderboard.submission.requirement import requirement
 __all__ = ["clean_python", "install_requirements", "search_variables"]
 
 _LONGEST = 1800.0  # that an installation may take [s]
-_PINNED = ("numpy", "numba", "gtsam")  # whose versions may change the bits of results
+_PINNED = ("numpy", "numba", "gtsam", "scipy", "filterpy")  # whose versions may change the bits of results
+_WHEELS = ("numpy", "numba", "gtsam", "scipy")
 
 
 def clean_python(folder: Path, versions: Mapping[str, str]) -> Path:
@@ -30,7 +31,7 @@ def clean_python(folder: Path, versions: Mapping[str, str]) -> Path:
     folder : Path
         Folder of the environment; it should not exist yet.
     versions : mapping of str to str
-        Versions of numpy, numba and gtsam that the results were made with; empty versions are not pinned.
+        Versions of numpy, numba, gtsam, scipy and filterpy that the results were made with; empty ones are not pinned.
 
     Raises
     ------
@@ -41,7 +42,7 @@ def clean_python(folder: Path, versions: Mapping[str, str]) -> Path:
     python = folder / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
     simnav = _copied(LIBRARY.parent, folder.with_name("simnav-source")) or f"simnav=={version('simnav')}"
     pinned = [f"{name}=={versions[name]}" for name in _PINNED if re.fullmatch(r"[\w.+!]+", versions.get(name, ""))]
-    wheels = ["--only-binary", ",".join(_PINNED)]  # of an old version that only its source is left, nothing is built
+    wheels = ["--only-binary", ",".join(_WHEELS)]  # of an old version that only its source is left, nothing is built
     _pip(python, [*wheels, simnav, *pinned], "simnav cannot be installed into a new environment")
     return python
 

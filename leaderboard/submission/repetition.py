@@ -29,7 +29,8 @@ __all__ = ["Again", "Asked", "Wanted", "answer"]
 
 #: What is compared of a run beside its status and scores.
 _FACTS = ("key", "recording", "parameters", "reference", "learned", "note", "draws", "seconds", "peak_memory", "simnav",
-          "time_limit", "memory_limit", "scoring", "scenario_digest", "estimator_digest")  # fmt: skip
+          "time_limit", "memory_limit", "scoring", "scenario_digest", "estimator_digest", "simulator_version",
+          "estimator_version")  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -68,6 +69,8 @@ class Asked:
         Key of the sealed seeds, in hexadecimal.
     confinement : str
         As in `simnav.leaderboard.interface.campaign`.
+    by_version : bool
+        Whether the results are known by declared versions; those of bundles of old are known by digests of code.
     """
 
     folder: str
@@ -75,6 +78,7 @@ class Asked:
     runs: list[Wanted]
     key: str = ""
     confinement: str = "auto"
+    by_version: bool = False
 
     def text(self) -> str:
         """Write the request as one line of JSON."""
@@ -132,13 +136,14 @@ def answer(asked: Asked, progress: Callable[..., None]) -> dict[str, Any]:
     seal = Seal(bytes.fromhex(asked.key))
     found: dict[tuple[bool, str, str, int], Again] = {}
     total, done = sum(len(w.seeds) for w in asked.runs), 0
-    for sealed in (False, True):  # in one folder, because the estimators' processes are made for one
+    for sealed in (False, True):
         for wanted in (w for w in asked.runs if w.sealed == sealed):
             what = f"{wanted.label} on {wanted.scenario}"
             progress(done, total, what)
             try:
                 run_campaign(
-                    [catalogued_scenario(wanted.scenario)], [requests[wanted.label]], wanted.seeds, asked.folder,
+                    [catalogued_scenario(wanted.scenario)], [requests[wanted.label]], wanted.seeds,
+                    f"{asked.folder}-sealed" if sealed else asked.folder, by_version=asked.by_version and not sealed,
                     workers=1, confinement=asked.confinement, seal=seal if sealed else PUBLIC,
                     progress=partial(_noted, progress, done, total, what),
                 )  # fmt: skip
@@ -148,7 +153,8 @@ def answer(asked: Asked, progress: Callable[..., None]) -> dict[str, Any]:
                     found[key] = Again(wanted.scenario, wanted.label, seed, sealed, "not-run", sentence(error))
             done += len(wanted.seeds)
             progress(done, total, wanted.scenario)
-        for r in store.load(asked.folder, series=False) if Path(asked.folder).is_dir() else ():
+        made = Path(f"{asked.folder}-sealed" if sealed else asked.folder)
+        for r in store.load(made, series=False) if made.is_dir() else ():
             if bool(r.provenance.seal) == sealed:
                 found[sealed, r.scenario, r.estimator, r.seed] = Again(
                     r.scenario, r.estimator, r.seed, sealed, r.status, r.reason, dict(r.scores),

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from simnav.leaderboard.campaign.campaign import MEMORY
-from simnav.leaderboard.campaign.comparison import claims, differing, listed, too_quick
+from simnav.leaderboard.campaign.comparison import CLAIMED, claims, differing, listed, proven, too_quick
 from simnav.leaderboard.campaign.confinement.attempt import chosen_confinement
 from simnav.leaderboard.campaign.recorder import time_limit
 from simnav.leaderboard.campaign.sampling import findable, sample_size
@@ -27,6 +27,7 @@ from simnav.leaderboard.results.catalogued import catalogued_scenario
 from simnav.leaderboard.results.errors import RequestError, mistakes
 from simnav.leaderboard.results.provenance import BENCHMARK, Provenance, benchmark_of, distinct
 from simnav.leaderboard.results.scratch import scratch
+from simnav.leaderboard.results.versions import is_declared
 from simnav.leaderboard.submission.bundle import Bundle, open_bundle
 from simnav.leaderboard.submission.environment import clean_python, install_requirements, search_variables
 from simnav.leaderboard.submission.repetition import Again, Asked, Wanted
@@ -102,6 +103,10 @@ class SubmissionReport:
         Runs that the repetition does not confirm, such as one that meets a limit of time on one machine only.
     unconfirmed : tuple of str
         What the results say of commit, processor, system and confinement, and cannot be confirmed here.
+    unconfirmed_fields, claimed : tuple of str
+        Names of the fields in ``unconfirmed``, and of all that no repetition proves.
+    summary : str
+        What is proven and what is only claimed, in one sentence.
     finds : str
         What the sample can find.
     unknown : tuple of str
@@ -129,6 +134,9 @@ class SubmissionReport:
     finds: str
     unknown: tuple[str, ...]
     sealed: tuple[SealedRuns, ...]
+    unconfirmed_fields: tuple[str, ...] = ()
+    claimed: tuple[str, ...] = CLAIMED
+    summary: str = ""
 
     @property
     def worse(self) -> tuple[SealedRuns, ...]:
@@ -175,6 +183,7 @@ def verify_bundle(
             install_requirements(python, bundle.contents.requires, home / "packages")
         asked = Asked(
             str(home / "runs"), bundle.requests(home / "packages"), wanted, seal.key.hex(), confinement,
+            all(is_declared(r.recording) for r in results),
         )  # fmt: skip
         again, where = repeat(python, asked, home, not present, report)
     known = {(r.scenario, r.estimator, r.seed): r for r in chosen}
@@ -199,15 +208,16 @@ def verify_bundle(
         findings.append(f"{missing} runs of the sample gave no answer")
     different += too_quick(pairs)
     used = next((a.confinement for a in again if a.confinement), "")
-    contradicted, unconfirmed = claims(results, replace(where, confinement=used))
-    findings += contradicted
     contents = bundle.contents
+    said_of = claims(results, replace(where, confinement=used), contents.requires)
+    findings += said_of.different
     return SubmissionReport(
         str(path), bundle.digest, contents.title, tuple(r.label for r in contents.estimators), contents.profile,
         len(results), tuple(findings), f"{'present' if present else 'clean'} environment: {_versions(where)}",
         len(chosen), identical, close, tolerance, tuple(different), tuple(undecided),
-        tuple(unconfirmed), findable(len(results), len(chosen)), tuple(unknown),
-        _compared(results, [a for a in again if a.sealed]),
+        tuple(said_of.unconfirmed), findable(len(results), len(chosen)), tuple(unknown),
+        _compared(results, [a for a in again if a.sealed]), tuple(said_of.fields),
+        summary=proven(identical + close, said_of.fields),
     )  # fmt: skip
 
 
@@ -408,16 +418,22 @@ def _difference(before: Result, again: Again, tolerance: float, where: Provenanc
 
 
 def _other_code(before: Result, again: Result, where: Provenance) -> str:
+    """Why a run is not the same: another simulator or scenario, other files of the submitter; empty where it is."""
     if again.recording != before.recording:
         made = before.provenance
         return (
-            "the scenario or the simulator is not that of the results, which were made with simnav "
-            f"{made.simnav} at commit {made.commit[:12] or 'unknown'}{' with changes' if made.dirty else ''}; here is "
-            f"{where.simnav} at commit {where.commit[:12] or 'unknown'}"
+            f"the scenario or the simulator is not that of the results, which were made with simnav {made.simnav}"
+            f"{_at(made)} ({before.recording:.40}); here is {where.simnav}{_at(where)} ({again.recording:.40})"
         )
-    if again.key != before.key:
+    if again.estimator_version != before.estimator_version:
+        return f"the estimator declares version {again.estimator_version}, the results {before.estimator_version}"
+    if again.key != before.key or (is_declared(before.recording) and again.estimator_digest != before.estimator_digest):
         return "the results were not made with this source, this name and these parameters"
     return ""
+
+
+def _at(made: Provenance) -> str:
+    return f" at commit {made.commit[:12] or 'unknown'}{' with changes' if made.dirty else ''}"
 
 
 def _worst_score(before: Result, again: Again, tolerance: float) -> str:

@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal, TypeAlias, get_args
 
 from simnav.estimator import describe
+from simnav.estimator.parameters import former_names
 from simnav.leaderboard.campaign.request import EstimatorRequest
 from simnav.leaderboard.results.errors import RequestError
 
@@ -113,15 +114,18 @@ def space_of(request: EstimatorRequest, ranges: Sequence[str | Range]) -> tuple[
     request : EstimatorRequest
         The row; a parameter that it sets holds, and is not varied.
     ranges : sequence of str or Range
-        What is varied; as text, ``"name=low:high"`` with ``:log`` or ``:integer``.
+        What is varied; as text, ``"name=low:high"`` with ``:log`` or ``:integer``. Former names of parameters are
+        replaced by the present ones.
 
     Raises
     ------
     RequestError
         If there is no such parameter, it is no number or outside of its range, or it is set or varied twice.
     """
-    known = {p.name: p.default for p in describe(request.name).parameters}
-    space = tuple(r if isinstance(r, Range) else read_range(r) for r in ranges)
+    about = describe(request.name)
+    known, formerly = {p.name: p.default for p in about.parameters}, former_names(about.cls)
+    given = [r if isinstance(r, Range) else read_range(r) for r in ranges]
+    space = tuple(replace(r, name=formerly.get(r.name, r.name)) for r in given)
     if not space:
         raise RequestError(f"no parameter is varied; {request.label} has: {', '.join(known) or 'none'}")
     present = {}

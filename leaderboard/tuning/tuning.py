@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 import numpy as np
 
+from simnav.estimator.lookup import former_names_of
 from simnav.leaderboard.campaign.request import EstimatorRequest
 from simnav.leaderboard.results.errors import RequestError
 from simnav.leaderboard.results.frame import frame
@@ -143,7 +144,7 @@ class Tuning:
 
 
 def read(path: Path) -> dict[str, Any]:
-    """A file of a tuning, as written by `Tuning.write`.
+    """A file of a tuning, as written by `Tuning.write`, with the present names of the parameters.
 
     Raises
     ------
@@ -156,6 +157,11 @@ def read(path: Path) -> dict[str, Any]:
         raise RequestError(f"{path}: it cannot be read: {error}") from None
     if not isinstance(found, dict) or not {"estimator", "chosen", "ranges", "families", "seeds"} <= set(found):
         raise RequestError(f"{path}: it is not the file of a tuning, as 'simnav tune' writes it")
+    names = former_names_of(str(found["estimator"]).partition("(")[0])
+    if names:
+        for part in ("chosen", "present"):
+            found[part] = {names.get(name, name): value for name, value in found.get(part, {}).items()}
+        found["ranges"] = [{**r, "name": names.get(r["name"], r["name"])} for r in found["ranges"]]
     return found
 
 

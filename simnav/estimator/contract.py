@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from simnav.estimator.needs import Needs
@@ -39,6 +39,10 @@ class Estimator(ABC):
         Version of its numbers, from 1. It is raised whenever a change of code alters an estimate, and is stored with
         each result. A version after 1 has a line in the section ``Versions`` of the docstring, which says what changed.
         A class has its own; that of its base is not inherited.
+    formerly : mapping of str to str
+        Former names of parameters, and the present ones: ``{"window": "innovations"}``. `simnav.estimator.make` reads
+        the former ones, and so do the constructors of rows. Results and tuned files of simnav's rows are shown under
+        the present ones.
     """
 
     name: ClassVar[str] = ""
@@ -46,6 +50,7 @@ class Estimator(ABC):
     slow: ClassVar[bool] = False
     real_time_as: ClassVar[str] = ""
     version: ClassVar[int] = 1
+    formerly: ClassVar[Mapping[str, str]] = {}
 
     def __init_subclass__(cls, **options: Any):
         super().__init_subclass__(**options)

@@ -6,6 +6,7 @@ import contextlib
 import inspect
 import re
 import typing
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -13,12 +14,20 @@ from typing import Any
 
 from simnav.estimator.contract import Estimator, EstimatorError
 from simnav.estimator.files import class_in_file
-from simnav.estimator.parameters import Parameter, constructors_of, converted, open_ended, parameters_of
-from simnav.estimator.registry import aliases_of, registered
+from simnav.estimator.parameters import (
+    Parameter,
+    constructors_of,
+    converted,
+    former_names,
+    open_ended,
+    parameters_of,
+    under_present_names,
+)
+from simnav.estimator.registry import aliases_of, own_class, registered
 from simnav.plugins import place_of
 from simnav.spec import closest
 
-__all__ = ["Description", "describe", "find", "make"]
+__all__ = ["Description", "describe", "find", "former_names_of", "make"]
 
 
 @dataclass(frozen=True)
@@ -108,6 +117,12 @@ def describe(name_or_path: str) -> Description:
     )
 
 
+def former_names_of(name: str) -> Mapping[str, str]:
+    """Former names of the parameters of an estimator that comes with simnav, and the present ones; else none."""
+    cls = own_class(name)
+    return {} if cls is None else former_names(cls)
+
+
 def make(name_or_path: str, **parameters: Any) -> Estimator:
     """Make an estimator.
 
@@ -116,8 +131,9 @@ def make(name_or_path: str, **parameters: Any) -> Estimator:
     name_or_path : str
         As for `find`.
     **parameters
-        Of its constructor. A string is converted to what the annotation, or else the default, asks
-        for: numbers, ``true``/``false``, ``none``, a choice, or several values parted by commas.
+        Of its constructor; former names are read, too (`Estimator.formerly`). A string is converted to what the
+        annotation, or else the default, asks for: numbers, ``true``/``false``, ``none``, a choice, or several values
+        parted by commas.
 
     Raises
     ------
@@ -133,7 +149,7 @@ def make(name_or_path: str, **parameters: Any) -> Estimator:
             hints |= typing.get_type_hints(constructor)
     takes_any = bool(constructors) and open_ended(constructors[-1])
     values: dict[str, Any] = {}
-    for key, value in parameters.items():
+    for key, value in under_present_names(former_names(cls), parameters, f"estimator {cls.name!r}").items():
         if key not in known and not takes_any:
             hint = closest(key, list(known)) if known else "; it takes none"
             raise EstimatorError(f"estimator {cls.name!r} has no parameter {key!r}{hint}")

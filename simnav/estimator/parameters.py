@@ -6,13 +6,21 @@ import ast
 import inspect
 import types
 import typing
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from simnav.estimator.contract import Estimator, EstimatorError
 
-__all__ = ["Parameter", "constructors_of", "converted", "open_ended", "parameters_of"]
+__all__ = [
+    "Parameter",
+    "constructors_of",
+    "converted",
+    "former_names",
+    "open_ended",
+    "parameters_of",
+    "under_present_names",
+]
 
 
 @dataclass(frozen=True)
@@ -48,6 +56,45 @@ def parameters_of(cls: type[Estimator]) -> list[inspect.Parameter]:
         found |= {p.name: p for p in own if p.kind in kinds and p.name not in found}
         kinds = kinds[:1]
     return list(found.values())
+
+
+def former_names(cls: type[Estimator]) -> Mapping[str, str]:
+    """Former names of parameters that are still read, and the present ones.
+
+    What a class inherits of `Estimator.formerly` counts only where it has the parameter, and no other of the old name.
+    """
+    if not cls.formerly:
+        return {}
+    known = {p.name for p in parameters_of(cls)}
+    return {old: new for old, new in cls.formerly.items() if new in known and old not in known}
+
+
+def under_present_names(names: Mapping[str, str], parameters: Mapping[str, Any], what: str) -> dict[str, Any]:
+    """Parameters with present names in place of former ones.
+
+    Parameters
+    ----------
+    names : mapping of str to str
+        As of `former_names`.
+    parameters : mapping
+        Values by name.
+    what : str
+        Whose parameters they are, for the message.
+
+    Raises
+    ------
+    EstimatorError
+        If a parameter is given under both names.
+
+    Examples
+    --------
+    >>> under_present_names({"window": "innovations"}, {"window": 30, "scope": "all"}, "iae-fixed")
+    {'innovations': 30, 'scope': 'all'}
+    """
+    for old in parameters:
+        if names.get(old) in parameters:
+            raise EstimatorError(f"{what}: {old!r} is the former name of {names[old]!r}; give one of them, not both")
+    return {names.get(name, name): value for name, value in parameters.items()}
 
 
 def constructors_of(cls: type[Estimator]) -> list[Callable[..., Any]]:

@@ -28,6 +28,7 @@ __all__ = [
     "is_own_reference",
     "kebab",
     "names",
+    "own_class",
     "point_of",
     "register",
     "registered",
@@ -167,11 +168,16 @@ def is_own_reference(name: str) -> bool:
     return getattr(sys.modules.get(cls.__module__), cls.__qualname__, None) is cls
 
 
-def is_own(name: str) -> bool:
-    """Whether a name or alias is that of an estimator that comes with simnav."""
+def own_class(name: str) -> type[Estimator] | None:
+    """The class of a name or alias of an estimator that comes with simnav; None for all others."""
     discover_own()
     cls = _classes.get(_aliases.get(name, name))
-    return cls is not None and cls.__module__.startswith("simnav.estimators.")
+    return cls if cls is not None and cls.__module__.startswith("simnav.estimators.") else None
+
+
+def is_own(name: str) -> bool:
+    """Whether a name or alias is that of an estimator that comes with simnav."""
+    return own_class(name) is not None
 
 
 def _is_ours(point: EntryPoint) -> bool:

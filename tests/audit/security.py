@@ -21,6 +21,7 @@ from tests.fuzz import fuzz_logs, fuzz_tomls
 from tests.hostile.answers import fuzz_answers
 from tests.hostile.attacks import CHEATS, Harm, cheats, plain, vandals
 from tests.hostile.channels import told
+from tests.hostile.meetings import seen
 
 __all__ = ["kills", "parts", "rows"]
 
@@ -46,6 +47,7 @@ def parts() -> dict[str, Callable[[], Any]]:
     for kind in confinements():
         found[f"cheats-{kind}"] = partial(_in_folder, partial(cheats, confinement=kind))
         found[f"channels-{kind}"] = partial(_in_folder, lambda folder, kind=kind: sorted(told(folder, kind)))
+        found[f"meetings-{kind}"] = partial(_in_folder, lambda folder, kind=kind: sorted(seen(folder, kind)))
         found[f"vandals-{kind}"] = partial(_in_folder, lambda folder, kind=kind: asdict(vandals(folder, kind)))
     found |= {f"kills-{k}": partial(kills, KILLS // _KILLS, k) for k in range(_KILLS)}
     found |= {f"tomls-{k}": partial(_tracebacks, fuzz_tomls, TOMLS // _TOMLS, k) for k in range(_TOMLS)}
@@ -69,6 +71,8 @@ def rows(found: Mapping[str, Any]) -> Iterator[tuple[str, str, str, bool]]:
         yield what, f"{len(harm.unnamed)} of {harm.tried}", "0", not harm.unnamed
         passed = found[f"channels-{kind}"]
         yield f"marks that a row of a sealed run finds of another ({kind})", f"{len(passed)}", "0", not passed
+        passed = found[f"meetings-{kind}"]
+        yield f"signs that a row sees of one that runs beside it ({kind})", f"{len(passed)}", "0", not passed
     wars = [found[f"kills-{k}"] for k in range(_KILLS)]
     killed, campaigns, differ = (sum(column) for column in zip(*wars, strict=True))
     yield f"campaigns with other results after {killed} SIGKILLs", f"{differ} of {campaigns}", "0", not differ

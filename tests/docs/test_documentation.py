@@ -168,6 +168,7 @@ def test_a_learning_agent(tmp_path, monkeypatch, capsys):
 @pytest.mark.parametrize(
     ("page", "number"), [("how-to/combine-pieces.md", 0), ("how-to/combine-pieces.md", 1),
                          ("how-to/combine-pieces.md", 2), ("how-to/combine-pieces.md", 3),
+                         ("how-to/combine-pieces.md", 5),
                          ("how-to/filterpy.md", 0)],
 )  # fmt: skip
 def test_estimators_of_the_guides_keep_the_contract(tmp_path, page, number):
@@ -175,6 +176,12 @@ def test_estimators_of_the_guides_keep_the_contract(tmp_path, page, number):
     path.write_text(blocks(page, "python")[number])
     report = check(str(path))
     assert report.passed, str(report)
+
+
+def test_parameters_that_two_pieces_have_in_common():
+    names = dict[str, Any]()
+    exec(blocks("how-to/combine-pieces.md", "python")[4], names)
+    assert (names["row"].adaptation.dof, names["row"].smoother.dof) == (8.0, 6.0)
 
 
 def test_the_environment(capsys):

@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
+import copy
 import inspect
 import json
 import pickle
 import re
+import subprocess
+import sys
+import typing
 from functools import cache
 from pathlib import Path
 
+import cloudpickle
 import numpy as np
 import pytest
 
 from simnav.estimator import EstimatorError, describe, find, make, names, register
+from simnav.estimator.parameters import former_names
 from simnav.estimators.adaptations.adkf import AdaptiveFactor
 from simnav.estimators.adaptations.fading import FadingMemory
 from simnav.estimators.adaptations.gating import ChiSquareGate
@@ -20,7 +26,7 @@ from simnav.estimators.adaptations.innovation_based import InnovationBased
 from simnav.estimators.adaptations.sage_husa import SageHusa
 from simnav.estimators.adaptations.truth import TrueNoise
 from simnav.estimators.adaptations.variational_bayes import VariationalBayes
-from simnav.estimators.composition import Row, documented, piece
+from simnav.estimators.composition import Row, Solver, documented, piece
 from simnav.estimators.models.inertial import InertialModel
 from simnav.estimators.models.inertial_points import InertialPoints
 from simnav.estimators.models.kinematic import KinematicModel
@@ -66,7 +72,8 @@ def test_every_name_alias_parameter_and_default_is_still_there(name: str):
     assert sorted(now.aliases) == told["aliases"]
     assert (now.slow, now.reference) == (told["slow"], told["reference"])
     defaults = {p.name: list(p.default) if isinstance(p.default, tuple) else p.default for p in now.parameters}
-    assert {n: defaults[n] for n in told["parameters"]} == told["parameters"]
+    formerly = former_names(now.cls)
+    assert {n: defaults[formerly.get(n, n)] for n in told["parameters"]} == told["parameters"]
 
 
 def test_the_same_noise_has_the_same_parameters_in_a_filter_and_in_a_window():
@@ -92,11 +99,44 @@ def test_what_a_piece_documents_together_stays_together():
     assert documented(find("iae"))["lowest"] == documented(find("iae"))["highest"]
 
 
-@pytest.mark.parametrize("name", [n for n in RECORDED if "dead" not in n])
-def test_a_row_can_be_pickled(name: str):
-    row = pickle.loads(pickle.dumps(make(name)))
-    assert type(row) is find(name)
-    assert row.solver.row == name
+@pytest.mark.parametrize("name", names())
+def test_an_estimator_and_its_class_can_be_pickled(name: str):
+    cls = pickle.loads(pickle.dumps(find(name)))
+    assert cls is find(name)
+    for row in (pickle.loads(pickle.dumps(make(name))), copy.deepcopy(make(name))):
+        assert type(row) is cls
+        assert not isinstance(getattr(row, "solver", None), Solver) or row.solver.row == name
+
+
+def test_a_row_of_a_session_can_be_sent_to_another_process():
+    code = (
+        "import sys, pickle, inspect; cls, row = pickle.loads(sys.stdin.buffer.read());"
+        "assert row.adaptation.probability == 0.9 and type(row) is cls, row;"
+        "assert inspect.signature(cls).parameters['probability'].annotation is float;"
+        "assert cls(patience=3.0).adaptation.patience == 3.0"
+    )
+
+    class Sent(Row, solver=KalmanEstimator, model=InertialModel, adaptation=ChiSquareGate):
+        """Known to this process only."""
+
+    sent = cloudpickle.dumps((Sent, Sent(probability=0.9)))
+    subprocess.run([sys.executable, "-c", code], input=sent, check=True)
+
+
+@pytest.mark.parametrize("name", [n for n in names() if issubclass(find(n), Row)])
+def test_the_signature_of_a_row_has_types_and_defaults_and_is_meant(name: str):
+    cls = find(name)
+    signature = inspect.signature(cls)
+    hints = typing.get_type_hints(cls.__init__)
+    values = {}
+    for parameter in signature.parameters.values():
+        assert parameter.kind is parameter.KEYWORD_ONLY
+        assert parameter.annotation == hints[parameter.name]
+        assert not isinstance(parameter.annotation, str)
+        values[parameter.name] = parameter.default
+    assert type(cls(**values)) is cls
+    with pytest.raises(TypeError, match="has no parameter 'oar'"):
+        cls(oar=1)
 
 
 def test_a_row_has_what_its_solver_has():
@@ -149,21 +189,59 @@ def test_pieces_are_changed_for_a_row():
         Row,
         solver=piece(WindowEstimator, defaults={"window": 7}, spacing=0.5),
         model=InertialModel,
-        adaptation=piece(VariationalBayes, rename={"iterations": "noise_iterations"}),
+        adaptation=VariationalBayes,
     ):
         """Changed."""
 
     parameters = inspect.signature(Changed).parameters
-    assert "spacing" not in parameters
-    assert (parameters["window"].default, parameters["noise_iterations"].default) == (7, 2)
-    row = Changed(noise_iterations=4, iterations=6)
+    assert not {"spacing", "iterations"} & set(parameters)
+    both = parameters["adaptation__iterations"].default, parameters["solver__iterations"].default
+    assert (parameters["window"].default, *both) == (7, 2, 10)
+    row = Changed(adaptation__iterations=4, solver__iterations=6)
     assert (row.window, row.spacing, row.adaptation.iterations, row.iterations) == (7, 0.5, 4, 6)
     assert Changed().window == 7
+    assert "alternating" not in documented(Changed)["solver__iterations"][1]
+    assert documented(Changed)["adaptation__iterations"] == documented(VariationalBayes)["iterations"]
+
+
+class Former(Gated):
+    """The gate, whose parameter had another name."""
+
+    formerly = {"limit": "probability", "patience": "probability", "gone": "away"}  # noqa: RUF012
+
+
+def test_a_former_name_is_read_where_no_parameter_has_it():
+    assert Former(limit=0.9).adaptation.probability == 0.9
+    assert Former(patience=3.0).adaptation.patience == 3.0  # it is a parameter
+    with pytest.raises(EstimatorError, match="Former: 'limit' is the former name of 'probability'; give one of them"):
+        Former(limit=0.9, probability=0.9)
+    with pytest.raises(TypeError, match="has no parameter 'gone'; it has probability, patience"):
+        Former(gone=1)
+
+    class Other(Former, adaptation=SageHusa):
+        """It has no such parameter."""
+
+    with pytest.raises(TypeError, match="has no parameter 'limit'"):
+        Other(limit=1)
+
+
+@pytest.mark.parametrize(
+    ("name", "old", "new"),
+    [
+        ("iae-fixed", {"window": "9"}, {"innovations": 9}),
+        ("rae", {"window": "9"}, {"innovations": 9}),
+        ("student-t-rts", {"dof": "5", "smoothed_dof": "4"}, {"adaptation__dof": 5.0, "smoother__dof": 4.0}),
+    ],
+)
+def test_former_names_of_our_rows_are_read(name: str, old: dict, new: dict):
+    assert not set(old) & set(inspect.signature(find(name)).parameters)
+    made = make(name, **old), make(name, **new), find(name)(**{k: float(v) for k, v in old.items()}), make(name)
+    for part in ("adaptation", "smoother") if "smoother" in find(name).recipe else ("adaptation",):
+        former, present, called, plain = (vars(getattr(row.solver, part)) for row in made)
+        assert former == present == called != plain
 
 
 def test_what_does_not_fit_is_said_where_it_is_declared():
-    with pytest.raises(TypeError, match=r"both have a parameter 'iterations'; rename one: piece\("):
-        type(Row)("Clash", (Row,), {}, solver=WindowEstimator, model=InertialModel, adaptation=VariationalBayes)
     with pytest.raises(TypeError, match="Wrong: ImmEstimator takes no adaptation: the noise of each measurement is a"):
         type(Row)("Wrong", (Row,), {}, solver=ImmEstimator, model=Suitable, adaptation=SageHusa)
     with pytest.raises(TypeError, match="Odd: KalmanEstimator takes no oar: it takes model, adaptation"):

@@ -151,6 +151,18 @@ FORGERIES: dict[str, tuple[dict[str, Any], str]] = {
     "the version of a library": ({"made_numpy": "9.9.9"}, "numpy '9.9.9' is stored with 2 results"),
     "the version of simnav": ({"simnav": "9.9+0123456789ab"}, "simnav '9.9+0123456789ab' is stored"),
     "the commit": ({"made_commit": "0" * 40}, "commit '"),
+    "a commit that is no hash": ({"made_commit": "main"}, "commit 'main' is no hash"),
+    "a version that cannot be": ({"made_scipy": "0.1"}, "scipy '0.1' is excluded by the requirement scipy"),
+    "the version of scipy": ({"made_scipy": "99.9"}, "scipy '99.9' is stored with 2 results"),
+    "what is no version": ({"made_numpy": "newest"}, "numpy 'newest' is no version"),
+    "a day to come": ({"made_date": "2999-01-01"}, "date '2999-01-01' is not between"),
+    "no day": ({"made_date": "yesterday"}, "date 'yesterday' is no day"),
+    "a confinement of another system": (
+        {"made_system": "Windows AMD64", "made_processor": "", "made_confinement": "landlock"},
+        "confinement 'landlock' does not exist on 'Windows AMD64'"),
+    "a processor of another system": ({"made_processor": "aarch64 a72"}, "processor 'aarch64 a72' is none of"),
+    "a processor of control characters": ({"made_cpu": "fast\x1b[2J"}, "numpy '' is stored with 2 results"),
+    "a processor in other letters": ({"made_cpu": "\u0406ntel"}, "cpu '\\u0406ntel' is no printable ASCII text"),
     "the processor": ({"made_cpu": "a faster one"}, "cpu 'a faster one' is stored with 2 results"),
     "the confinement": ({"made_confinement": "bubblewrap"}, "confinement 'bubblewrap' is stored with 2 results"),
     "a confinement that does not exist": ({"made_confinement": "vault"}, "confinement 'vault' is stored"),
@@ -177,6 +189,29 @@ def test_a_forgery_is_found(folder: Path, scenario: Scenario, forgery: str) -> N
     words = " | ".join((*found.different, *found.claims, *found.unconfirmed, *found.not_repeatable, *found.set_aside))
     assert said in words
     assert found.passed == (forgery in CLAIMS)
+    if forgery in CLAIMS:
+        (field,) = found.unconfirmed_fields
+        assert found.to_dict()["unconfirmed_fields"] == (field,)
+        assert found.summary.endswith(f", of which {field} differ from here")
+
+
+def test_what_is_proven_and_what_is_claimed_is_said(
+    folder: Path, scenario: Scenario, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """In one sentence, in the JSON, and by the exit code: 0, or 3 where something is left that only the results say."""
+    found = verified(folder, scenario)
+    assert found.unconfirmed_fields == ()
+    assert {"commit", "cpu", "confinement"} <= set(found.claimed)  # also where they are as here
+    assert found.summary.startswith("proven: status, note, parameters, draws and scores of the runs")
+    assert "only claimed: commit, dirty, cpu, system, confinement" in found.summary
+    monkeypatch.setattr("simnav.leaderboard.interface.verify", lambda *_, **__: found)
+    assert CliRunner().invoke(app, ["verify", str(folder)]).exit_code == 0
+    for change, code in ((fields(made_cpu="a faster one"), 3), (fields(made_commit="main"), 1)):
+        forge(folder, change)
+        found = verified(folder, scenario)
+        done = CliRunner().invoke(app, ["verify", str(folder), "--json"])
+        assert done.exit_code == code
+        assert json.loads(done.stdout)["unconfirmed_fields"] == ["cpu"]
 
 
 def test_the_sample_finds_five_per_cent_of_forged_runs() -> None:

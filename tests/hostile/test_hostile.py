@@ -13,6 +13,7 @@ from tests.fuzz import fuzz_logs, fuzz_tomls
 from tests.hostile.answers import fuzz_answers
 from tests.hostile.attacks import CHEATS, cheats, vandals
 from tests.hostile.channels import told
+from tests.hostile.meetings import seen
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="estimators are confined on POSIX systems only")
 
@@ -44,6 +45,10 @@ def test_no_vandal_touches_another_row(tmp_path: Path, confinement: str) -> None
 
 def test_no_row_tells_another_of_a_sealed_run(tmp_path: Path, confinement: str) -> None:
     assert told(tmp_path, confinement) == {}
+
+
+def test_no_row_meets_another_that_runs_at_the_same_time(tmp_path: Path, confinement: str) -> None:
+    assert seen(tmp_path, confinement) == {}
 
 
 def test_no_answer_ends_a_campaign() -> None:

@@ -79,6 +79,16 @@ def test_a_profile_of_ones_own(tmp_path: Path):
         load("quik")
 
 
+def test_a_profile_with_a_former_name_of_a_parameter_runs_the_row(tmp_path: Path):
+    pond = (Path(__file__).parents[1] / "cases" / "pond.toml").as_posix()
+    file = tmp_path / "mine.toml"
+    file.write_text(f'[[part]]\nscenarios = ["{pond}"]\nestimators = ["iae-fixed:window=9"]\nruns = 1\n')
+    (result,) = (
+        r for r in simnav.campaign(profile=file, output=tmp_path / "out", workers=1).results if not r.reference
+    )
+    assert (result.estimator, result.parameters) == ("iae-fixed(innovations=9)", {"innovations": "9"})
+
+
 def test_a_campaign_runs_the_parts_of_a_profile(tmp_path: Path):
     pond = (Path(__file__).parents[1] / "cases" / "pond.toml").as_posix()
     file = tmp_path / "mine.toml"

@@ -25,7 +25,8 @@ _PATH_BENEATH = 1
 
 _WRITE_FILE, _READ_FILE, _TRUNCATE = 1 << 1, 1 << 2, 1 << 14
 #: What all processes can read and some can change: counters and state of other processes, of control groups and of
-#: devices, and logs of the kernel, into which whoever crashes writes. Of these only `_HARMLESS` can be read.
+#: devices, and logs of the kernel, into which whoever crashes writes. Of these only `_HARMLESS` can be read, and of
+#: devices only `_DEVICES`: root could read the disk, with the key on it, and whoever opens a terminal makes one.
 _STATE = ("/proc", "/sys", "/dev/kmsg", "/var/log", "/run/log", "/var/crash", "/var/lib/systemd/coredump")
 _HARMLESS = (
     "/proc/cpuinfo", "/proc/meminfo", "/proc/filesystems", "/proc/version", "/proc/sys/vm/overcommit_memory",
@@ -34,6 +35,7 @@ _HARMLESS = (
     "/sys/kernel/mm/transparent_hugepage", "/sys/fs/cgroup/cpu.max", "/sys/fs/cgroup/cpu/cpu.cfs_quota_us",
     "/sys/fs/cgroup/cpu/cpu.cfs_period_us",
 )  # fmt: skip
+_DEVICES = ("null", "zero", "full", "random", "urandom", "shm")
 
 #: Rights over files by the version of the interface that brought them: all that change something.
 _IOCTL_DEVICE = 1 << 15  # requests to devices, such as the size of a terminal, which all that can open it can change
@@ -129,6 +131,8 @@ class Unreadable:
                     continue
                 with os.scandir(folder) as entries:
                     for entry in entries:  # what a link leads to counts where it lies
+                        if folder == "/dev" and entry.name not in _DEVICES:
+                            continue
                         if entry.path not in self._hidden and entry.path not in self._way and not entry.is_symlink():
                             _allow(self._ruleset, entry.path, _READ_FILE)
                 self._seen[folder] = changed

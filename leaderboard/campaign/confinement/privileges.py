@@ -12,15 +12,20 @@ import ctypes
 import os
 import struct
 import sys
+import warnings
 
 from simnav.leaderboard.campaign.confinement.limits import prctl
 
-__all__ = ["give_up", "user_for"]
+__all__ = ["PrivilegesWarning", "give_up", "kept_rights", "user_for"]
 
 _FIRST_USER = 0x70000000  # beyond all users that systems give numbers to
 _READ_SEARCH = 2  # the capability to read any file and to search any folder
 _SET_DUMPABLE, _KEEP, _DROP_BOUNDING, _AMBIENT, _RAISE = 4, 8, 24, 47, 2  # of prctl(2)
 _VERSION_3 = 0x20080522  # of capset(2)
+
+
+class PrivilegesWarning(UserWarning):
+    """The estimators of a campaign of root keep capabilities."""
 
 
 def user_for(number: int) -> int | None:
@@ -48,7 +53,7 @@ def give_up(user: int | None) -> bool:
     Returns
     -------
     bool
-        Whether this process has no capability that changes anything.
+        Whether this process has no capability that changes anything; looked up, not concluded.
     """
     if sys.platform != "linux" or os.geteuid() != 0:
         return True
@@ -61,20 +66,55 @@ def give_up(user: int | None) -> bool:
             os.setgroups([])
             os.setresgid(user, user, user)
             os.setresuid(user, user, user)
-    done = _only(1 << _READ_SEARCH)
+    _only(1 << _READ_SEARCH)
     with contextlib.suppress(OSError, AttributeError):  # programs that it starts read as it does
         ctypes.CDLL(None).prctl(_AMBIENT, _RAISE, _READ_SEARCH, 0, 0)
     prctl(_SET_DUMPABLE, 1)  # or it could not look at itself in /proc
-    return done
+    return _permitted() & ~(1 << _READ_SEARCH) == 0
+
+
+def kept_rights() -> str:
+    """Why an estimator process that root starts here would keep capabilities; empty where it gives them up.
+
+    A child tries it. Some containers forbid the system calls that it takes.
+    """
+    user = user_for(0)
+    if user is None:
+        return ""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DeprecationWarning)  # fork beside threads: the child uses none of them
+        child = os.fork()
+    if child == 0:
+        code = 2
+        try:
+            code = 0 if give_up(user) else 1
+        finally:
+            os._exit(code)
+    code = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+    if code == 0:
+        return ""
+    return "the system refuses to take them away" if code == 1 else f"an attempt ended with {code}"
+
+
+def _permitted() -> int:
+    """Capabilities that this process has or can take; all where the system does not say."""
+    held = _look()
+    return ~0 if held is None else held[1] | held[4] << 32
+
+
+def _look() -> tuple[int, ...] | None:
+    """Effective, permitted and inheritable capabilities, the lower 32 bits, and the upper ones; see capget(2)."""
+    held = ctypes.create_string_buffer(24)
+    if ctypes.CDLL(None).capget(struct.pack("=Ii", _VERSION_3, 0), held):
+        return None
+    return struct.unpack("=6I", held.raw)
 
 
 def _only(capabilities: int) -> bool:
     """Keep these capabilities only, of those that there are."""
-    libc = ctypes.CDLL(None, use_errno=True)
-    header = struct.pack("=Ii", _VERSION_3, 0)
-    held = ctypes.create_string_buffer(24)
-    if libc.capget(header, held):
+    held = _look()
+    if held is None:
         return False
-    permitted = struct.unpack("=6I", held.raw)[1] & capabilities
+    permitted = held[1] & capabilities
     low, high = (permitted, permitted, permitted), (0, 0, 0)
-    return bool(libc.capset(header, struct.pack("=6I", *low, *high)) == 0)
+    return bool(ctypes.CDLL(None).capset(struct.pack("=Ii", _VERSION_3, 0), struct.pack("=6I", *low, *high)) == 0)

@@ -139,18 +139,22 @@ def _fork(
     if asked["landlock"]:
         unreadable.prepare()
     before, parent = out_of_memory_kills(), os.getpid()
+    confined, says = os.pipe()
     child = os.fork()
     if child == 0:
         try:
             control.close()
-            _become_estimator(parent, asked | {"cache": cache}, descriptors, temporary, unreadable)
+            _become_estimator(parent, asked | {"cache": cache}, [*descriptors[:2], says, *descriptors[2:]], temporary,
+                              unreadable)  # fmt: skip
         finally:
             os._exit(70)
-    for descriptor in descriptors:
+    for descriptor in (*descriptors, says):
         os.close(descriptor)
+    fault = os.read(confined, _LONGEST).decode()  # nothing of the estimator runs before
+    os.close(confined)
     start, verdict, ended = resident(child), "", None
     watch = Watch(child, start, asked["memory"], temporary)
-    control.sendall(json.dumps({"forked": child}).encode())
+    control.sendall(json.dumps({"forked": child, "fault": fault}).encode())
     try:
         while not select.select([control], [], [], WATCH)[0]:
             if not verdict:
@@ -204,16 +208,15 @@ def _become_estimator(
     parent: int, asked: dict[str, Any], descriptors: list[int], temporary: Path, unreadable: Unreadable
 ) -> None:
     """The forked process until it ends."""
-    if descriptors[2:]:
+    if descriptors[3:]:
         with contextlib.suppress(OSError):
-            os.write(descriptors[2], b"0")  # join the group whose memory is limited
-    if asked["landlock"]:
-        unreadable.enforce()
-    moved = [fcntl.fcntl(descriptor, fcntl.F_DUPFD, 16) for descriptor in descriptors[:2]]
-    down, up = 3, 4
-    for number, descriptor in zip((down, up), moved, strict=True):
+            os.write(descriptors[3], b"0")  # join the group whose memory is limited
+    in_force = [not asked["landlock"] or unreadable.enforce()]
+    moved = [fcntl.fcntl(descriptor, fcntl.F_DUPFD, 16) for descriptor in descriptors[:3]]
+    down, up, says = 3, 4, 5
+    for number, descriptor in zip((down, up, says), moved, strict=True):
         os.dup2(descriptor, number)
-    os.closerange(5, _most_descriptors())
+    os.closerange(6, _most_descriptors())
     begin_alone(parent)
     if asked.get("core") is not None and hasattr(os, "sched_setaffinity"):
         with contextlib.suppress(OSError):
@@ -226,12 +229,18 @@ def _become_estimator(
     with contextlib.suppress(OSError):
         os.chdir(asked["folder"])
     if asked["landlock"]:
-        restrict(writable)
+        in_force.append(restrict(writable))
     privileges.give_up(asked["user"])
     die_with_parent(parent)  # which is forgotten with a change of the user
     os.umask(0o077)
     limit(asked["timeout"], asked["memory"], alone=os.geteuid() == asked["user"])
-    seccomp.deny()
+    if not all(in_force):
+        os.write(says, b"Landlock")
+        os._exit(0)
+    if not seccomp.deny() and seccomp.available():
+        os.write(says, b"a filter of system calls (seccomp)")
+        os._exit(0)
+    os.close(says)
     live(down, up)
     os._exit(0)
 

@@ -254,6 +254,8 @@ class EstimatorServer:
         ------
         NoAnswerError
             If there is no process, since the server did not start one.
+        ServerError
+            If the process could not be confined.
         StoppedError
             If the process is no more there; also where it ended after its last answer.
         """
@@ -286,6 +288,11 @@ class EstimatorServer:
                 os.close(up)
             if facts is None or "forked" not in facts:
                 raise NoAnswerError("the process for estimators did not answer")
+            if facts.get("fault"):
+                raise ServerError(
+                    f"the system has {facts['fault']}, but refuses it to estimator processes, so they cannot be "
+                    "confined; confinement = 'none' runs estimators that you trust"
+                )
             session = RemoteSession(write, read, limits)
             try:
                 yield session

@@ -18,7 +18,7 @@ from simnav.trial import run_trial
 def test_with_gaussian_noise_it_is_the_rauch_tung_striebel_smoother(recording_of, seed: int):
     """An independent forward and backward pass over the same linear problem, and its covariance."""
     recording = recording_of(seed, 60.0)
-    gaussian = make("student-t-rts", dof=float("inf"), smoothed_dof=float("inf"))
+    gaussian = make("student-t-rts", adaptation__dof=float("inf"), smoother__dof=float("inf"))
     plain = make("ekf-rts")
     ours, theirs = (smoothed_errors(run_trial(e, recording), recording) for e in (gaussian, plain))
     sigma = np.sqrt(np.diagonal(plain.smoothed_covariance, axis1=1, axis2=2))

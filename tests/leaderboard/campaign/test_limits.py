@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import os
+import platform
+import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
-from simnav.leaderboard.campaign.confinement import privileges
+from simnav.leaderboard.campaign.confinement import landlock, privileges, seccomp
 from simnav.leaderboard.campaign.confinement.attempt import attempt
 from simnav.leaderboard.campaign.confinement.memory_group import MemoryGroup
 from simnav.leaderboard.campaign.confinement.session import EstimatorServer, Limits
@@ -20,6 +22,7 @@ from simnav.source import record
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="only Linux tells what processes take")
 
+_SCENARIO = Path(__file__).parents[2] / "hostile" / "cheats" / "scenario.toml"
 _ROW = """
 import os, tempfile, time
 import numpy as np
@@ -49,7 +52,7 @@ def _registry(clean_registry: None) -> None:
 
 @pytest.fixture(scope="module")
 def recording() -> Recording:
-    return record(load(Path(__file__).parents[2] / "hostile" / "cheats" / "scenario.toml"), 0)
+    return record(load(_SCENARIO), 0)
 
 
 @pytest.fixture(scope="module", params=["counted by the kernel", "counted by the server"])
@@ -146,3 +149,61 @@ def test_root_gives_up_all_but_to_read(tmp_path: Path) -> None:
             os._exit(code)
     assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 0
     assert closed.stat().st_size == 1
+
+
+#: A campaign of root in a container that forbids system calls, by their numbers on x86-64 and ARM64.
+_FORBIDDING = """
+import ctypes, platform, struct, sys, warnings
+from simnav.leaderboard.campaign.campaign import run_campaign
+from simnav.leaderboard.campaign.confinement import seccomp
+from simnav.leaderboard.campaign.request import EstimatorRequest
+from simnav.scenario import load
+
+program = seccomp._instruction(0x20, 0)
+for number in map(int, sys.argv[3:]):
+    program += seccomp._instruction(0x15, number, 0, 1) + seccomp._instruction(0x06, 0x00050001)
+program += seccomp._instruction(0x06, 0x7FFF0000)
+text = ctypes.create_string_buffer(program, len(program))
+given = ctypes.create_string_buffer(struct.pack("@HP", len(program) // 8, ctypes.addressof(text)))
+assert ctypes.CDLL(None).syscall(seccomp._CALL[platform.machine()], 1, 0, ctypes.c_void_p(ctypes.addressof(given))) == 0
+with warnings.catch_warnings(record=True) as said:
+    warnings.simplefilter("always")
+    run_campaign([load(sys.argv[1])], [EstimatorRequest("gnss-only")], [0], sys.argv[2], workers=1,
+                 confinement="process")
+for one in said:
+    print(f"{one.category.__name__}: {one.message}")
+"""
+
+
+@pytest.mark.skipif(not seccomp.available() or os.geteuid() != 0, reason="only root has rights to give up, on Linux")
+@pytest.mark.parametrize(
+    ("forbidden", "warns"),
+    [((), False), (("capset",), True), (("capset", "setresuid"), True), (("setresuid",), False)],
+)
+def test_a_campaign_warns_where_rights_cannot_be_given_up(
+    forbidden: tuple[str, ...], warns: bool, tmp_path: Path
+) -> None:
+    """By real attempts, under filters of system calls as containers have them."""
+    arm = platform.machine() == "aarch64"
+    numbers = {"capset": 91 if arm else 126, "setresuid": 147 if arm else 117}
+    done = _campaign_without(*(numbers[name] for name in forbidden), folder=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert ("PrivilegesWarning: estimators keep capabilities of root" in done.stdout) == warns, done.stdout
+
+
+@pytest.mark.skipif(not seccomp.available(), reason="the system calls are not known here")
+def test_nobody_runs_where_confinement_is_refused(tmp_path: Path) -> None:
+    """The name of a confinement in a result is that of one that was in force."""
+    arm = platform.machine() == "aarch64"
+    for number, what in ((446, "Landlock"), (277 if arm else 317, "seccomp")):
+        if what == "seccomp" or landlock.available():
+            done = _campaign_without(number, folder=tmp_path)
+            assert done.returncode != 0
+            assert "cannot be confined" in done.stderr
+            assert what in done.stderr
+
+
+def _campaign_without(*numbers: int, folder: Path) -> subprocess.CompletedProcess[str]:
+    """A campaign that may not make some system calls."""
+    words = [str(_SCENARIO), str(folder / "results"), *map(str, numbers)]
+    return subprocess.run([sys.executable, "-c", _FORBIDDING, *words], capture_output=True, text=True, check=False)

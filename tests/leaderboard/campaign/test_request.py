@@ -7,8 +7,9 @@ from pathlib import Path
 import pytest
 
 import simnav
+from simnav.estimators.rows.adaptive import Rae
 from simnav.estimators.rows.kalman import Ekf
-from simnav.leaderboard.campaign.request import requests, split_estimators
+from simnav.leaderboard.campaign.request import request, requests, split_estimators
 from simnav.leaderboard.results.errors import RequestError
 
 STILL = """
@@ -28,6 +29,19 @@ def test_estimators_are_split_with_their_parameters():
     ]
     with pytest.raises(ValueError, match="parameters follow a name"):
         split_estimators(["a,x=1"])
+
+
+def test_former_names_of_parameters_become_present_ones():
+    """In a text, a pair, a class, and where several rows are given the same parameter."""
+    new = {"innovations": "9"}
+    assert request("iae-fixed:window=9").label == request("iae-fixed:innovations=9").label == "iae-fixed(innovations=9)"
+    assert request(("rae", {"window": "9"})).parameters == request((Rae, {"window": "9"})).parameters == new
+    found = requests("iae,iae-fixed,rae,sw-fgo", {"window": "9"})
+    assert [r.label for r in found[1:]] == ["iae-fixed(innovations=9)", "rae(innovations=9)", "sw-fgo(window=9)"]
+    assert found[0].parameters == {}
+    assert request("no-such-row:window=9").parameters == {"window": "9"}
+    with pytest.raises(RequestError, match="'iae-fixed': 'window' is the former name of 'innovations'; give one"):
+        request("iae-fixed:window=9,innovations=8")
 
 
 @pytest.mark.parametrize("asked", ["ekf.py", "ekf,ekf.py", "a/ekf.py:calibrate=no"])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import pickle
 from pathlib import Path
 
@@ -38,6 +39,39 @@ def test_only_the_scores_that_are_wanted_are_read(folder: Path):
     assert [r.parameters for r in found] == [{"gain": k % 2} for k in range(5)]
     assert set(store.load(folder)[0].scores) == {"a", "b", "c"}
     assert store.load(folder, scores=())[0].scores == {}
+
+
+@pytest.mark.parametrize("compacted", [False, True])
+def test_former_names_of_parameters_are_shown_under_the_present_ones(tmp_path: Path, compacted: bool):
+    """Files and marker as they were written when the parameters had these names; a row of others keeps its own."""
+    path = store.create(tmp_path / "results")
+    old = {
+        "student-t-rts(dof=5,smoothed_dof=4)": {"dof": "5", "smoothed_dof": "4"},
+        "rae(window=9)": {"window": "9"},
+        "sw-fgo(window=9)": {"window": "9"},
+        "theirs(window=9)": {"window": "9"},
+        "rae": {},
+    }
+    for k, (label, parameters) in enumerate(old.items()):
+        store.write(path, Result("bay-v1", 0, label, parameters, False, "ok", "", {"a": 1.0}, {}, key=f"k{k}-0"))
+    entry = {"recording": "r", "estimators": {label: f"k{k}" for k, label in enumerate(old)}}
+    marker = path / "simnav-results.json"
+    marker.write_text(json.dumps(json.loads(marker.read_text()) | {"current": {"bay-v1": entry}}))
+    if compacted:
+        store.compact(path)
+    found = {r.estimator: (dict(r.parameters), r.key) for r in store.load(path)}
+    assert found == {
+        "student-t-rts(adaptation__dof=5,smoother__dof=4)": ({"adaptation__dof": "5", "smoother__dof": "4"}, "k0-0"),
+        "rae(innovations=9)": ({"innovations": "9"}, "k1-0"),
+        "sw-fgo(window=9)": ({"window": "9"}, "k2-0"),
+        "theirs(window=9)": ({"window": "9"}, "k3-0"),
+        "rae": ({}, "k4-0"),
+    }
+    store.write(path, Result("bay-v1", 0, "rae(innovations=9)", {"innovations": 9}, False, "ok", "", {}, key="new-0"))
+    store.select(path, {"bay-v1": ("r", {"rae(innovations=9)": "new"})})  # a campaign of today in the same folder
+    assert {r.key for r in store.load(path)} == {"k0-0", "new-0", "k2-0", "k3-0", "k4-0"}
+    merged = gather(tmp_path / "merged", [path])
+    assert {r.estimator for r in store.load(merged)} == set(found)
 
 
 def test_series_stay_on_disk_until_they_are_looked_at(folder: Path):

@@ -21,11 +21,12 @@ from simnav.leaderboard.ranking.ranking import rank
 from simnav.leaderboard.ranking.stored_costs import cost_of
 from simnav.leaderboard.results.errors import RequestError
 from simnav.leaderboard.results.export import SCHEMA_VERSION
-from simnav.leaderboard.site import charts, site
+from simnav.leaderboard.site import charts, site, sweeps
 from simnav.leaderboard.site.facts import estimator_facts
 from simnav.leaderboard.site.overview import bar_scale
 from simnav.leaderboard.site.scenario_page import ScenarioData
 from simnav.scoring import SCORES
+from tests.leaderboard.site.conftest import made_up_sweep
 
 SCENARIOS = ("made-up-one-v1", "made-up-two-v3")
 LARGEST = 500_000  # bytes of a page or of a file that it reads, Vega aside
@@ -222,6 +223,15 @@ def test_a_scenario_shows_its_sweeps_with_breaking_points(folder, catalogued):
     (chart,) = data["sweeps"][0]["charts"]
     assert chart["data"]["curves"]["rows"]["ekf"]["value"] == [0.0, 2.0, 4.0]
     assert chart["data"]["marks"]["rows"] == {"ekf": {"at": [3.0], "threshold": [2.0]}}
+
+
+def test_a_sweep_of_former_names_of_parameters_is_shown_under_the_present_ones(tmp_path: Path):
+    content = json.dumps(made_up_sweep("bay-v1").content).replace('"sw-fgo"', '"rae(window=9)"')
+    (tmp_path / "results").mkdir()
+    (tmp_path / "results" / "sweep-jump.json").write_text(content)
+    (found,) = sweeps.find(tmp_path)
+    assert found.rows == ["ekf", "rae(innovations=9)"]
+    assert [b["estimator"] for b in found.content["breaking_points"]] == found.rows
 
 
 def test_a_scenario_from_elsewhere_has_failures_and_who_does_not_suit(folder):

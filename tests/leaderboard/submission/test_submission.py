@@ -6,6 +6,7 @@ import hashlib
 import json
 import shutil
 import stat
+import subprocess
 import sys
 import zipfile
 from collections.abc import Callable
@@ -19,6 +20,7 @@ from typer.testing import CliRunner
 
 import simnav
 from simnav.leaderboard import publishing
+from simnav.leaderboard.campaign import fingerprint
 from simnav.leaderboard.cli.application import app
 from simnav.leaderboard.results import store
 from simnav.leaderboard.results.errors import RequestError
@@ -26,6 +28,7 @@ from simnav.leaderboard.results.provenance import Provenance
 from simnav.leaderboard.submission import archive, environment, source, verifying
 from simnav.leaderboard.submission.bundle import open_bundle
 from simnav.leaderboard.submission.repetition import Again, Asked, answer
+from simnav.simulation.version import SIMULATOR_VERSION
 from tests.cases.packages import install
 from tests.hostile.forging import evil_scenario, fields, forge
 
@@ -424,6 +427,52 @@ def test_the_code_of_a_scenario_in_a_bundle_is_not_run(made: Path, tmp_path: Pat
     assert not witness.exists()
 
 
+@pytest.mark.usefixtures("here")
+def test_a_bundle_of_an_older_commit_holds(made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """simnav's own code is known by declared versions; only the submitter's files are known by digests."""
+    (result, *_) = store.load(open_bundle(made, tmp_path / "open").results)
+    assert result.recording == f"simulator-{SIMULATOR_VERSION}"
+    history = ["git", "-C", str(Path(simnav.__file__).resolve().parents[1]), "rev-list", "--max-count=20", "HEAD"]
+    done = subprocess.run(history, capture_output=True, text=True, check=False)
+    older = done.stdout.split()[-1] if done.returncode == 0 else ""
+
+    def change(folder: Path) -> None:
+        forge(
+            folder / "results", fields(made_commit=older, made_dirty=False if older else None, simnav="0.1.0+of-then")
+        )
+
+    bundle = changed(made, tmp_path / "older.zip", change, hashes=True)
+    monkeypatch.setattr(fingerprint, "folder_code", lambda *_: "another digest of simnav's code")
+    report = publishing.verify_bundle(bundle, present=True)
+    assert report.passed, (report.findings, report.different, report.undecided)
+    assert (report.repeated, report.identical, report.different) == (2, 2, ())
+    assert set(report.unconfirmed_fields) <= {"commit", "dirty"}
+    assert ("commit" in report.unconfirmed_fields) == bool(older)
+    assert report.summary.startswith("proven: ")
+
+
+@pytest.mark.usefixtures("here")
+def test_a_bundle_of_another_simulator_does_not_hold(
+    made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("simnav.leaderboard.campaign.campaign.SIMULATOR_VERSION", SIMULATOR_VERSION + 1)
+    report = publishing.verify_bundle(made, present=True)
+    assert not report.passed
+    assert "the scenario or the simulator is not that of the results" in report.different[0]
+    assert f"(simulator-{SIMULATOR_VERSION}); here is" in report.different[0]
+
+
+@pytest.mark.usefixtures("here")
+def test_a_version_that_the_bundle_excludes_is_refused(made: Path, tmp_path: Path) -> None:
+    def change(folder: Path) -> None:
+        manifest = json.loads((folder / "bundle.json").read_text())
+        (folder / "bundle.json").write_text(json.dumps({**manifest, "requires": ["numpy<2"]}))
+
+    report = publishing.verify_bundle(changed(made, tmp_path / "bad.zip", change, hashes=True), present=True)
+    assert not report.passed
+    assert any("is excluded by the requirement numpy<2" in text for text in report.findings)
+
+
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
@@ -440,7 +489,7 @@ def test_the_code_of_a_scenario_in_a_bundle_is_not_run(made: Path, tmp_path: Pat
         ({"made_numpy": "9.9.9"}, "its results were made with several versions of numpy"),
         ({"made_commit": "0" * 40}, "several versions of commit"),
         ({"scoring": "{}", "score_r95": None}, "the results lack r95"),
-        ({"estimator_digest": "0" * 24}, "estimator_digest"),
+        ({"estimator_digest": "0" * 24}, "the results were not made with this source"),
         ({"reference": True}, "says that it was told the truth"),
     ],
 )

@@ -134,6 +134,30 @@ def test_a_clean_voyage_that_costs_is_dear_and_a_failure_is_the_worst():
     assert failed.lost == 1.0
 
 
+# --- former names of parameters -----------------------------------------------------------------------
+
+
+def test_a_former_name_is_varied_under_the_present_one():
+    space, present = space_of(request("student-t-rts"), ["smoothed_dof=2:50:log", "turns=1:9:integer"])
+    assert ([r.name for r in space], dict(present)) == (["smoother__dof", "turns"], {"smoother__dof": 6.0, "turns": 5})
+    with pytest.raises(RequestError, match="'smoother__dof' is set or varied twice"):
+        space_of(request("student-t-rts"), ["smoothed_dof=2:50", "smoother__dof=2:50"])
+    with pytest.raises(RequestError, match="'smoother__dof' is set or varied twice"):
+        space_of(request("student-t-rts:smoothed_dof=3"), ["smoothed_dof=2:50"])
+
+
+def test_a_stored_tuning_of_former_names_is_read(tmp_path: Path):
+    document = json.loads(FILES[0].read_text())
+    old = {"smoothed_dof": 4.0, "passes": 9}
+    ranges = [{"name": name, "low": 1.0, "high": 20.0, "scale": "linear"} for name in old]
+    document |= {"estimator": "student-t-rts", "chosen": old, "present": old, "ranges": ranges}
+    path = tmp_path / "student-t-rts.json"
+    path.write_text(json.dumps(document))
+    found = read(path)
+    assert found["chosen"] == found["present"] == {"smoother__dof": 4.0, "passes": 9}
+    assert ranges_of(found) == (Range("smoother__dof", 1.0, 20.0), Range("passes", 1.0, 20.0))
+
+
 # --- the board is out of bounds -----------------------------------------------------------------------
 
 

@@ -1,0 +1,25 @@
+# Of oracles.py, for type checkers and editors. Do not edit: "python -m simnav.estimators.stubs" writes it.
+
+from simnav.estimator import register
+from simnav.estimators.adaptations.truth import MixtureNoise, NominalNoise, TrueNoise
+from simnav.estimators.composition import Row, piece
+from simnav.estimators.solvers.oracle import OracleEstimator
+from simnav.estimators.solvers.smoother import Smoother
+
+__all__ = ["Oracle", "OracleClairvoyant", "OracleMixture", "OracleRts"]
+
+@register("oracle")
+class Oracle(Row, solver=piece(OracleEstimator, restore=False), adaptation=TrueNoise):
+    def __init__(self) -> None: ...
+
+@register("oracle-clairvoyant")
+class OracleClairvoyant(Row, solver=piece(OracleEstimator, restore=True), adaptation=NominalNoise):
+    def __init__(self) -> None: ...
+
+@register("oracle-rts")
+class OracleRts(Oracle, smoother=Smoother):
+    def __init__(self) -> None: ...
+
+@register("oracle-mixture")
+class OracleMixture(Oracle, adaptation=MixtureNoise):
+    def __init__(self) -> None: ...

@@ -1,0 +1,75 @@
+# Of sigma_point.py, for type checkers and editors. Do not edit: "python -m simnav.estimators.stubs" writes it.
+
+from simnav.estimator import register
+from simnav.estimators.composition import Row, piece
+from simnav.estimators.models.inertial_points import InertialPoints
+from simnav.estimators.models.ship_points import ShipPoints
+from simnav.estimators.solvers.filterpy_unscented import FilterpyUnscentedEstimator
+from simnav.estimators.solvers.sigma_point import SigmaPointEstimator
+
+__all__ = ["Ckf", "FilterpyUkf", "ShipCkf", "ShipUkf", "Ukf"]
+_CUBATURE = piece(SigmaPointEstimator, alpha=1.0, beta=0.0, kappa=0.0)
+
+@register("ukf")
+class Ukf(Row, solver=SigmaPointEstimator, model=InertialPoints):
+    def __init__(
+        self,
+        *,
+        calibrate: bool = True,
+        alpha: float = 0.5,
+        beta: float = 2.0,
+        kappa: float = 0.0,
+    ) -> None: ...
+
+@register("ckf")
+class Ckf(Row, solver=_CUBATURE, model=InertialPoints):
+    def __init__(
+        self,
+        *,
+        calibrate: bool = True,
+    ) -> None: ...
+
+@register("ship-ukf")
+class ShipUkf(Row, solver=SigmaPointEstimator, model=ShipPoints):
+    def __init__(
+        self,
+        *,
+        acceleration: float = 0.05,
+        turn_rate_deg: float = 0.6,
+        turn_time: float = 10.0,
+        current: float = 0.3,
+        current_time: float = 3600.0,
+        sway: float = 0.2,
+        alpha: float = 0.5,
+        beta: float = 2.0,
+        kappa: float = 0.0,
+    ) -> None: ...
+
+@register("ship-ckf")
+class ShipCkf(Row, solver=_CUBATURE, model=ShipPoints):
+    def __init__(
+        self,
+        *,
+        acceleration: float = 0.05,
+        turn_rate_deg: float = 0.6,
+        turn_time: float = 10.0,
+        current: float = 0.3,
+        current_time: float = 3600.0,
+        sway: float = 0.2,
+    ) -> None: ...
+
+@register("filterpy-ukf")
+class FilterpyUkf(Row, solver=FilterpyUnscentedEstimator, model=ShipPoints):
+    def __init__(
+        self,
+        *,
+        acceleration: float = 0.05,
+        turn_rate_deg: float = 0.6,
+        turn_time: float = 10.0,
+        current: float = 0.3,
+        current_time: float = 3600.0,
+        sway: float = 0.2,
+        alpha: float = 0.5,
+        beta: float = 2.0,
+        kappa: float = 0.0,
+    ) -> None: ...
