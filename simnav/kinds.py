@@ -281,6 +281,8 @@ class Kind:
                     f"the equation {self.equation!r} gives {EQUATIONS[self.equation]}: {d} components, "
                     f"not {len(self.components)}"
                 )
+        if self.reading_sigma is not None and not callable(self.equation):
+            raise PluginError("a kind with a reading_sigma has an equation of its own: a function, not a compiled one")
         if self.geodetic and self.values[:2] != ("latitude", "longitude"):
             raise PluginError("the first components of a geodetic kind are latitude and longitude")
         # An angle equal to its limit is still plausible; another quantity equal to its limit is not.

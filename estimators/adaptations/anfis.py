@@ -18,9 +18,10 @@ import numpy as np
 from simnav.estimators.adaptations.anfis_file import FEATURES, FeatureSet, Parameters, shipped
 from simnav.estimators.adaptations.base import Innovation
 from simnav.estimators.adaptations.noise import NoiseAdaptation
+from simnav.estimators.models.equations import equation_of_kind
 from simnav.estimators.models.measurements import wrap
-from simnav.kinds import BODY_VELOCITY, HEADING, POSITION, WATER_SPEED
-from simnav.types import KINDS, Array, Instruments
+from simnav.kinds import BODY_VELOCITY, HEADING, WATER_SPEED
+from simnav.types import Array, Instruments
 
 __all__ = ["Anfis", "Features", "Motion"]
 
@@ -107,7 +108,7 @@ class Features:
     def observe(self, innovation: Innovation) -> list[float] | None:
         """Update from an innovation; return the n inputs for a GNSS fix, or None for other measurements."""
         m = innovation.measurement
-        if KINDS[m.kind].equation != POSITION:
+        if not equation_of_kind(m.kind).has_height:
             self._motion.observe(innovation)
             return None
         now = _whitened(innovation)

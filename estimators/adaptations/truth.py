@@ -23,6 +23,7 @@ from typing import Any
 import numpy as np
 
 from simnav.estimators.adaptations.base import Adaptation, Innovation
+from simnav.estimators.models.channels import of_channels, whole
 from simnav.estimators.models.fault_states import FaultState
 from simnav.recording import AidStream, FaultLabel, Recording
 from simnav.sensors.faults import FAULTS, effect_of, size_by_component, size_range
@@ -49,11 +50,14 @@ class TrueNoise(Adaptation):
         self.faults: tuple[FaultLabel, ...] = ()
         self._streams: dict[str, tuple[AidStream, Array]] = {}
         self._states: dict[str, int] = {}
+        self._affected: list[list[str]] = []
 
     def reveal(self, recording: Recording) -> None:
         """Receive the labels of a recording."""
-        self._streams = {n: (s, np.asarray(s.time)) for n, s in recording.data.aids.items()}
+        parts = [part for stream in recording.data.aids.values() for part in of_channels(stream)]
+        self._streams = {part.name: (part, np.asarray(part.time)) for part in parts}
         self.faults = recording.faults
+        self._affected = [_sources(fault, recording) for fault in self.faults]
 
     def reset(self, instruments: Instruments) -> None:
         """Begin a run."""
@@ -65,7 +69,7 @@ class TrueNoise(Adaptation):
         self._states = dict.fromkeys(self._streams, 0)
         found: dict[tuple[Any, ...], tuple[FaultState, int]] = {}
         for j, fault in enumerate(self.faults):
-            for name in fault.instruments:
+            for name in self._affected[j]:
                 if effect_of(fault.kind) not in LASTING or name not in self._streams:
                     continue
                 growing = effect_of(fault.kind) == "growing"
@@ -81,24 +85,26 @@ class TrueNoise(Adaptation):
                 self._states[name] |= mask
         return [state for state, _ in found.values()]
 
-    def _factor(self, instrument: str, mask: int, start: float | None, time: float) -> float:
-        stream, k = self._label(instrument, time)
+    def _factor(self, source: str, mask: int, start: float | None, time: float) -> float:
+        stream, k = self._label(source, time)
         if not int(stream.faults[k]) & mask:
             return 0.0
         return 1.0 if start is None else max(time - start, 0.0)
 
-    def _label(self, instrument: str, time: float) -> tuple[AidStream, int]:
-        """The stream of an instrument, and the index of its measurement at a time."""
-        stream, times = self._streams[instrument]
+    def _label(self, source: str, time: float) -> tuple[AidStream, int]:
+        """The stream of an instrument or a channel, and the index of its measurement at a time."""
+        stream, times = self._streams[source]
         return stream, min(int(np.searchsorted(times, time - 1e-9)), len(times) - 1)
 
     def _white(self, innovation: Innovation) -> tuple[Array, list[int], AidStream, int]:
         """Noise with the true sigma; the faults that are neither noise steps nor states; stream and index."""
         m = innovation.measurement
-        stream, k = self._label(m.instrument, m.time)
+        stream, k = self._label(m.source, m.time)
         d = len(innovation.residual)
-        noise = innovation.noise + np.diag(stream.sigma[k, :d] ** 2 - self._sheets[m.instrument].sigma[:d] ** 2)
-        bits = int(stream.faults[k]) & ~self._states.get(m.instrument, 0)
+        sheet, of_reading = self._sheets[m.source], KINDS[m.kind].reading_sigma
+        nominal = sheet.sigma if of_reading is None else np.asarray(of_reading(m.side, whole(sheet)))
+        noise = innovation.noise + np.diag(stream.sigma[k, :d] ** 2 - nominal[:d] ** 2)
+        bits = int(stream.faults[k]) & ~self._states.get(m.source, 0)
         faults = (
             [j for j, f in enumerate(self.faults) if bits >> j & 1 and effect_of(f.kind) != "noise"] if bits else []
         )
@@ -139,7 +145,7 @@ class NominalNoise(TrueNoise):
 
     def restore(self, measurement: Measurement) -> Measurement:
         """A measurement without the error that the faults added."""
-        stream, k = self._label(measurement.instrument, measurement.time)
+        stream, k = self._label(measurement.source, measurement.time)
         if not stream.faults[k]:
             return measurement
         value = KINDS[stream.kind].add_error(measurement.value[None], -stream.fault_error[k : k + 1])[0]
@@ -148,7 +154,7 @@ class NominalNoise(TrueNoise):
     def adapt(self, innovation: Innovation) -> Array | None:
         """The noise without faults."""
         m = innovation.measurement
-        stream, k = self._label(m.instrument, m.time)
+        stream, k = self._label(m.source, m.time)
         steps = sum(1 << j for j, f in enumerate(self.faults) if effect_of(f.kind) == "noise")
         return innovation.noise if int(stream.faults[k]) & steps else self._white(innovation)[0]
 
@@ -196,7 +202,7 @@ class MixtureNoise(TrueNoise):
         about = [
             (float(f.parameters["probability"]), self._variance(j, stream, k, d))
             for j, f in enumerate(self.faults)
-            if effect_of(f.kind) == "gross" and "probability" in f.parameters and stream.name in f.instruments
+            if effect_of(f.kind) == "gross" and "probability" in f.parameters and stream.name in self._affected[j]
             if f.start - 1e-6 <= t < f.end - 1e-6
         ]
         about = [(p, v) for p, v in about if p > 0.0 and v is not None]
@@ -272,6 +278,16 @@ def fisher_information(probability: Array, variance: Array) -> Array:
         score = at * (share @ (1.0 / variance))
         information += p * np.mean(score**2, axis=0)
     return information
+
+
+def _sources(fault: FaultLabel, recording: Recording) -> list[str]:
+    """The instruments and channels that a fault affects (`simnav.types.Measurement.source`)."""
+    found = []
+    for name in fault.instruments:
+        stream = recording.data.aids.get(name)
+        of_fault = [c for c in stream.channels if not fault.channels or c in fault.channels] if stream else []
+        found += [f"{name}:{channel}" for channel in of_fault] if stream and stream.channels else [name]
+    return found
 
 
 def _size(fault: FaultLabel, stream: AidStream) -> Array | None:

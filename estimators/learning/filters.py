@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simnav.environment.navigation import most_samples
+from simnav.estimator import UnsuitableScenario
 from simnav.estimators.learning.bank import MEMORY_COLUMNS, observe, take
 from simnav.estimators.learning.features import observation_size
 from simnav.estimators.learning.reference import Linear, ReferenceFilter
@@ -71,7 +72,7 @@ def layout_of(runs: Sequence[Instruments], which: str, most: Sequence[Mapping[st
     Raises
     ------
     UnsuitableScenario
-        If no filter fits the instruments.
+        If no filter fits the instruments, or one of them has channels.
     ValueError
         If there is nobody to be asked about.
     """
@@ -83,6 +84,12 @@ def layout_of(runs: Sequence[Instruments], which: str, most: Sequence[Mapping[st
     names: dict[str, str] = {}
     room, states, events = 1, 0, 0.0
     for i, instruments in enumerate(runs):
+        for sheet in instruments.values():
+            if sheet.channels:
+                raise UnsuitableScenario(
+                    f"a learning task takes instruments without channels; {sheet.name!r} has the channels "
+                    f"{', '.join(sheet.channels)}"
+                )
         trial = ReferenceFilter(list(instruments))
         trial.reset(start, instruments)
         states = max(states, trial.model.size)

@@ -14,6 +14,7 @@ from simnav.estimators.learning.filters import Filters, Layout
 from simnav.estimators.learning.policy import Policy, PolicyError
 from simnav.estimators.learning.reference import ReferenceFilter
 from simnav.estimators.learning.tasks import TASKS
+from simnav.estimators.models.channels import by_channel
 from simnav.estimators.models.suitable import Suitable
 from simnav.types import KINDS, Array, Estimate, InitialState, Instruments, Measurements
 
@@ -54,9 +55,9 @@ class PolicyEstimator(Estimator):
     def reset(self, start: InitialState, instruments: Instruments) -> None:
         """Begin a run; UnsuitableScenario where an instrument is lacking.
 
-        The policy is asked about the first instrument of each of its kinds; all others keep their noise.
+        The policy is asked about the first instrument, or channel, of each of its kinds; all others keep their noise.
         """
-        policy = self.policy
+        policy, instruments = self.policy, by_channel(instruments)
         self._filter = ReferenceFilter(list(instruments))
         self._filter.reset(start, instruments)
         names: list[str] = []
@@ -121,9 +122,10 @@ class PolicyEstimator(Estimator):
         counts = dict.fromkeys(self._layout.names, 0)
         flagged = []
         for m in measurements:
-            if m.instrument in counts:
-                j = min(counts[m.instrument], self._layout.most - 1)
-                counts[m.instrument] += 1
-                if self._filters.decision.scale[0, self._layout.names.index(m.instrument), j] <= 0.0:
-                    flagged.append((m.instrument, m.time))
+            name = m.source
+            if name in counts:
+                j = min(counts[name], self._layout.most - 1)
+                counts[name] += 1
+                if self._filters.decision.scale[0, self._layout.names.index(name), j] <= 0.0:
+                    flagged.append((name, m.time))
         return flagged

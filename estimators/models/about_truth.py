@@ -37,12 +37,12 @@ from typing import NamedTuple
 import numpy as np
 
 from simnav.estimators.models.base import ErrorModel, Linearised, is_fast, stationary
+from simnav.estimators.models.equations import equation_of
 from simnav.estimators.models.inertial import CURRENT, CURRENT_TIME, InertialModel, roll_pitch_yaw
 from simnav.estimators.models.propagation import correct_inertial
 from simnav.estimators.models.state_blocks import StateBlocks
 from simnav.geometry.earth import principal_radii
 from simnav.geometry.rotation import dcm_from_rpy, rotation_vector_from_dcm
-from simnav.kinds import BODY_VELOCITY, DEPTH, WATER_SPEED
 from simnav.types import (
     Array,
     Datasheet,
@@ -179,12 +179,13 @@ class AboutTruthModel(ErrorModel):
                     bias.append((i, self._state(s * s, 1.0 / time, 2.0 * s * s / time)))
                 elif s:
                     bias.append((i, self._state(0.0, 0.0, s * s)))
-        if sheet.equation == WATER_SPEED and self.water is None:
+        equation = equation_of(sheet)
+        if equation.through_water and self.water is None:
             bias.append((0, self._state(*stationary(CURRENT, CURRENT_TIME)[:3])))
         scale = misalignment = deviation = -1
-        if sheet.equation in (BODY_VELOCITY, WATER_SPEED, DEPTH) and sheet.scale:
+        if equation.has_scale and sheet.scale:
             scale = self._state(sheet.scale**2)
-        if sheet.equation == BODY_VELOCITY and np.any(sheet.misalignment):
+        if equation.in_body and np.any(sheet.misalignment):
             misalignment = self._several(sheet.misalignment)
         amplitude = float(sheet.details.get("deviation", 0.0))
         if amplitude:
@@ -300,9 +301,10 @@ class AboutTruthModel(ErrorModel):
             jacobian[:, mine] = own.jacobian[:, theirs]
         for component, at in errors.bias:
             jacobian[component, at] = 1.0
-        if sheet.equation in (BODY_VELOCITY, WATER_SPEED, DEPTH):
+        equation = equation_of(sheet)
+        if equation.has_scale:
             u = measurement.value - innovation  # what it should read
-            if sheet.equation == WATER_SPEED and self.water is not None:
+            if equation.through_water and self.water is not None:
                 forward = self.nominal.dcm[:, 0]
                 water = np.array([np.interp(measurement.time, self.truth.time, w) for w in self.water.T])
                 along = forward @ water

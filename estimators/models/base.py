@@ -13,7 +13,17 @@ from simnav.estimator.needs import Needs
 from simnav.estimators.algebra.joseph import joseph_update, project
 from simnav.estimators.models.own_observation import OwnObservation
 from simnav.geometry.rotation import left_jacobian
-from simnav.types import Array, Datasheet, Estimate, ImuSamples, InitialState, Instruments, Measurement, TriadDatasheet
+from simnav.types import (
+    NO_SIDE,
+    Array,
+    Datasheet,
+    Estimate,
+    ImuSamples,
+    InitialState,
+    Instruments,
+    Measurement,
+    TriadDatasheet,
+)
 
 __all__ = [
     "ErrorModel", "GaussMarkov", "Linearised", "Observation", "aid_biases", "gauss_markov", "is_fast", "stationary",
@@ -118,7 +128,9 @@ class ErrorModel(ABC):
     def measure(self, measurement: Measurement) -> Linearised | None:
         """Linearise a measurement at the present state; None if it cannot be used."""
 
-    def observe_own(self, name: str, time: float, value: Array, state: tuple[Array, ...]) -> tuple[Array, Array] | None:
+    def observe_own(
+        self, name: str, time: float, value: Array, state: tuple[Array, ...], side: Array = NO_SIDE
+    ) -> tuple[Array, Array] | None:
         """Innovation and Jacobian of a measurement of an instrument in ``own``, at any state.
 
         Parameters
@@ -131,6 +143,8 @@ class ErrorModel(ABC):
             The measured value.
         state : tuple of array
             The arrays that describe a state of this model, as its chain keeps them.
+        side : (s,) array
+            Side information of the reading (`simnav.kinds.Kind.side`).
 
         Returns
         -------

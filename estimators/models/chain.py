@@ -29,7 +29,17 @@ from simnav.compiled import kernel
 from simnav.estimator.needs import Needs
 from simnav.estimators.algebra.whitening import whitening
 from simnav.estimators.models.base import ErrorModel, Linearised
-from simnav.types import Array, Datasheet, Estimate, ImuSamples, InitialState, Instruments, Integers, Measurement
+from simnav.types import (
+    NO_SIDE,
+    Array,
+    Datasheet,
+    Estimate,
+    ImuSamples,
+    InitialState,
+    Instruments,
+    Integers,
+    Measurement,
+)
 
 __all__ = ["Chain", "Columns", "chain_of"]
 
@@ -228,7 +238,8 @@ class Chain(ABC):
         The aiding factors in ascending order of their nodes: ``node`` (number since the start of the run), ``fold``
         (number since the start of the run, or -1), ``instrument`` (index into ``names``), ``components``, ``time``,
         ``value`` (3,), ``noise`` and ``whitener`` (3, 3), ``bare`` (1 if the noise of the motion has not been added to
-        the noise yet); of the last linearisation ``residual`` (3,), ``jacobian`` (3, n); ``weight``.
+        the noise yet); ``side`` if readings have side information; of the last linearisation ``residual`` (3,),
+        ``jacobian`` (3, n); ``weight``.
     folds : Columns
         Times between nodes with measurements: ``node`` (number of the previous node), ``time``, ``transition`` and
         ``noise`` (n, n) from the node, ``shift`` (n,) by which the node has moved since the prediction, the predicted
@@ -236,7 +247,8 @@ class Chain(ABC):
     fold_base : int
         Number of the first fold of the window since the start of the run.
     names : tuple of str
-        Names of the instruments.
+        Names of the instruments; for one with channels, the source of each
+        (`simnav.estimators.models.channels.by_channel`).
     base : int
         Number of the first node of the window since the start of the run.
     ahead : float
@@ -272,6 +284,9 @@ class Chain(ABC):
             node=np.int64, fold=np.int64, instrument=np.int64, components=np.int64, time=(), value=(3,), noise=(3, 3),
             bare=np.int64, whitener=(3, 3), residual=(3,), jacobian=(3, n), whitened=(3,), norm=(), weight=(),
         )  # fmt: skip
+        self._sides = max((len(own.kind.side) for own in front.own.values()), default=0)
+        if self._sides:
+            self.aids.add(side=(self._sides,))
         self.folds = Columns(node=np.int64, time=(), transition=(n, n), noise=(n, n), shift=(n,), jacobian=(n, n))
         self.folds.add(**{name: getattr(front, name).shape for name in self._kept})
         self.folds.add(**{f"now_{name}": getattr(front, name).shape for name in front.state})
@@ -369,6 +384,8 @@ class Chain(ABC):
             np.ascontiguousarray(noise, dtype=np.float64), np.ascontiguousarray(measurement.value, dtype=np.float64),
             aids.newest("noise"), aids.newest("whitener"), aids.newest("value"),
         )  # fmt: skip
+        if self._sides:
+            aids.newest("side")[: len(measurement.side)] = measurement.side
 
     def _fold(self) -> int:
         """The number of the fold at the front's time; a new one, if there is none yet."""
@@ -483,9 +500,18 @@ class Chain(ABC):
             d = len(own[name].kind.components)
             aids["residual"][i], jacobian[i], aids["components"][i] = 0.0, 0.0, 0
             at = tuple(column[row[i]] for column in state)
-            found = self.front.observe_own(name, aids["time"][i], aids["value"][i, :d], at)
+            side = self.side_of(int(i))
+            found = self.front.observe_own(name, aids["time"][i], aids["value"][i, :d], at, side)
             if found is not None:
                 aids["residual"][i, :d], jacobian[i, :d], aids["components"][i] = *found, d
+
+    def side_of(self, i: int) -> Array:
+        """The (s,) side information of an aiding factor, whose instrument has an equation of its own."""
+        if not self._sides:
+            return NO_SIDE
+        name = self.names[self.aids["instrument"][i]]
+        side: Array = self.aids["side"][i, : len(self.front.own[name].kind.side)]
+        return side
 
     @abstractmethod
     def move_folds(self, first: int) -> None:

@@ -30,7 +30,7 @@ class FaultState(NamedTuple):
     Attributes
     ----------
     instrument : str
-        Name of the instrument.
+        Name of the instrument, or the source of a channel (`simnav.types.Measurement.source`).
     sigma : (d,) array
         Standard deviation of each component; a component with 0 has no state.
     correlation_time : float
@@ -117,7 +117,7 @@ class FaultStateModel(ErrorModel):
         jacobian = np.zeros((d, self.size))
         jacobian[:, :n] = linearised.jacobian
         innovation = linearised.innovation
-        for fault, axes, at in self._of.get(measurement.instrument, ()):
+        for fault, axes, at in self._of.get(measurement.source, ()):
             factor = fault.factor(measurement.time)
             for k, axis in enumerate(axes.tolist()):
                 if factor and axis < d:  # a ship's model has no height

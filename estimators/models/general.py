@@ -29,12 +29,12 @@ from numpy.typing import NDArray
 
 from simnav.estimators.models.base import Linearised, aid_biases, is_fast
 from simnav.estimators.models.chain import Chain, Columns, chain_of
+from simnav.estimators.models.equations import EQUATIONS, equation_of
 from simnav.estimators.models.own_observation import OwnObservation
 from simnav.estimators.models.points import PointModel
-from simnav.estimators.models.readings import READINGS
 from simnav.estimators.models.state_blocks import StateBlocks
 from simnav.kinds import NavigationPoint
-from simnav.types import KINDS, Array, Datasheet, Estimate, InitialState, Instruments, Measurement
+from simnav.types import KINDS, NO_SIDE, Array, Datasheet, Estimate, InitialState, Instruments, Measurement
 
 __all__ = ["GeneralChain", "GeneralModel"]
 
@@ -60,7 +60,7 @@ class GeneralModel(PointModel):
 
     state = ("x", "extra")
     moving = (slice(0, 0), slice(0, 0))
-    equations: ClassVar[tuple[str, ...]] = tuple(READINGS)
+    equations: ClassVar[tuple[str, ...]] = tuple(EQUATIONS)
 
     @abstractmethod
     def initial(self, start: InitialState, instruments: Instruments) -> tuple[Array, Array]:
@@ -90,14 +90,17 @@ class GeneralModel(PointModel):
         """The (n,) error that leads from ``reference`` to ``x``: the inverse of `retract`."""
         return np.asarray(x - reference)
 
-    def read(self, x: Array, time: float, sheet: Datasheet, extra: Array) -> Array | None:
-        """What an instrument should read at a state: (d,) array, or None; with its bias and the blocks in ``extra``."""
+    def read(self, x: Array, time: float, sheet: Datasheet, extra: Array, side: Array = NO_SIDE) -> Array | None:
+        """What an instrument should read at a state: (d,) array, or None; with its bias and the blocks in ``extra``.
+
+        ``side`` is the (s,) side information of the reading of a channel.
+        """
         own = self.own.get(sheet.name)
         point = self.navigation(x, time)
         if own is None:
-            reading = READINGS[sheet.equation](point, sheet)
+            reading = equation_of(sheet).read(point, sheet)
         else:
-            reading = own.read(point._replace(blocks=own.blocks(extra)))
+            reading = own.read(point._replace(blocks=own.blocks(extra), channel=own.channel, side=side))
         at = self._bias_at.get(sheet.name, -1)
         if reading is None or at < 0:
             return reading
@@ -183,10 +186,12 @@ class GeneralModel(PointModel):
         """Take an error, or several in columns, through the last propagation, in place."""
         error[...] = self._last @ error
 
-    def linearise(self, name: str, time: float, value: Array, x: Array, extra: Array) -> tuple[Array, Array] | None:
+    def linearise(
+        self, name: str, time: float, value: Array, x: Array, extra: Array, side: Array = NO_SIDE
+    ) -> tuple[Array, Array] | None:
         """Innovation (d,) and Jacobian (d, n) of a measurement at any state; None where it has no reading."""
         sheet, kind, m = self.sheets[name], KINDS[self.sheets[name].kind], self.n_own
-        reading = self.read(x, time, sheet, extra)
+        reading = self.read(x, time, sheet, extra, side)
         if reading is None:
             return None
         jacobian = np.zeros((len(reading), self.size))
@@ -194,10 +199,10 @@ class GeneralModel(PointModel):
             error = np.zeros(self.size)
             error[j] = self._steps[j]
             ends, length = [reading, reading], 0.0
-            for side, sign in enumerate((1.0, -1.0)):
-                there = self.read(self.retract(x, sign * error[:m]), time, sheet, extra + sign * error[m:])
+            for end, sign in enumerate((1.0, -1.0)):
+                there = self.read(self.retract(x, sign * error[:m]), time, sheet, extra + sign * error[m:], side)
                 if there is not None:
-                    ends[side] = there
+                    ends[end] = there
                     length += error[j]
             if length:
                 jacobian[:, j] = kind.difference(ends[0], ends[1]) / length
@@ -212,8 +217,13 @@ class GeneralModel(PointModel):
     def measure(self, measurement: Measurement) -> Linearised | None:
         """Linearise one measurement at the present state."""
         name = measurement.instrument
-        found = self.linearise(name, measurement.time, measurement.value, self.x, self.extra)
-        return None if found is None else Linearised(*found, self._white[name])
+        found = self.linearise(name, measurement.time, measurement.value, self.x, self.extra, measurement.side)
+        if found is None:
+            return None
+        noise, own = self._white[name], self.own.get(name)
+        if own is not None and (more := own.reading_noise(measurement.side)) is not None:
+            noise = noise + more
+        return Linearised(*found, noise)
 
     def correct(self, dx: Array) -> None:
         """Add a correction to the state."""
@@ -234,12 +244,13 @@ class GeneralModel(PointModel):
         """What the instrument should read at the points, minus what it should read at the state."""
         name, m = measurement.instrument, self.n_own
         sheet, kind = self.sheets[name], KINDS[measurement.kind]
-        found = self.linearise(name, measurement.time, measurement.value, self.x, self.extra)
-        reading = self.read(self.x, measurement.time, sheet, self.extra)
+        time, side = measurement.time, measurement.side
+        found = self.linearise(name, time, measurement.value, self.x, self.extra, side)
+        reading = self.read(self.x, time, sheet, self.extra, side)
         assert found is not None and reading is not None  # noqa: PT018 (`measure` says something of it)
         differences = errors @ found[1].T
         for k, error in enumerate(errors):
-            there = self.read(self.retract(self.x, error[:m]), measurement.time, sheet, self.extra + error[m:])
+            there = self.read(self.retract(self.x, error[:m]), time, sheet, self.extra + error[m:], side)
             if there is not None:
                 differences[k] = kind.difference(there, reading)
         return np.asarray(differences)
@@ -287,7 +298,8 @@ class GeneralChain(Chain):
             name = self.names[aids["instrument"][i]]
             d = len(self.front._white[name])
             aids["residual"][i], jacobian[i], aids["components"][i] = 0.0, 0.0, 0
-            found = self.front.linearise(name, aids["time"][i], aids["value"][i, :d], x[row[i]], extra[row[i]])
+            side = self.side_of(int(i)) if name in self.front.own else NO_SIDE
+            found = self.front.linearise(name, aids["time"][i], aids["value"][i, :d], x[row[i]], extra[row[i]], side)
             if found is not None:
                 aids["residual"][i, :d], jacobian[i, :d], aids["components"][i] = *found, d
 

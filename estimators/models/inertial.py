@@ -50,16 +50,13 @@ from simnav.estimators.models.base import (
     stationary,
     triad_bias,
 )
+from simnav.estimators.models.equations import EQUATIONS, equation_of
 from simnav.estimators.models.inertial_update import absorb_inertial, assimilate_inertial, innovate_inertial
 from simnav.estimators.models.measurements import (
-    CODES,
     HEADING,
-    OWN,
     Aid,
     State,
     observe,
-    uncalibrated_noise,
-    white_noise,
 )
 from simnav.estimators.models.own_observation import OwnObservation
 from simnav.estimators.models.propagation import (
@@ -71,9 +68,9 @@ from simnav.estimators.models.propagation import (
 )
 from simnav.estimators.models.state_blocks import StateBlocks
 from simnav.geometry.rotation import dcm_from_rpy
-from simnav.kinds import BODY_VELOCITY, WATER_SPEED
 from simnav.types import (
     KINDS,
+    NO_SIDE,
     Array,
     Datasheet,
     Estimate,
@@ -140,7 +137,7 @@ class InertialModel(ErrorModel):
     noise : dict of str to (d, d) array
         Covariance of the white noise of each instrument.
     uncalibrated : set of str
-        Instruments whose noise grows with the velocity (`simnav.estimators.models.measurements.uncalibrated_noise`).
+        Instruments whose noise grows with the velocity (`simnav.estimators.models.equations`).
     raw_rate, raw_force : (3,) array
         Angular rate at the time of the state (extrapolated) and specific force of the last IMU sample, as measured.
     transition, process_noise : (15, 15) array
@@ -243,26 +240,25 @@ class InertialModel(ErrorModel):
         for sheet in self.instruments.values():
             if not self.observes(sheet):
                 continue
-            states = aid_biases(sheet)
+            equation, states = equation_of(sheet), aid_biases(sheet)
             white = sheet.bias_instability**2 if is_fast(sheet) else np.zeros(len(states))
-            if sheet.equation == WATER_SPEED and self.calibrate:
+            if equation.through_water and self.calibrate:
                 states += 2 * [stationary(CURRENT, CURRENT_TIME)]
             if not self.calibrate:
-                along_keel = CURRENT**2 if sheet.equation == WATER_SPEED else 0.0
+                along_keel = CURRENT**2 if equation.through_water else 0.0
                 white = white + [s.variance + along_keel for s in states]
             elif any(s.variance or s.noise for s in states):
                 self.bias_at[sheet.name] = _NAV + len(self._states)
                 self._states += [(s.variance, s.decay, s.noise) for s in states]
-            if sheet.equation in (BODY_VELOCITY, WATER_SPEED) and (sheet.scale or np.any(sheet.misalignment)):
+            if sigmas := equation.scale_sigmas(sheet):
                 if self.calibrate:
                     self.scale_at[sheet.name] = _NAV + len(self._states)
-                    extra = sheet.misalignment if sheet.equation == BODY_VELOCITY else ()
-                    self._states += [(x * x, 0.0, 0.0) for x in (sheet.scale, *extra)]
+                    self._states += [(x * x, 0.0, 0.0) for x in sigmas]
                 else:
                     self.uncalibrated.add(sheet.name)
-            self.noise[sheet.name] = white_noise(sheet, white, self._rate_variance)
+            self.noise[sheet.name] = equation.white_noise(sheet, white, self._rate_variance)
             self.aid_parameters[sheet.name] = (
-                CODES.get(sheet.equation, OWN), np.array(sheet.lever_arm, dtype=np.float64),
+                equation.code, np.array(sheet.lever_arm, dtype=np.float64),
                 self.bias_at.get(sheet.name, -1), self.scale_at.get(sheet.name, -1),
             )  # fmt: skip
         self._states += self._more_states()
@@ -284,7 +280,7 @@ class InertialModel(ErrorModel):
 
     def observes(self, instrument: Datasheet) -> bool:
         """Every kind of instrument that has a measurement equation."""
-        return instrument.equation in CODES or KINDS[instrument.kind].observation is not None
+        return instrument.equation in EQUATIONS or KINDS[instrument.kind].observation is not None
 
     def arrays(self, names: Sequence[str]) -> dict[str, NDArray[Any]] | None:
         """The state and the constants, for a kernel that goes through many filters.
@@ -300,9 +296,9 @@ class InertialModel(ErrorModel):
             The state under the names of its attributes; ``sensors``, the noise of the IMU (`accumulate_error`); by
             instrument ``codes`` (its code, components, and the places of its bias and scale factor; no components:
             it is not used), ``arms``, ``noises`` (flat) and ``limits`` (values of this size are not plausible). None
-            where the model uses an instrument in a way of its own.
+            where the model uses an instrument in a way of its own, or channel by channel.
         """
-        if self._fused != set(self.noise):
+        if self._fused != set(self.noise) or not self.noise.keys() <= set(names):
             return None
         codes, arms = np.zeros((len(names), 4), np.int64), np.zeros((len(names), 3))
         noises, limits = np.zeros((len(names), 9)), np.zeros((len(names), 3))
@@ -369,7 +365,7 @@ class InertialModel(ErrorModel):
         """Linearise one measurement (`simnav.estimators.models.measurements`)."""
         name = measurement.instrument
         if name in self.own:
-            found = self._linearise_own(name, measurement.time, measurement.value, self._state())
+            found = self._linearise_own(name, measurement.time, measurement.value, self._state(), measurement.side)
             if found is None:
                 return None
             noise = self.noise[name] if found[2] is None else self.noise[name] + found[2]
@@ -379,23 +375,26 @@ class InertialModel(ErrorModel):
         if not observe(self.aid_parameters[name], value, self._state(), innovation, jacobian):
             return None
         if name in self.uncalibrated:
-            noise = noise + uncalibrated_noise(self.instruments[name], value - innovation)
+            sheet = self.instruments[name]
+            noise = noise + equation_of(sheet).uncalibrated_noise(sheet, value - innovation)
         return Linearised(innovation, jacobian, noise)
 
     def _state(self) -> State:
         return self.position, self.velocity, self.dcm, self.raw_rate, self.bias, self.calibration
 
-    def observe_own(self, name: str, time: float, value: Array, state: tuple[Array, ...]) -> tuple[Array, Array] | None:
+    def observe_own(
+        self, name: str, time: float, value: Array, state: tuple[Array, ...], side: Array = NO_SIDE
+    ) -> tuple[Array, Array] | None:
         """As `ErrorModel.observe_own`; the state is position, velocity, DCM, angular rate, bias and calibration."""
-        found = self._linearise_own(name, time, value, state)
+        found = self._linearise_own(name, time, value, state, side)
         return None if found is None else found[:2]
 
     def _linearise_own(
-        self, name: str, time: float, value: Array, state: tuple[Array, ...]
+        self, name: str, time: float, value: Array, state: tuple[Array, ...], side: Array
     ) -> tuple[Array, Array, Array | None] | None:
         position, velocity, dcm, rate, bias, calibration = state
         own, size = self.own[name], _NAV + len(calibration)
-        point = own.point(time, position, velocity, dcm, rate, bias, calibration)
+        point = own.point(time, position, velocity, dcm, rate, bias, calibration, side)
         return own.linearise(point, value, calibration, size, self.bias_at.get(name, -1))
 
     def nominal_noise(self, measurement: Measurement) -> Array | None:

@@ -13,6 +13,7 @@ import numpy as np
 from simnav.estimator import UnsuitableScenario
 from simnav.estimator.needs import Needs
 from simnav.estimators.models.base import ErrorModel, Linearised
+from simnav.estimators.models.equations import equation_of
 from simnav.estimators.models.measurements import radii, wrap
 from simnav.kinds import POSITION, VELOCITY, kinds_with
 from simnav.types import Array, Datasheet, Estimate, InitialState, Instruments, Measurement
@@ -97,7 +98,7 @@ class KinematicModel(ErrorModel):
         """Linearise a fix or a velocity; a lever arm is turned by the course, or the last one, or the initial yaw."""
         sheet = self.instruments[measurement.instrument]
         H = np.zeros((3, 6))
-        if sheet.equation == VELOCITY:
+        if equation_of(sheet).is_fix:
             H[:, 3:] = np.eye(3)
             arm = sheet.lever_arm
             noise = sheet.sigma**2 + sheet.bias**2 + SEAWAY**2 + TILT_RATE**2 * float(arm @ arm)

@@ -21,21 +21,16 @@ The noise is that of the datasheet plus that of the gyroscopes times the lever a
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from math import atan2, cos, sin, sqrt
 from typing import TypeAlias
 
-import numpy as np
-
-from simnav import kinds
 from simnav.compiled import kernel
 from simnav.geometry.earth import ECCENTRICITY_SQUARED, ROTATION_RATE, SEMI_MAJOR_AXIS, radii_scalar
 from simnav.geometry.rotation import cross
-from simnav.types import Array, Datasheet
+from simnav.types import Array
 
 __all__ = [
-    "AID", "CODES", "OWN", "STATE", "Aid", "State", "observe", "observe_inertial", "radii", "uncalibrated_noise",
-    "white_noise", "wrap",
+    "AID", "OWN", "STATE", "Aid", "State", "observe", "observe_inertial", "radii", "wrap",
 ]  # fmt: skip
 
 #: Smallest cosine of the pitch at which there is a heading [-].
@@ -43,21 +38,12 @@ LEAST_LEVEL = 0.1
 #: Number of components of the inertial state, without the calibration.
 NAVIGATION_STATES = 15
 
+#: What `observe_inertial` calls the measurement equations: `simnav.estimators.models.equations.Equation.code`.
 GNSS_POSITION, TERRAIN_FIX, GNSS_VELOCITY, DVL, SPEED_LOG, HEADING, DEPTH = range(7)
-#: What `observe_inertial` calls each of the measurement equations (`simnav.kinds.EQUATIONS`).
-CODES: Mapping[str, int] = {
-    kinds.POSITION: GNSS_POSITION,
-    kinds.HORIZONTAL_POSITION: TERRAIN_FIX,
-    kinds.VELOCITY: GNSS_VELOCITY,
-    kinds.BODY_VELOCITY: DVL,
-    kinds.WATER_SPEED: SPEED_LOG,
-    kinds.HEADING: HEADING,
-    kinds.DEPTH: DEPTH,
-}
 #: In the place of a code: the kind of instrument has a function of its own (`simnav.kinds.Kind.observation`).
 OWN = -1
 
-#: The parameters of an instrument: one of `CODES`; its lever arm (3,), body axes [m]; the index in the error state of
+#: The parameters of an instrument: its code; its lever arm (3,), body axes [m]; the index in the error state of
 #: its first bias, and of its scale factor, -1 for none. After a DVL's scale factor come three misalignments, after a
 #: log's bias the current, north and east.
 Aid: TypeAlias = tuple[int, Array, int, int]
@@ -205,25 +191,3 @@ def observe_inertial(aid: Aid, value: Array, state: State, innovation: Array, ja
 def observe(aid: Aid, value: Array, state: State, innovation: Array, jacobian: Array) -> int:
     """Call `observe_inertial` from Python."""
     return observe_inertial(aid, value, state, innovation, jacobian)
-
-
-def white_noise(sheet: Datasheet, faster: Array | float, rate_variance: float) -> Array:
-    """(d, d) noise: that of the instrument, biases ``faster`` than a state, and gyroscope noise times the lever arm."""
-    noise = np.diag(sheet.sigma**2 + faster)
-    arm = sheet.lever_arm
-    if sheet.equation == kinds.VELOCITY:
-        noise += rate_variance * (arm @ arm) * np.eye(3)
-    elif sheet.equation == kinds.BODY_VELOCITY:
-        noise += rate_variance * (arm @ arm * np.eye(3) - np.outer(arm, arm))
-    elif sheet.equation == kinds.WATER_SPEED:
-        noise += rate_variance * (arm[1:] @ arm[1:])
-    return noise
-
-
-def uncalibrated_noise(sheet: Datasheet, predicted: Array) -> Array:
-    """(d, d) noise in place of a scale factor and a misalignment without states, at a ``predicted`` velocity."""
-    u, m = predicted**2, sheet.misalignment**2
-    variance = sheet.scale**2 * u
-    if sheet.equation == kinds.BODY_VELOCITY:
-        variance += [m[1] * u[2] + m[2] * u[1], m[0] * u[2] + m[2] * u[0], m[0] * u[1] + m[1] * u[0]]
-    return np.diag(variance)

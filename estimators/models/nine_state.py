@@ -16,8 +16,8 @@ from __future__ import annotations
 import numpy as np
 
 from simnav.estimators.models.base import Linearised
+from simnav.estimators.models.equations import equation_of
 from simnav.estimators.models.inertial import InertialModel
-from simnav.kinds import BODY_VELOCITY, POSITION
 from simnav.types import Array, InitialState, Instruments, Measurement
 
 __all__ = ["NineStateModel"]
@@ -60,9 +60,10 @@ class NineStateModel(InertialModel):
         self._full = np.zeros(15)
         self._noise[:8] = 0.0
         for sheet in instruments.values():
-            if sheet.equation == POSITION and np.all(self._gnss > 0.0):
+            equation = equation_of(sheet)
+            if equation.has_height and np.all(self._gnss > 0.0):
                 self.noise[sheet.name] = np.diag(self._gnss**2)
-            elif sheet.equation == BODY_VELOCITY and self._dvl > 0.0:
+            elif equation.in_body and self._dvl > 0.0:
                 self.noise[sheet.name] = self._dvl**2 * np.eye(3)
         return np.array(start.covariance, dtype=np.float64)
 

@@ -7,6 +7,9 @@ are used here, for every model over the inertial state, in filters and graphs; f
 
 A reading may depend on states that the instrument brings along (`simnav.blocks`). A Jacobian, or a block of it, that
 the function does not give is computed here by central differences.
+
+The reading of a channel also depends on which channel it is and on its side information, and its noise may do so, too
+(`simnav.kinds.Kind.reading_sigma`).
 """
 
 from __future__ import annotations
@@ -20,11 +23,12 @@ from typing import Any
 import numpy as np
 
 from simnav.blocks import NAVIGATION
+from simnav.estimators.models.channels import ChannelDatasheet, whole
 from simnav.geometry.earth import earth_rate, principal_radii
 from simnav.geometry.rotation import dcm_from_rotation_vector
 from simnav.kinds import NavigationPoint
 from simnav.plugins import place_of
-from simnav.types import KINDS, Array, Datasheet
+from simnav.types import KINDS, NO_SIDE, Array, Datasheet
 
 __all__ = ["OwnObservation"]
 
@@ -38,12 +42,13 @@ _NONE: Mapping[str, Array] = MappingProxyType({})
 
 
 class OwnObservation:
-    """The measurement equation of one instrument.
+    """The measurement equation of one instrument, or of one of its channels.
 
     Parameters
     ----------
     sheet : Datasheet
-        Datasheet of an instrument whose kind has an observation function.
+        Datasheet of an instrument whose kind has an observation function. For one with channels it is that of a channel
+        (`simnav.estimators.models.channels.by_channel`); the function receives that of the instrument.
     places : mapping of str to int, optional
         Index of the first state of each of its blocks in the array of values that `point` receives. A block without a
         place has no state: it is zero, and its uncertainty counts as noise.
@@ -57,7 +62,9 @@ class OwnObservation:
     """
 
     def __init__(self, sheet: Datasheet, places: Mapping[str, int] = MappingProxyType({}), since: float = 0.0):
-        self.sheet, self.kind = sheet, KINDS[sheet.kind]
+        assert not sheet.channels, "each channel has an equation of its own, see `by_channel`"
+        self.sheet, self.kind, self._given = sheet, KINDS[sheet.kind], whole(sheet)
+        self.channel = sheet.channel if isinstance(sheet, ChannelDatasheet) else ""
         observation = self.kind.observation
         assert observation is not None
         self._observation = observation
@@ -84,8 +91,9 @@ class OwnObservation:
         ]
 
     def point(
-        self, time: float, position: Array, velocity: Array, dcm: Array, rate: Array, bias: Array, values: Array
-    ) -> NavigationPoint:
+        self, time: float, position: Array, velocity: Array, dcm: Array, rate: Array, bias: Array, values: Array,
+        side: Array = NO_SIDE,
+    ) -> NavigationPoint:  # fmt: skip
         """The state for the function.
 
         Parameters
@@ -100,9 +108,11 @@ class OwnObservation:
             Their bias first [rad/s].
         values : (m,) array
             The states among which those of the blocks are.
+        side : (s,) array
+            Side information of the reading.
         """
         turning = rate - bias[:3] - dcm.T @ earth_rate(position[0])
-        return NavigationPoint(time, position, velocity, dcm, turning, self.blocks(values))
+        return NavigationPoint(time, position, velocity, dcm, turning, self.blocks(values), self.channel, side)
 
     def blocks(self, values: Array) -> Mapping[str, Array]:
         """The values of the blocks, by name."""
@@ -152,7 +162,7 @@ class OwnObservation:
 
     def _call(self, point: NavigationPoint) -> Any:
         try:
-            return self._observation(point, self.sheet)
+            return self._observation(point, self._given)
         except Exception as error:
             raise ValueError(f"{self._label()} raised {type(error).__name__}: {error}") from error
 
@@ -199,7 +209,7 @@ class OwnObservation:
         blocks = point.blocks
         if self.sheet.blocks:
             blocks = {b.name: point.blocks[b.name] + error[self._columns[b.name]] for b in self.sheet.blocks}
-        return NavigationPoint(point.time, position, point.velocity + error[3:6], dcm, point.angular_rate, blocks)
+        return point._replace(position=position, velocity=point.velocity + error[3:6], dcm=dcm, blocks=blocks)
 
     def _label(self) -> str:
         """The function, for messages: of which kind it is, for which instrument, and where it stands."""
@@ -208,24 +218,47 @@ class OwnObservation:
         place = f"{function}() in {Path(file).name}, line {line}"
         return f"the observation of kind {self.sheet.kind!r} ({place}), for the instrument {self.sheet.name!r},"
 
-    def spread(self, own: Array, time: float) -> Array | None:
-        """The (d, d) noise of the blocks that have no state; None if all have one.
+    def spread(self, own: Array, point: NavigationPoint) -> Array | None:
+        """The (d, d) covariance that a reading has beyond the noise of the datasheet; None if there is nothing.
+
+        It is the noise of the blocks that have no state, and the difference of this reading's own noise
+        (`simnav.kinds.Kind.reading_sigma`) from that of the datasheet.
 
         Parameters
         ----------
         own : (d, 9 + b) array
             Jacobian of `predict`.
-        time : float
-            Time of validity [s]. The uncertainty of a clock or a random walk grows from the start of the run.
+        point : NavigationPoint
+            The state of the reading. The uncertainty of a clock or a random walk grows from the start of the run to its
+            time.
         """
+        more = self.reading_noise(point.side)
         if not len(self._free):
-            return None
-        noise = np.zeros((len(own), len(own)))
+            return more
+        noise = np.zeros((len(own), len(own))) if more is None else more
         for block in self.sheet.blocks:
             if block.name in self._zeros:
                 part = own[:, self._columns[block.name]]
-                noise += part @ block.covariance(max(0.0, time - self._since)) @ part.T
+                noise += part @ block.covariance(max(0.0, point.time - self._since)) @ part.T
         return noise
+
+    def reading_noise(self, side: Array) -> Array | None:
+        """The (d, d) covariance of a reading with this side information minus that of the datasheet; None if equal."""
+        function, d = self.kind.reading_sigma, len(self.kind.components)
+        if function is None:
+            return None
+        try:
+            sigma = np.asarray(function(side, self._given), dtype=np.float64)
+        except Exception as error:
+            message = f"reading_sigma of kind {self.sheet.kind!r} raised {type(error).__name__}: {error}"
+            raise ValueError(message) from error
+        if sigma.shape != (d,) or not (np.isfinite(sigma).all() and np.all(sigma >= 0.0)):
+            raise ValueError(
+                f"reading_sigma of kind {self.sheet.kind!r}, for the instrument {self.sheet.name!r} with the side "
+                f"information {side.tolist()}, should return an array of shape {(d,)}, finite and not negative, not "
+                f"{sigma.tolist()}"
+            )
+        return np.diag(sigma**2 - self.sheet.sigma**2)
 
     def place(self, own: Array, jacobian: Array, offset: int) -> None:
         """Write the columns of the blocks into a (d, n) Jacobian; ``offset`` is the index of the first value in it."""
@@ -271,7 +304,7 @@ class OwnObservation:
             jacobian[range(d), range(bias_at, bias_at + d)] = 1.0
             first = bias_at + len(calibration) - size
             reading = self.kind.add_error(reading, calibration[first : first + d])
-        return self.kind.difference(value, reading), jacobian, self.spread(own, point.time)
+        return self.kind.difference(value, reading), jacobian, self.spread(own, point)
 
     def differences(self, point: NavigationPoint, errors: Array, bias_at: int, offset: int) -> Array | None:
         """The predicted readings of the instrument at k states, minus that at one state.
@@ -306,7 +339,8 @@ class OwnObservation:
         attitudes = dcm_from_rotation_vector(errors[:, 6:9]) @ point.dcm
         rates = point.angular_rate - errors[:, 9:12]
         for k, state in enumerate(zip(positions, velocities, attitudes, rates, strict=True)):
-            there = self.read(NavigationPoint(point.time, *state, self._blocks_at(point, errors[k], offset)))
+            blocks = self._blocks_at(point, errors[k], offset)
+            there = self.read(NavigationPoint(point.time, *state, blocks, point.channel, point.side))
             if there is not None:
                 differences[k] = self.kind.difference(there, reading)
         if bias_at >= 0:

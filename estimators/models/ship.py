@@ -29,6 +29,7 @@ from simnav import kinds
 from simnav.estimator import UnsuitableScenario
 from simnav.estimator.needs import Needs
 from simnav.estimators.models.base import ErrorModel, GaussMarkov, Linearised, aid_biases, is_fast, stationary
+from simnav.estimators.models.equations import equation_of
 from simnav.estimators.models.measurements import wrap
 from simnav.estimators.models.ship_kernels import (
     BODY_VELOCITY,
@@ -47,7 +48,7 @@ from simnav.estimators.models.ship_kernels import (
 )
 from simnav.estimators.models.ship_observation import HEEL, VERTICAL_SPEED, ShipObservation
 from simnav.estimators.models.state_blocks import StateBlocks
-from simnav.types import KINDS, Array, Datasheet, Estimate, InitialState, Instruments, Measurement
+from simnav.types import KINDS, NO_SIDE, Array, Datasheet, Estimate, InitialState, Instruments, Measurement
 
 __all__ = ["OBSERVED", "POSITIONS", "E", "N", "ShipModel"]
 
@@ -146,17 +147,17 @@ class ShipModel(ErrorModel):
         self.bias_at: dict[str, int] = {}
         self.scale_at: dict[str, int] = {}
         for sheet in instruments.values():
-            own = KINDS[sheet.kind].observation is not None
+            equation, own = equation_of(sheet), KINDS[sheet.kind].observation is not None
             if own and not self.observes(sheet):
                 continue
-            if not own and sheet.equation not in (kinds.HEADING, *POSITIONS, kinds.WATER_SPEED):
+            if not own and not (equation.is_heading or equation.is_position or equation.through_water):
                 continue
-            d = len(sheet.sigma) if own else 2 if sheet.equation in POSITIONS else 1
+            d = len(sheet.sigma) if own else 2 if equation.is_position else 1
             biases = aid_biases(sheet)[:d]
             if any(b.variance or b.noise for b in biases):
                 self.bias_at[sheet.name] = 2 + len(states)
                 states += biases
-            if sheet.equation == kinds.WATER_SPEED and sheet.scale:
+            if equation.through_water and sheet.scale:
                 self.scale_at[sheet.name] = 2 + len(states)
                 states.append(GaussMarkov(sheet.scale**2, 0.0, 0.0, 0.0))
         brought = [s for s in instruments.values() if KINDS[s.kind].observation is not None and self.observes(s)]
@@ -221,16 +222,19 @@ class ShipModel(ErrorModel):
         """Linearise one measurement."""
         if measurement.instrument in self.own:
             own = self.own[measurement.instrument]
-            return own.measure(measurement.time, measurement.value, self.position, self.x)
+            return own.measure(measurement.time, measurement.value, self.position, self.x, measurement.side)
         code, aid, m = self.aids[measurement.instrument]
         residual, jacobian, noise = np.empty(m), np.zeros((m, self.size)), np.empty((m, m))
         first, second = float(measurement.value[0]), float(measurement.value[m - 1])
         observe_ship(code, aid, self.position, self.x, first, second, residual, jacobian, noise)
         return Linearised(residual, jacobian, noise)
 
-    def observe_own(self, name: str, time: float, value: Array, state: tuple[Array, ...]) -> tuple[Array, Array] | None:
+    def observe_own(
+        self, name: str, time: float, value: Array, state: tuple[Array, ...], side: Array = NO_SIDE
+    ) -> tuple[Array, Array] | None:
         """As `ErrorModel.observe_own`; the state is ``position, x``."""
-        found = self.own[name].measure(time, value, *state)
+        position, x = state
+        found = self.own[name].measure(time, value, position, x, side)
         return None if found is None else (found.innovation, found.jacobian)
 
     def correct(self, dx: Array) -> None:
@@ -254,16 +258,16 @@ class ShipModel(ErrorModel):
 def _aid(sheet: Datasheet, sway: float) -> tuple[int, list[float]]:
     """Kind and numbers of an instrument, for the kernels (`simnav.estimators.models.ship_kernels`)."""
     lx, ly, lz = sheet.lever_arm.tolist()
-    fast, white = is_fast(sheet), _white(sheet)
-    if sheet.equation in (kinds.HEADING, kinds.WATER_SPEED):
-        kind = LOG if sheet.equation == kinds.WATER_SPEED else HEADING
+    fast, white, equation = is_fast(sheet), _white(sheet), equation_of(sheet)
+    if equation.is_heading or equation.through_water:
+        kind = LOG if equation.through_water else HEADING
         return kind, [lx, ly, float(white[0]), 0.0, 0.0, 0.0, 0.0]
     white = white[:2]
-    if sheet.equation in POSITIONS:
+    if equation.is_position:
         return POSITION, [lx, ly, *(white + (HEEL * lz) ** 2).tolist(), 0.0, 0.0, 0.0]
     # A velocity's bias has no state.
     white = white + sheet.bias[:2] ** 2 + (0.0 if fast else sheet.bias_instability[:2] ** 2)
-    if sheet.equation == kinds.VELOCITY:
+    if equation.is_fix:
         return VELOCITY, [lx, ly, *white.tolist(), sway**2, 0.0, 0.0]
     white = white + (HEEL * sway) ** 2
     return BODY_VELOCITY, [lx, ly, *white.tolist(), sway**2, sheet.scale**2, float(sheet.misalignment[2]) ** 2]

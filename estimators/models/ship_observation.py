@@ -16,7 +16,7 @@ from simnav.estimators.models.base import Linearised
 from simnav.estimators.models.own_observation import OwnObservation
 from simnav.estimators.models.ship_kernels import CE, CN, PSI, E, N, R, U, displace_ship
 from simnav.kinds import NavigationPoint
-from simnav.types import Array, Datasheet
+from simnav.types import NO_SIDE, Array, Datasheet
 
 __all__ = ["HEEL", "VERTICAL_SPEED", "ShipObservation"]
 
@@ -50,7 +50,7 @@ class ShipObservation(OwnObservation):
         self._bias_at, self._white, self._sway = bias_at, np.diag(white), sway
         self._unknown = np.diag([0.0, 0.0, height, 0.0, 0.0, VERTICAL_SPEED**2, HEEL**2, HEEL**2, 0.0])
 
-    def measure(self, time: float, value: Array, position: Array, x: Array) -> Linearised | None:
+    def measure(self, time: float, value: Array, position: Array, x: Array, side: Array = NO_SIDE) -> Linearised | None:
         """Linearise one measurement.
 
         Parameters
@@ -61,13 +61,16 @@ class ShipObservation(OwnObservation):
             The measured value.
         position, x : (3,), (n,) array
             State of the ship (`simnav.estimators.models.ship_kernels`).
+        side : (s,) array
+            Side information of the reading.
 
         Returns
         -------
         Linearised or None
             None where the state has no reading.
         """
-        predicted = self.predict(self._point(time, position, x))
+        point = self._point(time, position, x, side)
+        predicted = self.predict(point)
         if predicted is None:
             return None
         reading, whole = predicted
@@ -79,9 +82,11 @@ class ShipObservation(OwnObservation):
             reading = self.kind.add_error(reading, x[at : at + d])
         aside = self._sway**0.5 * (own[:, 4] * cos(x[PSI]) - own[:, 3] * sin(x[PSI]))
         noise = self._white + own @ self._unknown @ own.T + np.outer(aside, aside)
+        more = self.spread(whole, point)
+        noise = noise if more is None else noise + more
         return Linearised(self.kind.difference(value, reading), jacobian, noise)
 
-    def differences_at(self, time: float, position: Array, x: Array, errors: Array) -> Array:
+    def differences_at(self, time: float, position: Array, x: Array, errors: Array, side: Array = NO_SIDE) -> Array:
         """What the instrument should read at k states, minus what it should read at one.
 
         Parameters
@@ -92,13 +97,15 @@ class ShipObservation(OwnObservation):
             The state that the k states are compared with; it has a reading.
         errors : (k, n) array
             Differences of the k states from it: metres north and east, then those of ``x``.
+        side : (s,) array
+            Side information of the reading.
 
         Returns
         -------
         (k, d) array
             A state that has no reading gets the difference by the Jacobian.
         """
-        predicted = self.predict(self._point(time, position, x))
+        predicted = self.predict(self._point(time, position, x, side))
         assert predicted is not None, "the model's own state has a reading"
         reading, own = predicted
         jacobian = own[:, :9] @ _navigation(x)
@@ -107,7 +114,7 @@ class ShipObservation(OwnObservation):
         for k, error in enumerate(errors):
             there = position.copy()
             displace_ship(there, error[N], error[E])
-            found = self.read(self._point(time, there, x + error))
+            found = self.read(self._point(time, there, x + error, side))
             if found is not None:
                 differences[k] = self.kind.difference(found, reading)
         at = self._bias_at
@@ -115,12 +122,13 @@ class ShipObservation(OwnObservation):
             differences += errors[:, at : at + len(reading)]
         return differences
 
-    def _point(self, time: float, position: Array, x: Array) -> NavigationPoint:
+    def _point(self, time: float, position: Array, x: Array, side: Array) -> NavigationPoint:
         """The navigation state of a ship."""
         c, s = cos(x[PSI]), sin(x[PSI])
         velocity = np.array([x[U] * c + x[CN], x[U] * s + x[CE], 0.0])
         dcm = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-        return NavigationPoint(time, position, velocity, dcm, np.array([0.0, 0.0, x[R]]), self.blocks(x))
+        turning = np.array([0.0, 0.0, x[R]])
+        return NavigationPoint(time, position, velocity, dcm, turning, self.blocks(x), self.channel, side)
 
 
 def _navigation(x: Array) -> Array:

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from simnav.estimators.models.equations import equation_of
 from simnav.estimators.models.points import PointModel
 from simnav.estimators.models.ship import ShipModel
 from simnav.estimators.models.ship_kernels import move_ships, read_ships
-from simnav.kinds import HEADING
 from simnav.types import Array, Measurement
 
 __all__ = ["ShipPoints"]
@@ -50,9 +50,9 @@ class ShipPoints(ShipModel, PointModel):
         """What the instrument should read at the points, minus what it should read at the state."""
         if measurement.instrument in self.own:
             own = self.own[measurement.instrument]
-            return own.differences_at(measurement.time, self.position, self.x, errors)
+            return own.differences_at(measurement.time, self.position, self.x, errors, measurement.side)
         reading = self.read(measurement, self.states(np.concatenate([np.zeros((1, self.size)), errors])))
         difference = reading[1:] - reading[0]
-        if self.instruments[measurement.instrument].equation == HEADING:
+        if equation_of(self.instruments[measurement.instrument]).is_heading:
             difference = np.arctan2(np.sin(difference), np.cos(difference))
         return np.asarray(difference)

@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from simnav.blocks import StateBlock, blocks_of
+from simnav.estimators.models.channels import instrument_of
 from simnav.types import Array, Datasheet, Instruments
 
 __all__ = ["StateBlocks", "without_shared_blocks"]
@@ -52,7 +53,7 @@ class StateBlocks:
 
     def __init__(self, sheets: Iterable[Datasheet], first: int):
         self._sheets = {sheet.name: sheet for sheet in sheets}
-        self.blocks: Mapping[str, StateBlock] = blocks_of((name, s.blocks) for name, s in self._sheets.items())
+        self.blocks: Mapping[str, StateBlock] = blocks_of((instrument_of(s), s.blocks) for s in self._sheets.values())
         self.at: dict[str, slice] = {}
         self.states: list[tuple[float, float, float]] = []
         self._clocks: list[tuple[int, StateBlock]] = []
@@ -74,12 +75,14 @@ class StateBlocks:
     def places(self, name: str, offset: int) -> dict[str, int]:
         """By name of the block, the index of the first state of each block of an instrument, less an offset."""
         sheet = self._sheets.get(name)
-        return {} if sheet is None else {b.name: self.at[b.label(name)].start - offset for b in sheet.blocks}
+        if sheet is None:
+            return {}
+        return {b.name: self.at[b.label(instrument_of(sheet))].start - offset for b in sheet.blocks}
 
     def of(self, name: str) -> list[slice]:
         """Places of the blocks of an instrument in the error state."""
         sheet = self._sheets.get(name)
-        return [] if sheet is None else [self.at[b.label(name)] for b in sheet.blocks]
+        return [] if sheet is None else [self.at[b.label(instrument_of(sheet))] for b in sheet.blocks]
 
     def carry(self, error: Array, elapsed: float) -> None:
         """Move the biases of clocks by their drifts in an (n,) or (n, k) array of errors, in place."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from itertools import pairwise
 
+from simnav.estimators.models.channels import reading_of
 from simnav.types import KINDS, Instruments, Measurement, Measurements
 
 __all__ = ["LATE", "Admission"]
@@ -16,10 +17,12 @@ LATE = 1e-4
 class Admission:
     """Selects the usable measurements: of known instruments, plausible, not older than the state, each only once.
 
+    The reading of a channel becomes a measurement of an instrument of its own.
+
     Parameters
     ----------
     instruments : Instruments
-        Datasheets of the run's instruments.
+        Datasheets of the run's instruments, channel by channel (`simnav.estimators.models.channels.by_channel`).
     observed : iterable of str
         Names of the instruments that the model uses. Measurements of others are ignored and not counted.
 
@@ -42,6 +45,8 @@ class Admission:
         admitted = []
         end = measurements.time + LATE
         for m in aids:
+            if m.channel:
+                m = reading_of(m)
             used = self._used.get(m.instrument)
             if used is None:
                 continue

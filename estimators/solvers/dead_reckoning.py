@@ -29,6 +29,7 @@ from simnav.estimator import UnsuitableScenario
 from simnav.estimator.needs import IMU, Needs
 from simnav.estimators.composition import Solver
 from simnav.estimators.models.base import triad_bias
+from simnav.estimators.models.equations import equation_of
 from simnav.estimators.models.measurements import radii, wrap
 from simnav.geometry.earth import gravity
 from simnav.geometry.rotation import dcm_from_rotation_vector, dcm_from_rpy, rpy_from_dcm
@@ -115,8 +116,9 @@ class DeadReckoningEstimator(Solver):
         speed = hypot(*self._body[:2].tolist())
         slow = sheet.bias**2 + sheet.bias_instability**2
         ahead = float(slow[0]) + (sheet.scale * speed) ** 2
-        abeam = float(slow[1]) + (sheet.misalignment[2] * speed) ** 2 if sheet.equation == BODY_VELOCITY else 0.0
-        extra = 0.0 if sheet.equation == BODY_VELOCITY else self.current**2
+        equation = equation_of(sheet)
+        abeam = float(slow[1]) + (sheet.misalignment[2] * speed) ** 2 if equation.in_body else 0.0
+        extra = self.current**2 if equation.through_water else 0.0
         P = self._covariance
         P[4:, :], P[:, 4:] = 0.0, 0.0
         P[_AHEAD, _AHEAD], P[_ABEAM, _ABEAM] = ahead + extra, abeam + extra
@@ -184,8 +186,8 @@ class DeadReckoningEstimator(Solver):
                 self._silent = False
                 time = self._carry(time, m.time, begin, dt)
                 turning = np.cross(self._rate, sheet.lever_arm) if self._imu is not None else np.zeros(3)
-                body = m.value if sheet.equation == BODY_VELOCITY else np.array([float(m.value[0]), 0.0, 0.0])
-                self._body = body - (turning if sheet.equation == BODY_VELOCITY else turning * (1.0, 0.0, 0.0))
+                equation = equation_of(sheet)
+                self._body = equation.in_body_axes(m.value) - equation.in_body_axes(turning)
         self._carry(time, measurements.time, begin, dt)
         if self._depth is not None:
             reading = measurements.latest(self._depth.name)
@@ -280,7 +282,7 @@ class DeadReckoningEstimator(Solver):
         estimated = None
         attitude = rpy_from_dcm(c)
         if self._imu is None:
-            dvl = self._source.equation == BODY_VELOCITY
+            dvl = equation_of(self._source).in_body
             estimated = np.array([True, True, self._depth is not None, True, True, dvl, False, False, True])
             attitude[:2] = 0.0
         diagnostics = {"skipped": float(self._skipped), "silent": float(self._silent)}

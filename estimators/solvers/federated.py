@@ -31,7 +31,8 @@ b along by G, and leaves the conditional covariance of b as it is.
 Between two fusions the estimate is the propagated reference: measurements have an effect at the next fusion only. This
 delay is the reason for the loss of the federated filter in the AUV smoothing paper (2022), which fuses at the rate of
 the slowest sensor; the default here is the same. In an outage of a sensor its local filter only predicts, so nothing
-has to be reconfigured. All measurements are linearised about the shared reference.
+has to be reconfigured. All measurements are linearised about the shared reference. The channels of
+an instrument are in one local filter.
 
 Source: N. A. Carlson, *Federated square root filter for decentralized parallel processes*, IEEE Trans. Aerospace and
 Electronic Systems 26(3), 1990; *Post-processing algorithm based on factor graph optimization for AUV integrated
@@ -50,6 +51,7 @@ from simnav.estimator import UnsuitableScenario
 from simnav.estimators.adaptations.base import Adaptation
 from simnav.estimators.algebra.joseph import joseph_update
 from simnav.estimators.models.base import Observation
+from simnav.estimators.models.channels import by_channel, instrument_of
 from simnav.estimators.models.inertial import InertialModel
 from simnav.estimators.models.nine_state import NineStateModel
 from simnav.estimators.models.propagation import propagate_covariance
@@ -134,16 +136,19 @@ class FederatedEstimator(KalmanEstimator):
 
     def reset(self, start: InitialState, instruments: Instruments) -> None:
         """Begin a run."""
-        super().reset(start, without_shared_blocks(instruments))
-        names = self._names
+        instruments = by_channel(without_shared_blocks(instruments))
+        super().reset(start, instruments)
+        self._of = {name: instrument_of(instruments[name]) for name in self._names}
+        names = list(dict.fromkeys(self._of.values()))
         shares = self.shares or tuple((1.0 - self.master_share) / len(names) for _ in names)
         if len(shares) != len(names):
             raise UnsuitableScenario(f"{len(shares)} shares do not fit {len(names)} aiding sensors: {', '.join(names)}")
         model = self.model
         self._common = c = len(model.transition)
-        starts = {name: [at[name] for at in (model.bias_at, model.scale_at) if name in at] for name in names}
-        for name in names:
-            starts[name] += [at.start for at in model.blocks.of(name)]
+        starts: dict[str, list[int]] = {name: [] for name in names}
+        for source, name in self._of.items():
+            starts[name] += [at[source] for at in (model.bias_at, model.scale_at) if source in at]
+            starts[name] += [at.start for at in model.blocks.of(source) if at.start not in starts[name]]
         stops = sorted([*(at for each in starts.values() for at in each), model.size])
         self._locals: dict[str, _Local] = {}
         for name, share in zip(names, shares):
@@ -152,7 +157,7 @@ class FederatedEstimator(KalmanEstimator):
         if self.master_share:
             self._locals[""] = self._local(self.master_share, np.array([], dtype=np.intp))
         period = self.fusion_period
-        self._period = max(1.0 / instruments[n].rate for n in names) if period is None else period
+        self._period = max(1.0 / instruments[n].rate for n in self._names) if period is None else period
         self._next = start.time + self._period
         self._still = np.zeros(model.size - c)
 
@@ -196,14 +201,14 @@ class FederatedEstimator(KalmanEstimator):
         linearised = self.model.measure(m)
         if linearised is None:
             return None
-        local = self._locals[m.instrument]
+        local = self._locals[self._of[m.instrument]]
         residual, jacobian, noise = linearised
         cross = np.dot(local.covariance, jacobian.T)
         return residual - jacobian @ local.error, cross, np.dot(jacobian, cross), noise
 
     def _take(self, m: Measurement, diagnostics: dict[str, float | Array], flagged: list[tuple[str, float]]) -> None:
         """Correct the measurement's local filter."""
-        master, self._correcting = self.covariance, self._locals[m.instrument]
+        master, self._correcting = self.covariance, self._locals[self._of[m.instrument]]
         self.covariance = self._correcting.covariance
         try:
             super()._take(m, diagnostics, flagged)

@@ -16,6 +16,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from simnav.estimator import Estimator, UnsuitableScenario, lacking
+from simnav.estimators.models.channels import by_channel, instrument_of
 from simnav.estimators.solvers.admission import Admission
 from simnav.geometry.earth import displace, relative_position
 from simnav.types import (
@@ -71,6 +72,14 @@ class FilterpyEstimator(Estimator):
         self.origin = np.array(start.position, dtype=np.float64)
         used = {*self.uses, *(k for n in self.needs for k in ((n,) if isinstance(n, str) else n))}
         self.sheets = {s.name: s for s in instruments.values() if s.kind in used or s.equation in self.uses}
+        for sheet in self.sheets.values():
+            if sheet.channels and KINDS[sheet.kind].side:
+                raise UnsuitableScenario(
+                    f"{self.name} cannot use the channels of {sheet.name!r}: a filter of filterpy receives no side "
+                    "information of a reading"
+                )
+        instruments = by_channel(instruments)
+        self.sheets = {s.name: s for s in instruments.values() if instrument_of(s) in self.sheets}
         self.kf = self.build(start, instruments)
         self._time = start.time
         self._admission = Admission(instruments, self.sheets)

@@ -22,14 +22,14 @@ from typing import Any, ClassVar
 import numpy as np
 
 from simnav.estimators.composition import Solver
+from simnav.estimators.models.equations import equation_of_kind
 from simnav.estimators.models.measurements import radii, wrap
 from simnav.estimators.models.ship import OBSERVED, E, N
 from simnav.estimators.models.ship_points import ShipPoints
 from simnav.estimators.solvers.filterpy_adapter import FilterpyEstimator
 from simnav.estimators.solvers.sigma_point import draw_points
 from simnav.geometry.earth import displace
-from simnav.kinds import HEADING
-from simnav.types import KINDS, Array, Datasheet, Estimate, InitialState, Instruments, Measurement
+from simnav.types import Array, Datasheet, Estimate, InitialState, Instruments, Measurement
 
 __all__ = ["FilterpyUnscentedEstimator"]
 
@@ -125,7 +125,7 @@ class FilterpyUnscentedEstimator(Solver, FilterpyEstimator):
         return np.asarray(self.model.read(self._measurement, x[None, :])[0])
 
     def _difference(self, a: Array, b: Array) -> Array:
-        if KINDS[self._measurement.kind].equation == HEADING:
+        if equation_of_kind(self._measurement.kind).is_heading:
             return np.array([wrap(float(a[0] - b[0]))])
         return a - b
 

@@ -31,6 +31,7 @@ import numpy as np
 
 from simnav.estimator.needs import AID, IMU, Needs
 from simnav.estimators.composition import Solver
+from simnav.estimators.models.channels import by_channel
 from simnav.estimators.models.inertial import InertialModel
 from simnav.estimators.solvers.admission import LATE, Admission
 from simnav.estimators.solvers.gtsam_graph import InertialGraph, Observation
@@ -89,6 +90,7 @@ class GtsamEstimator(Solver):
 
     def reset(self, start: InitialState, instruments: Instruments) -> None:
         """Begin a run; needs an IMU and at least one aiding instrument."""
+        instruments = by_channel(instruments)
         InertialModel().choose(instruments, self.label)
         prior, values = self.graph.begin(start, instruments)
         observed = [name for name, sheet in instruments.items() if sheet.equation and self.graph.model.observes(sheet)]

@@ -12,6 +12,7 @@ from simnav.compiled import kernel
 from simnav.estimators.adaptations.base import Innovation
 from simnav.estimators.adaptations.prediction import PredictionTest
 from simnav.estimators.algebra.cholesky import factorise, invert_factor
+from simnav.estimators.models.channels import by_channel, summary
 from simnav.estimators.models.suitable import ModelChoice
 from simnav.estimators.solvers.kalman import KalmanEstimator
 from simnav.estimators.solvers.smoother import Smoother
@@ -196,6 +197,7 @@ class ImmEstimator(KalmanEstimator):
 
     def reset(self, start: InitialState, instruments: Instruments) -> None:
         """Begin a run."""
+        instruments = by_channel(instruments)
         super().reset(start, instruments)
         self._prediction = PredictionTest(instruments)
         # The chain's stationary distribution
@@ -211,7 +213,7 @@ class ImmEstimator(KalmanEstimator):
     def update(self, measurements: Measurements) -> Estimate:
         """Take one step's measurements."""
         estimate = super().update(measurements)
-        estimate.diagnostics = {**estimate.diagnostics, **self._report}
+        estimate.diagnostics = {**estimate.diagnostics, **self._report, **summary(self._report, self._owners)}
         return estimate
 
     def _take(self, m: Measurement, diagnostics: dict[str, float | Array], flagged: list[tuple[str, float]]) -> None:

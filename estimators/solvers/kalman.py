@@ -6,6 +6,9 @@ updated in Joseph's form (`simnav.estimators.algebra.joseph`).
 The filter tests its innovations. If they stay improbably large, the diagnostic ``inconsistent`` is 1
 (`simnav.estimators.solvers.innovation_consistency`).
 
+An instrument with channels is used channel by channel (`simnav.estimators.models.channels`). Its diagnostics are the
+means over its channels; each channel has its own, too, as ``nis.INSTRUMENT:CHANNEL``.
+
 The diagnostic ``skipped`` is the number of measurements that could not be used: not finite or implausible, older than
 the state, repeated, or with a singular innovation covariance.
 
@@ -23,6 +26,7 @@ import numpy as np
 from simnav.estimators.adaptations.base import Adaptation, Innovation
 from simnav.estimators.composition import Solver
 from simnav.estimators.models.base import ErrorModel, Linearised, Observation
+from simnav.estimators.models.channels import by_channel, owners, summary
 from simnav.estimators.models.suitable import ModelChoice
 from simnav.estimators.solvers.admission import Admission
 from simnav.estimators.solvers.innovation_consistency import InnovationTest
@@ -86,6 +90,7 @@ class KalmanEstimator(Solver):
 
     def reset(self, start: InitialState, instruments: Instruments) -> None:
         """Begin a run; UnsuitableScenario if the model lacks an instrument."""
+        instruments = by_channel(instruments)
         self.model = self._chosen(instruments)
         self.covariance = self.model.begin(start, instruments)
         self._first_variances = self.covariance.diagonal().copy()
@@ -95,6 +100,7 @@ class KalmanEstimator(Solver):
         self._admission = Admission(instruments, self._names)
         self._innovation_test = InnovationTest()
         self._correction = np.empty(self.model.size)
+        self._owners = owners(instruments)
         self._keys = {name: (f"innovation.{name}", f"nis.{name}") for name in self._names}
         self._blank = dict.fromkeys((label for pair in self._keys.values() for label in pair), np.nan)
         self._plain = self.assimilates and self.adaptation is None and not self._stepwise
@@ -123,6 +129,8 @@ class KalmanEstimator(Solver):
         diagnostics["inconsistent"] = float(self._innovation_test.inconsistent)
         if self.adaptation is not None:
             diagnostics.update(self.adaptation.diagnostics())
+        if self._owners:
+            diagnostics.update(summary(diagnostics, self._owners))
         estimate = self._estimate()
         estimate.diagnostics, estimate.flagged = diagnostics, flagged
         if self.smoother is not None:

@@ -2,7 +2,8 @@
 
 The main filter uses all instruments, sub-filter i all except instrument i. If instrument i is wrong, sub-filter i is
 right and the main filter is wrong. Then their estimates differ by more than the test of
-`simnav.estimators.solvers.separation` allows.
+`simnav.estimators.solvers.separation` allows. Each channel of an instrument counts as an instrument here: a spoofed
+satellite is excluded by itself.
 
 **Exclusion.** If a test fails, one instrument is excluded. The suspects are the instruments with a large separation,
 and those whose innovations in the main filter have been improbable for longer than a gross error lasts. The choice is
@@ -86,12 +87,14 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Collection, Iterable, Mapping
+from dataclasses import replace
 from math import exp, hypot, sqrt
 from typing import ClassVar
 
 import numpy as np
 
 from simnav.estimators.composition import Solver
+from simnav.estimators.models.channels import by_channel, owners, reading_of, summary
 from simnav.estimators.models.roles import fixes_and_logs
 from simnav.estimators.models.suitable import ModelChoice
 from simnav.estimators.solvers.exclusion_rules import COASTING, ExclusionRules, RulesWithoutImu
@@ -205,10 +208,11 @@ class SolutionSeparation(Solver):
         """Begin a run; UnsuitableScenario if the model lacks an instrument."""
         from scipy.stats import norm
 
+        instruments = by_channel(instruments)
         self._begin_with = start, instruments
         self._inertial = instruments.imu is not None
         self._horizon = self.horizon if self._inertial else self.horizon_without_imu
-        self._exclusion = Exclusion()
+        self._exclusion, self._owners = Exclusion(), owners(instruments)
         self._main = self._filter(self._exclusion)
         self._names = [name for name, sheet in instruments.items() if self._main.model.observes(sheet)]
         self._components = {name: len(KINDS[instruments[name].kind].errors) for name in self._names}
@@ -263,6 +267,8 @@ class SolutionSeparation(Solver):
 
     def update(self, measurements: Measurements) -> Estimate:
         """Take one step's measurements, each at its own time."""
+        if self._owners:
+            measurements = replace(measurements, aids=[reading_of(m) for m in measurements.aids])
         out, gross = self._exclusion.excluded, self._exclusion.gross
         gross.clear()
         self._exclusion.linear = self._disturbed or measurements.time >= self._settled
@@ -317,6 +323,8 @@ class SolutionSeparation(Solver):
         for name in (_START, _IMU):
             diagnostics[f"separation.{name}"] = ratios.get(name, np.nan)
         diagnostics[f"excluded.{_IMU}"] = float(self._disturbed)
+        if self._owners:
+            diagnostics.update(summary(diagnostics, self._owners))
         estimate.diagnostics, estimate.flagged = diagnostics, flagged
         return estimate
 

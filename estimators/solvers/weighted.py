@@ -25,6 +25,7 @@ import numpy as np
 
 from simnav.estimators.algebra.joseph import joseph_update
 from simnav.estimators.algebra.whitening import whitening
+from simnav.estimators.models.channels import by_channel
 from simnav.estimators.models.suitable import ModelChoice
 from simnav.estimators.solvers.kalman import KalmanEstimator
 from simnav.estimators.weightings.base import Factors, Weighting
@@ -70,6 +71,7 @@ class WeightedKalmanEstimator(KalmanEstimator):
 
     def reset(self, start: InitialState, instruments: Instruments) -> None:
         """Begin a run; UnsuitableScenario if the model lacks an instrument."""
+        instruments = by_channel(instruments)
         super().reset(start, instruments)
         self.weighting.reset(instruments)
         self._index = {name: k for k, name in enumerate(instruments)}

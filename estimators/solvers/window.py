@@ -27,6 +27,9 @@ If the cost of a window is improbable (`simnav.estimators.solvers.cost_consisten
 The weight of a measurement has two parts: an `Adaptation` chooses its noise when it arrives, from the innovation, as in
 a filter; a `Weighting` receives all factors of the window at every iteration.
 
+The readings of each channel of an instrument are factors with a residual, a weight and a flag of their own
+(`simnav.estimators.models.channels`). The diagnostics of the instrument are the means over its channels.
+
 Sources: Guo et al. (2026), section 3 (window, Gauss-Newton, convergence at 1e-6 or after 10 iterations); Mao, Wang and
 Fu (2025), section 2;
 for the test of convergence by contraction (ratio of the step after a new linearisation to the steps before it; an
@@ -52,6 +55,7 @@ from simnav.estimators.algebra.block_tridiagonal import after_step, half_squares
 from simnav.estimators.composition import Solver
 from simnav.estimators.models.base import ErrorModel
 from simnav.estimators.models.chains import Chain, chain_of
+from simnav.estimators.models.channels import by_channel, owners, summary
 from simnav.estimators.models.suitable import ModelChoice
 from simnav.estimators.solvers.admission import Admission
 from simnav.estimators.solvers.cost_consistency import CostTest
@@ -157,10 +161,11 @@ class WindowEstimator(Solver):
 
     def reset(self, start: InitialState, instruments: Instruments) -> None:
         """Begin a run; UnsuitableScenario if the model lacks an instrument."""
+        instruments = by_channel(instruments)
         self.chain = chain_of(self._choice.choose(instruments, self.label))
         self.covariance = self.chain.begin(start, instruments)
         observed = [name for name, sheet in instruments.items() if self.chain.observes(sheet)]
-        self._admission = Admission(instruments, observed)
+        self._admission, self._owners = Admission(instruments, observed), owners(instruments)
         for what in (self.adaptation, self.weighting, self.isolation):
             if what is not None:
                 what.reset(instruments)
@@ -197,6 +202,8 @@ class WindowEstimator(Solver):
         for what in (self.adaptation, self.weighting):
             if what is not None:
                 diagnostics.update(what.diagnostics())
+        if self._owners:
+            diagnostics.update(summary(diagnostics, self._owners))
         estimate = chain.estimate(chain.predicted_covariance(self.covariance))
         diagnostics["inconsistent"] = float(self._cost_test.inconsistent)
         if self._cost_test.inconsistent and estimate.covariance is not None:

@@ -28,9 +28,9 @@ from simnav.estimators.adaptations.anfis import Features
 from simnav.estimators.adaptations.anfis_file import FEATURES, Parameters
 from simnav.estimators.adaptations.base import Adaptation, Innovation
 from simnav.estimators.adaptations.sugeno import Sugeno
+from simnav.estimators.models.equations import equation_of_kind
 from simnav.estimators.training.hybrid_learning import Learned, learn, rmse
-from simnav.kinds import POSITION
-from simnav.types import KINDS, Array, Instruments
+from simnav.types import Array, Instruments
 
 if TYPE_CHECKING:
     from simnav.recording import AidStream, Recording
@@ -180,7 +180,7 @@ class _Teacher(Adaptation):
     def adapt(self, innovation: Innovation) -> Array:
         rows = {name: f.observe(innovation) for name, f in self._features.items()}
         m = innovation.measurement
-        if KINDS[m.kind].equation != POSITION:
+        if not equation_of_kind(m.kind).has_height:
             return innovation.noise
         factor = self._factors[m.time]
         if m.time > SETTLED:

@@ -20,9 +20,9 @@ class Factors:
     Attributes
     ----------
     names : tuple of str
-        Names of the instruments.
+        Names of the instruments; for one with channels, the source of each channel, ``INSTRUMENT:CHANNEL``.
     instrument : (M,) array of int
-        Instrument of each measurement, as an index into ``names``.
+        Instrument or channel of each measurement, as an index into ``names``.
     components : (M,) array of int
         Number of components of each measurement, 1 to 3.
     time : (M,) array

@@ -6,7 +6,8 @@ For each type of factor (an instrument, or motion) over the window (eqs. 19-21),
 
 with the residual r, its scale s and the constants epsilon, a, c and w_min. The information is multiplied by w (eq. 24;
 eqs. 22 and 23 contradict it). The window consists of all epochs with a measurement (eqs. 18 and 25 differ). The paper
-names three types; here, instruments other than GNSS have the constants of its DVL.
+names three types; here, instruments other than GNSS have the constants of its DVL. The channels of an instrument are of
+one type.
 
 Deviations from the print, unless the preset is ``"paper"``:
 
@@ -36,6 +37,7 @@ from typing import Literal
 import numpy as np
 
 from simnav.compiled import kernel
+from simnav.estimators.models.channels import instrument_of, owners
 from simnav.estimators.weightings.base import Factors, Weighting
 from simnav.kinds import POSITION, VELOCITY
 from simnav.types import Array, Instruments, Integers
@@ -139,8 +141,10 @@ class GradientAdaptive(Weighting):
 
     def reset(self, instruments: Instruments) -> None:
         """Begin a run."""
-        self._receivers = {sheet.name for sheet in instruments.of_equation(POSITION, VELOCITY)}
+        self._owners = owners(instruments)
+        self._receivers = {instrument_of(sheet) for sheet in instruments.of_equation(POSITION, VELOCITY)}
         self._names: tuple[str, ...] = ()
+        self._types: list[str] = []
         self._scales = np.ones(1)
         paper = self.preset == "paper"
         self._kappa = np.full(4, 1.4826) if paper else 1.0 / _CHI_MEDIAN
@@ -151,7 +155,10 @@ class GradientAdaptive(Weighting):
         """Set the weights of the measurements and of motion."""
         if factors.names != self._names:
             self._names = factors.names
-            shapes = [self._gnss if n in self._receivers else self._other for n in factors.names]
+            types = [self._owners.get(name, name) for name in factors.names]
+            self._types = list(dict.fromkeys(types))
+            self._type = np.array([self._types.index(name) for name in types], dtype=np.int64)
+            shapes = [self._gnss if n in self._receivers else self._other for n in self._types]
             self._shapes = np.array([*shapes, self._motion], dtype=np.float64)
             self._scales = np.ones(len(self._shapes))
         if self.preset == "paper":
@@ -160,16 +167,16 @@ class GradientAdaptive(Weighting):
             norm, motion = factors.norm, factors.motion_norm * (3.0 / factors.motion_residual.shape[1]) ** 0.5
         constants, scales, zero = self._shapes, self._scales, np.zeros(len(motion), np.int64)
         settings = self.epsilon, self._floor, self._least
+        of_type = self._type[factors.instrument] if self._owners else factors.instrument
         _adapt(
-            norm, self._kappa, factors.components, factors.instrument, constants[:-1], settings, scales[:-1],
-            factors.weight,
+            norm, self._kappa, factors.components, of_type, constants[:-1], settings, scales[:-1], factors.weight,
         )  # fmt: skip
         _adapt(motion, self._kappa_motion, zero, zero, constants[-1:], settings, scales[-1:], factors.motion_weight)
         return True
 
     def diagnostics(self) -> dict[str, float | Array]:
         """``scale.<instrument>`` and ``scale.motion``: s, in sigma or as the preset has it."""
-        return {f"scale.{name}": s for name, s in zip((*self._names, "motion"), self._scales.tolist())}
+        return {f"scale.{name}": s for name, s in zip((*self._types, "motion"), self._scales.tolist())}
 
 
 def _rows(matrix: Array) -> Array:

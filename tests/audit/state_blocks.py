@@ -11,7 +11,7 @@ from pathlib import Path
 from simnav.scoring import nees_band
 from simnav.source import record
 from tests.cases.block_consistency import DURATION, LEVEL, ROWS, WITHIN, consistency
-from tests.cases.fjord import CASES, fjord
+from tests.cases.fjord import CASES, CHANNEL_CASES, fjord
 
 __all__ = ["rows"]
 
@@ -23,7 +23,7 @@ _PLUGINS = Path(__file__).parents[1] / "simnav" / "plugins"
 def rows() -> Iterator[tuple[str, str, str, bool]]:
     """What is measured, its figure, what is promised, and whether that is kept."""
     (low, high), (least, most) = (nees_band(degrees, RUNS, LEVEL) for degrees in (3, 1))
-    for case in CASES:
+    for case in (*CASES, *CHANNEL_CASES):
         scenario = fjord(_PLUGINS, case, duration=DURATION)
         recordings = [record(scenario, seed) for seed in range(RUNS)]
         found = {row: consistency(row, scenario, recordings) for row in ROWS}

@@ -1,7 +1,8 @@
 """States that instruments of a third party bring along: in models, points, chains, and in every solver.
 
 Each case is one file of `tests/simnav/plugins`: a magnetometer with six states of iron, fixes with a late time stamp,
-the beams of a DVL that share a scale, and ranges by a clock with a drift.
+the beams of a DVL that share a scale, and ranges by a clock with a drift. The last two are there again as instruments
+with channels (`tests/estimators/test_channels.py`): what all solvers do with blocks is the same for them.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ from simnav.trial import Trial, run_trial
 from simnav.types import Instruments, Measurement
 from tests.cases.block_consistency import DURATION, ROWS, WITHIN, block_errors, consistency
 from tests.cases.derivatives import along, innovation
-from tests.cases.fjord import CASES, fjord, true_blocks
+from tests.cases.fjord import CASES, CHANNEL_CASES, fjord, true_blocks
 
 #: Runs of the solvers, of the smoothers and of a ship; `tests/audit/state_blocks.py` takes more.
 RUNS, SMOOTHED_RUNS, SHIP_RUNS = 5, 3, 6
@@ -39,6 +40,11 @@ OF_CASE = {"iron": ("magnetometer", 6), "delay": ("fix", 1), "beams": ("beam_2",
 
 @pytest.fixture(params=CASES)
 def case(request) -> str:
+    return request.param
+
+
+@pytest.fixture(params=[*CASES, *CHANNEL_CASES])
+def any_case(request) -> str:
     return request.param
 
 
@@ -159,8 +165,8 @@ def unaware(recording: Recording) -> Recording:
     return replace(recording, instruments=Instruments(sheets, given.imu, given.step))
 
 
-def test_all_solvers_are_consistent_and_filter_and_window_agree(plugins, runs, case):
-    scenario, made = fjord(plugins, case, duration=DURATION), recordings(runs, plugins, case)
+def test_all_solvers_are_consistent_and_filter_and_window_agree(plugins, runs, any_case):
+    scenario, made = fjord(plugins, any_case, duration=DURATION), recordings(runs, plugins, any_case)
     found = {row: consistency(row, scenario, made) for row in ROWS}
     for row, figures in found.items():
         assert figures.motion_kept, (row, figures)
@@ -170,14 +176,14 @@ def test_all_solvers_are_consistent_and_filter_and_window_agree(plugins, runs, c
 
 
 @pytest.mark.parametrize("row", ["ekf", "oracle"])
-def test_a_row_that_is_not_told_of_the_states_is_not_consistent(plugins, runs, row, case):
+def test_a_row_that_is_not_told_of_the_states_is_not_consistent(plugins, runs, row, any_case):
     """So few runs are enough to see it."""
-    scenario, made = fjord(plugins, case, duration=DURATION), recordings(runs, plugins, case)
+    scenario, made = fjord(plugins, any_case, duration=DURATION), recordings(runs, plugins, any_case)
     assert not consistency(row, scenario, [unaware(recording) for recording in made], blocks=False).motion_kept
 
 
-def test_the_smoother_and_the_full_graph_carry_them(plugins, runs, case):
-    made = recordings(runs, plugins, case)[:SMOOTHED_RUNS]
+def test_the_smoother_and_the_full_graph_carry_them(plugins, runs, any_case):
+    made = recordings(runs, plugins, any_case)[:SMOOTHED_RUNS]
     rmse = {}
     for row in ("ekf", "ekf-rts", "ekf-two-filter", "fgo-full", "oracle-rts"):
         trials = [run_trial(make(row), recording) for recording in made]
@@ -196,8 +202,8 @@ def replace_smoothed(trial: Trial) -> Trial:
     return replace(trial, position=s.position, velocity=s.velocity, attitude=s.attitude)
 
 
-def test_the_bound_has_them(plugins, case):
-    scenario = fjord(plugins, case, duration=DURATION)
+def test_the_bound_has_them(plugins, any_case):
+    scenario = fjord(plugins, any_case, duration=DURATION)
     perfect = ideal(scenario, 3)
     covariance = bound_of_run(perfect)
     sigma = np.sqrt(covariance[:, range(2), range(2)].sum(axis=1))
@@ -212,9 +218,9 @@ def test_the_bound_has_them(plugins, case):
 
 
 @pytest.mark.parametrize("row", ["ekf-9", "federated", "imm", "heading-bank", "gtsam-isam2", "student-t-rts"])
-def test_other_rows_run_and_stay_honest(plugins, runs, row, case):
+def test_other_rows_run_and_stay_honest(plugins, runs, row, any_case):
     """A model without calibration states counts them as noise, local filters have each their own."""
-    for recording in recordings(runs, plugins, case)[:2]:
+    for recording in recordings(runs, plugins, any_case)[:2]:
         trial = run_trial(make(row), recording)
         assert trial.status == "ok", trial.reason
         e, P = errors(trial, recording), trial.covariance
@@ -222,7 +228,7 @@ def test_other_rows_run_and_stay_honest(plugins, runs, row, case):
         assert e[k, :2] @ np.linalg.solve(P[k, :2, :2], e[k, :2]) < 25.0
 
 
-@pytest.mark.parametrize("case", ["beams", "clock"])
+@pytest.mark.parametrize("case", ["beams", "clock", *CHANNEL_CASES])
 def test_every_estimator_meets_them_and_runs_or_says_what_it_needs(plugins, case):
     recording = record(fjord(plugins, case, duration=6.0), 1)
     trials = [run_trial(make(name), recording) for name in names() if not find(name).slow]
@@ -233,8 +239,8 @@ def test_every_estimator_meets_them_and_runs_or_says_what_it_needs(plugins, case
 # --- reports, environment, contract
 
 
-def test_an_agent_in_the_environment_gives_the_numbers_of_the_trial(plugins, case):
-    scenario = fjord(plugins, case, duration=10.0)
+def test_an_agent_in_the_environment_gives_the_numbers_of_the_trial(plugins, any_case):
+    scenario = fjord(plugins, any_case, duration=10.0)
     trial = run_trial(make("ekf"), record(scenario, 5))
     agent, env = EstimatorAgent(make("ekf")), NavigationEnv(scenario)
     observation, info = env.reset(seed=5)

@@ -1,0 +1,121 @@
+"""Instruments with channels, taken apart: a solver uses each channel as an instrument of its own.
+
+A receiver of satellites or a DVL of four beams gives several independent readings at one time, one for each channel
+(`simnav.kinds.Datasheet.channels`). Every solver takes them one by one. Its instruments are then the sources of
+readings (`simnav.types.Measurement.source`): ``dvl:1``, ``dvl:2`` and so on, each with the datasheet of the instrument,
+so each has its own test, weight, flag, noise and biases. The blocks of states that the instrument brings along
+(`simnav.blocks`) belong to the instrument: all its channels depend on the same ones.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from math import isnan
+
+from simnav.recording import AidStream
+from simnav.types import Array, Datasheet, Instruments, Measurement
+
+__all__ = ["ChannelDatasheet", "by_channel", "instrument_of", "of_channels", "owners", "reading_of", "summary", "whole"]
+
+
+@dataclass(frozen=True, eq=False)
+class ChannelDatasheet(Datasheet):
+    """The datasheet of one channel; its name is the source of the readings, ``INSTRUMENT:CHANNEL``.
+
+    Attributes
+    ----------
+    instrument : str
+        Name of the instrument.
+    channel : str
+        Which of its channels it is.
+    siblings : tuple of str
+        All its channels.
+    """
+
+    instrument: str = ""
+    channel: str = ""
+    siblings: tuple[str, ...] = ()
+
+
+_FIELDS = tuple(field.name for field in fields(Datasheet))
+
+
+def by_channel(instruments: Instruments) -> Instruments:
+    """The instruments, with each channel as an instrument of its own; unchanged if none has channels."""
+    if not any(sheet.channels for sheet in instruments.values()):
+        return instruments
+    sheets = [one for sheet in instruments.values() for one in _apart(sheet)]
+    return Instruments(sheets, instruments.imu, instruments.step)
+
+
+def _apart(sheet: Datasheet) -> list[Datasheet]:
+    if not sheet.channels:
+        return [sheet]
+    given = {name: getattr(sheet, name) for name in _FIELDS if name not in ("name", "channels")}
+    return [
+        ChannelDatasheet(
+            f"{sheet.name}:{channel}", instrument=sheet.name, channel=channel, siblings=sheet.channels, **given
+        )
+        for channel in sheet.channels
+    ]
+
+
+def reading_of(measurement: Measurement) -> Measurement:
+    """The measurement of a channel as one of an instrument of its own; its side information stays with it."""
+    return Measurement(measurement.time, measurement.source, measurement.kind, measurement.value, side=measurement.side)
+
+
+def of_channels(stream: AidStream) -> list[AidStream]:
+    """The recorded readings of each channel of an instrument, named after their source; itself without channels."""
+    if not stream.channels:
+        return [stream]
+    found = []
+    for c, channel in enumerate(stream.channels):
+        rows = stream.channel == c
+        part = AidStream(
+            f"{stream.name}:{channel}", stream.kind, stream.time[rows], stream.value[rows], stream.faults[rows],
+            stream.fault_error[rows], stream.sigma[rows], stream.dropped[stream.dropped_channel == c],
+        )  # fmt: skip
+        found.append(part)
+    return found
+
+
+def instrument_of(sheet: Datasheet) -> str:
+    """The name of the instrument that a datasheet belongs to."""
+    return sheet.instrument if isinstance(sheet, ChannelDatasheet) else sheet.name
+
+
+def whole(sheet: Datasheet) -> Datasheet:
+    """The datasheet of the instrument that a channel belongs to, as the kind's functions receive it."""
+    if not isinstance(sheet, ChannelDatasheet):
+        return sheet
+    given = {name: getattr(sheet, name) for name in _FIELDS if name not in ("name", "channels")}
+    return Datasheet(sheet.instrument, channels=sheet.siblings, **given)
+
+
+def owners(instruments: Instruments) -> dict[str, str]:
+    """The instrument of each source that is a channel; empty if there are no channels."""
+    return {s.name: s.instrument for s in by_channel(instruments).values() if isinstance(s, ChannelDatasheet)}
+
+
+def summary(diagnostics: Mapping[str, float | Array], owner: Mapping[str, str]) -> dict[str, float | Array]:
+    """The diagnostics of channels, ``QUANTITY.INSTRUMENT:CHANNEL``, as one of their instrument: the mean over them.
+
+    Channels that say nothing (NaN) do not count. The result holds no other diagnostics.
+
+    Parameters
+    ----------
+    diagnostics : mapping of str to float or array
+        All diagnostics of a step.
+    owner : mapping of str to str
+        The result of `owners`.
+    """
+    found: dict[str, list[float]] = {}
+    for label, value in diagnostics.items():
+        quantity, _, source = label.partition(".")
+        if source in owner and isinstance(value, (int, float)):
+            known = found.setdefault(f"{quantity}.{owner[source]}", [])
+            if not isnan(value):
+                known.append(float(value))
+    return {label: sum(known) / len(known) if known else float("nan") for label, known in found.items()}
