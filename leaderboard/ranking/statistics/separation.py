@@ -17,7 +17,8 @@ separates such equal rows far too often.
   Statistical Association 2005).
 - **One more unlucky run.** No test of a few runs can see a rare bad run that has not happened yet. But the other rows
   of the board show how far out such a run is. So a difference has to hold also if the better row has one more run that
-  is as unlucky, for its scatter, as one in four times as many runs of all rows (`unlucky_excess`).
+  is as unlucky, for its scatter, as one in four times as many runs of all rows (`unlucky_excess`). A row that scatters
+  less than three quarters of the rows is taken to scatter as these do: its bad run may not have happened yet.
 - **Relevance.** A difference of less than `RELEVANT` is none, so that rounding does not rank rows.
 - **Rank intervals** follow from the pairs: a row's best possible rank is 1 plus the number of rows that are separated
   from it and better (Mogstad, Romano, Shaikh and Wilhelm, *Inference for ranks with applications to mobility across
@@ -51,6 +52,9 @@ DRAWS = 2000
 RELEVANT = 0.001
 
 _UNLUCKY = 0.25  # how many runs of a row, in all its runs, are as bad as the one that is added
+#: The scatter that a row has at least, as a quantile of that of all rows. A test of all pairs finds the luckiest row,
+#: whose scatter says least, so that its rows are taken for rather scattered ones; for one row alone it is the median.
+_OF_ONE, _OF_ALL = 0.5, 0.75
 _TINY = 1e-12  # of the largest difference: what is smaller is rounding
 _LEAST_VARIANCE = 0.01  # of a draw, as a share of the variance of the sample
 _FEWEST_VISIBLE = 2.0  # clusters that the scatter of a pair has to come from, to count for the others
@@ -181,11 +185,11 @@ def unlucky_excess(
     x: Array = np.asarray(values, dtype=np.float64)
     stratum = codes([0] * len(x) if strata is None else strata)
     cluster = codes(range(len(x)) if clusters is None else clusters)
-    return _excess(_shares(x, stratum, cluster))
+    return _excess(_shares(x, stratum, cluster), _OF_ONE)
 
 
-def _excess(shares: Array) -> Array:
-    """`unlucky_excess`, given the figures of the clusters (K, n)."""
+def _excess(shares: Array, quantile: float) -> Array:
+    """`unlucky_excess`, given the figures of the clusters (K, n), and the quantile of the least scatter."""
     count, rows = shares.shape
     if count < 2 or not rows:
         return np.zeros(rows)
@@ -194,7 +198,7 @@ def _excess(shares: Array) -> Array:
     scatter = np.sqrt(np.sum(excess**2, axis=0) / (count - 1))
     reached = min(max(round(_UNLUCKY * rows), 1), shares.size - 1)
     far = np.sort(excess / np.maximum(scatter, 1e-300), axis=None)[-reached]
-    return np.asarray(max(float(far), 0.0) * np.maximum(scatter, np.sqrt(np.median(scatter**2))))
+    return np.asarray(max(float(far), 0.0) * np.maximum(scatter, np.sqrt(np.quantile(scatter**2, quantile))))
 
 
 def _statistics(
@@ -219,7 +223,7 @@ def _statistics(
         if len(shares) < FEWEST:
             continue
         i, j = np.searchsorted(rows, first[here]), np.searchsorted(rows, second[here])
-        excess = _excess(shares)
+        excess = _excess(shares, _OF_ALL)
         observed[here], sizes[here] = _studentised(shares[:, i] - shares[:, j], excess[i], excess[j])
     return observed, sizes
 
