@@ -151,7 +151,7 @@ def single_runs(values: Iterable[float]) -> Interval:
     --------
     >>> found = single_runs([0.9, 1.0, 1.1])
     >>> round(found.value, 3), round(found.low, 2), round(found.high, 2)
-    (1.0, 0.6, 1.63)
+    (1.0, 0.61, 1.64)
     """
     x = np.array([v for v in values if math.isfinite(v)])
     n = len(x)

@@ -40,8 +40,8 @@ def contents(paper: Paper) -> list[Item]:
 
     Examples
     --------
-    >>> from simnav.leaderboard.papers.paper import load
-    >>> [i.number for i in contents(load("mao-2025"))][:3]
+    >>> from simnav.leaderboard.papers.paper import paper_of
+    >>> [i.number for i in contents(paper_of("mao-2025"))][:3]
     ['Table 1', 'Table 2', 'Table 3']
     """
     items: dict[str, Item] = {}

@@ -99,7 +99,7 @@ def read_profile(profile: str | os.PathLike[str]) -> Profile:
 
     Examples
     --------
-    >>> load("smoke").parts[0].runs
+    >>> read_profile("smoke").parts[0].runs
     2
     """
     path = Path(profile)

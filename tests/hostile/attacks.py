@@ -254,7 +254,9 @@ def vandals(folder: Path, confinement: str = "auto", workers: int = 2, seeds: in
         requests.append(EstimatorRequest(str(path), label=name))
     ours = [EstimatorRequest("gnss-only"), EstimatorRequest("oracle")]
     mixed = [requests[0], ours[0], *requests[1:], ours[1]]
-    options: dict[str, Any] = {"workers": workers, "timeout": 4.0, "memory": 300 << 20, "confinement": confinement}
+    options: dict[str, Any] = {
+        "workers": workers, "time_limit": 4.0, "memory_limit": 300.0, "confinement": confinement,
+    }  # fmt: skip
     options["keep_trials"] = True
     scenario = load(SCENARIO)
     run_campaign([scenario], [requests[0], *ours], range(seeds), folder / "alone", **options)

@@ -12,6 +12,7 @@ import warnings
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -204,7 +205,7 @@ def test_what_is_proven_and_what_is_claimed_is_said(
     assert {"commit", "cpu", "confinement"} <= set(found.claimed)  # also where they are as here
     assert found.summary.startswith("proven: status, note, parameters, draws and scores of the runs")
     assert "only claimed: commit, dirty, cpu, system, confinement" in found.summary
-    monkeypatch.setattr("simnav.leaderboard.interface.verify", lambda *_, **__: found)
+    monkeypatch.setattr("simnav.leaderboard.cli.verify.verify", SimpleNamespace(of=lambda _: found))
     assert CliRunner().invoke(app, ["verify", str(folder)]).exit_code == 0
     for change, code in ((fields(made_cpu="a faster one"), 3), (fields(made_commit="main"), 1)):
         forge(folder, change)

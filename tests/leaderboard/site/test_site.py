@@ -229,7 +229,7 @@ def test_a_sweep_of_former_names_of_parameters_is_shown_under_the_present_ones(t
     content = json.dumps(made_up_sweep("bay-v1").content).replace('"sw-fgo"', '"rae(window=9)"')
     (tmp_path / "results").mkdir()
     (tmp_path / "results" / "sweep-jump.json").write_text(content)
-    (found,) = sweeps.find(tmp_path)
+    (found,) = sweeps.sweeps_in(tmp_path)
     assert found.rows == ["ekf", "rae(innovations=9)"]
     assert [b["estimator"] for b in found.content["breaking_points"]] == found.rows
 
