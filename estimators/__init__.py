@@ -3,6 +3,6 @@
 Importing the package registers the rows; compiled code and large libraries load when an estimator first runs.
 """
 
-from simnav.estimators import rows
+from . import rows
 
 __all__ = ["rows"]

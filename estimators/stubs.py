@@ -24,8 +24,9 @@ from pkgutil import iter_modules
 from typing import Any, TypeAlias, TypeGuard
 
 from simnav.estimator.parameters import parameters_of
-from simnav.estimators.composition import Row
 from simnav.plugins import PluginError, import_file
+
+from .composition import Row
 
 __all__ = ["main", "own_modules", "stub_of"]
 

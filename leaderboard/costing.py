@@ -6,11 +6,12 @@ import os
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
-from simnav.leaderboard.calls import call, whole_number
 from simnav.leaderboard.campaign.request import EstimatorRequest, requests, together
-from simnav.leaderboard.given import absolute, scenario_of
-from simnav.leaderboard.requests import BenchRequest, CostsRequest, ScenarioLike
 from simnav.leaderboard.results.errors import RequestError, mistakes
+
+from .calls import call, whole_number
+from .given import absolute, scenario_of
+from .requests import BenchRequest, CostsRequest, ScenarioLike
 
 if TYPE_CHECKING:
     from simnav.leaderboard.ranking.costs import CostReport, MultipleReport

@@ -9,10 +9,11 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from simnav.leaderboard.calls import whole_number
-from simnav.leaderboard.requests import ScenarioLike, Scenarios
 from simnav.leaderboard.results.errors import MOST_RUNS, RequestError, StoreError, mistakes, sentence
 from simnav.scenario import Scenario
+
+from .calls import whole_number
+from .requests import ScenarioLike, Scenarios
 
 if TYPE_CHECKING:
     from simnav.leaderboard.results.result import Result

@@ -10,10 +10,13 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from simnav.leaderboard.calls import call, whole_number
 from simnav.leaderboard.campaign.request import requests
-from simnav.leaderboard.given import absolute, results_of, scenario_of, scenarios_of
-from simnav.leaderboard.requests import (
+from simnav.leaderboard.results.errors import RequestError, StoreError, mistakes
+from simnav.leaderboard.results.scratch import scratch
+
+from .calls import call, whole_number
+from .given import absolute, results_of, scenario_of, scenarios_of
+from .requests import (
     BoundRequest,
     CiteRequest,
     MergeRequest,
@@ -23,9 +26,7 @@ from simnav.leaderboard.requests import (
     SealRequest,
     VerifyRequest,
 )
-from simnav.leaderboard.results import requested
-from simnav.leaderboard.results.errors import RequestError, StoreError, mistakes
-from simnav.leaderboard.results.scratch import scratch
+from .results import requested
 
 if TYPE_CHECKING:
     from simnav.leaderboard.campaign.rescoring import Rescored
@@ -212,10 +213,11 @@ def reproduce(request: ReproduceRequest) -> Reproduction:
     RequestError
         If there is no such paper or method, or options contradict each other; one sentence.
     """
-    from simnav.leaderboard.papers import paper as papers
-    from simnav.leaderboard.papers import sequential
-    from simnav.leaderboard.papers import stored as shipped
     from simnav.leaderboard.papers.reproduction import reproduce
+
+    from .papers import paper as papers
+    from .papers import sequential
+    from .papers import stored as shipped
 
     if request.stored and (request.until_decided or request.runs is not None):
         raise RequestError("stored results have a fixed number of runs: 'runs' and 'until_decided' do not go with them")

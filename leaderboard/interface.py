@@ -13,12 +13,13 @@ Mistakes in arguments raise `RequestError`, a `ValueError` whose message is one 
 from __future__ import annotations
 
 from simnav.leaderboard.campaign.request import EstimatorLike, Estimators
-from simnav.leaderboard.costing import bench, costs
-from simnav.leaderboard.given import results_of, scenario_of, scenarios_of
-from simnav.leaderboard.inspection import bound, cite, merge, rank, reproduce, rescore, seal, verify
-from simnav.leaderboard.requests import ScenarioLike, Scenarios
 from simnav.leaderboard.results.errors import RequestError
-from simnav.leaderboard.running import campaign, check, evaluate, make, record, run, sweep, tune
+
+from .costing import bench, costs
+from .given import results_of, scenario_of, scenarios_of
+from .inspection import bound, cite, merge, rank, reproduce, rescore, seal, verify
+from .requests import ScenarioLike, Scenarios
+from .running import campaign, check, evaluate, make, record, run, sweep, tune
 
 __all__ = [
     "EstimatorLike",

@@ -10,11 +10,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from simnav.leaderboard.calls import call, whole_number
 from simnav.leaderboard.campaign.request import EstimatorRequest, file_of
-from simnav.leaderboard.given import absolute, results_of
-from simnav.leaderboard.inspection import rank
-from simnav.leaderboard.publishing_requests import (
+from simnav.leaderboard.results.errors import RequestError, StoreError, mistakes
+from simnav.leaderboard.results.scratch import scratch
+
+from .calls import call, whole_number
+from .given import absolute, results_of
+from .inspection import rank
+from .publishing_requests import (
     AuditRequest,
     CheckStandardRequest,
     PublishRequest,
@@ -23,9 +26,7 @@ from simnav.leaderboard.publishing_requests import (
     SubmitRequest,
     VerifyBundleRequest,
 )
-from simnav.leaderboard.results.errors import RequestError, StoreError, mistakes
-from simnav.leaderboard.results.scratch import scratch
-from simnav.leaderboard.running import campaign
+from .running import campaign
 
 if TYPE_CHECKING:
     from simnav.leaderboard.ranking.reports import CampaignReport
@@ -64,10 +65,11 @@ def site(request: SiteRequest) -> SiteReport:
     from simnav.leaderboard.papers.page import pages_in
     from simnav.leaderboard.ranking.agreement import rank_correlations
     from simnav.leaderboard.ranking.ranking import rank as ranked
-    from simnav.leaderboard.results import requested
-    from simnav.leaderboard.site import sweeps as swept
     from simnav.leaderboard.site.report import SiteReport
     from simnav.leaderboard.site.site import build
+
+    from .results import requested
+    from .site import sweeps as swept
 
     shown, processes = whole_number("runs_shown", request.runs_shown, 1), whole_number("workers", request.workers, 1)
     found = results_of(request.results, series=True)
@@ -128,12 +130,13 @@ def submit(request: SubmitRequest) -> Submission:
         If there is no such estimator or profile, the estimator cannot be passed on, or runs are left after ``minutes``.
     """
     from simnav.leaderboard.campaign.confinement.attempt import chosen_confinement
-    from simnav.leaderboard.profiles import read_profile
     from simnav.leaderboard.results.packing import pack
     from simnav.leaderboard.results.provenance import BENCHMARK
     from simnav.leaderboard.submission.bundle import SUFFIX, write_bundle
     from simnav.leaderboard.submission.source import source_of
     from simnav.leaderboard.submission.verifying import runs_of
+
+    from .profiles import read_profile
 
     name = read_profile(request.profile).name
     with mistakes(ValueError):
@@ -218,12 +221,13 @@ def run_standard(request: StandardRequest) -> CampaignReport:
     CampaignReport
         Its summary says how many runs are left.
     """
-    from simnav.leaderboard import standard
-    from simnav.leaderboard.profiles import read_profile
     from simnav.leaderboard.ranking.ranking import rank
     from simnav.leaderboard.ranking.reports import CampaignReport
-    from simnav.leaderboard.results import requested
     from simnav.leaderboard.standard.publication import begin, run
+
+    from . import standard
+    from .profiles import read_profile
+    from .results import requested
 
     folder = absolute(request.results)
     with mistakes(StoreError):
@@ -258,7 +262,7 @@ def check_standard(request: CheckStandardRequest) -> Outdated:
 
 def _standard_results(given: str | os.PathLike[str] | None) -> Path:
     """The folder of a standard result that is there: what was given, or what comes with simnav."""
-    from simnav.leaderboard import standard
+    from . import standard
 
     folder = standard.RESULTS if given is None else absolute(given)
     if not standard.shipped(folder):
@@ -295,13 +299,14 @@ def publish_standard(request: PublishRequest) -> Published:
     RequestError
         If runs are missing or out of date; then nothing is written.
     """
-    from simnav.leaderboard import standard
     from simnav.leaderboard.papers.page import pages_in
-    from simnav.leaderboard.profiles import read_profile
     from simnav.leaderboard.site.site import build
     from simnav.leaderboard.standard.editions import pages_of
     from simnav.leaderboard.standard.history import read
     from simnav.leaderboard.standard.publication import publish
+
+    from . import standard
+    from .profiles import read_profile
 
     folder = standard.RESULTS if request.shipped is None else absolute(request.shipped)
     file = standard.HISTORY if request.history is None else absolute(request.history)

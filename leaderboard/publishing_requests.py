@@ -6,9 +6,10 @@ from collections.abc import Sequence
 from dataclasses import KW_ONLY
 from pathlib import Path
 
-from simnav.leaderboard.calls import option, request
 from simnav.leaderboard.campaign.options import PathLike, part_of
-from simnav.leaderboard.requests import (
+
+from .calls import option, request
+from .requests import (
     CAMPAIGN_PROGRESS,
     FOLDER,
     PARAMETERS,

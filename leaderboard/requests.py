@@ -10,9 +10,10 @@ from dataclasses import KW_ONLY
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
-from simnav.leaderboard.calls import option, request
 from simnav.leaderboard.campaign.options import CampaignOptions, PathLike, RunOptions
-from simnav.leaderboard.papers import PAPERS
+
+from .calls import option, request
+from .papers import PAPERS
 
 if TYPE_CHECKING:
     from simnav.leaderboard.campaign.campaign import Progress

@@ -10,12 +10,15 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from simnav.leaderboard.calls import call, whole_number
 from simnav.leaderboard.campaign.options import RunOptions, shared
 from simnav.leaderboard.campaign.request import EstimatorLike, EstimatorRequest, Estimators, requests, together
 from simnav.leaderboard.campaign.request import request as one_request
-from simnav.leaderboard.given import absolute, results_of, scenario_of, scenarios_of, seeds_of
-from simnav.leaderboard.requests import (
+from simnav.leaderboard.results.errors import RequestError, StoreError, mistakes
+from simnav.leaderboard.results.scratch import scratch
+
+from .calls import call, whole_number
+from .given import absolute, results_of, scenario_of, scenarios_of, seeds_of
+from .requests import (
     CampaignRequest,
     EvaluateRequest,
     RecordRequest,
@@ -24,8 +27,6 @@ from simnav.leaderboard.requests import (
     SweepRequest,
     TuneRequest,
 )
-from simnav.leaderboard.results.errors import RequestError, StoreError, mistakes
-from simnav.leaderboard.results.scratch import scratch
 
 if TYPE_CHECKING:
     from simnav.estimator import Estimator
@@ -173,7 +174,8 @@ def campaign(request: CampaignRequest) -> CampaignReport:
     from simnav.leaderboard.campaign.seal import read_seal
     from simnav.leaderboard.ranking.ranking import rank
     from simnav.leaderboard.ranking.reports import CampaignReport
-    from simnav.leaderboard.results import requested
+
+    from .results import requested
 
     parts = _parts(request)
     folder, summaries, seal = absolute(request.output), [], read_seal(request.sealed)
@@ -197,7 +199,8 @@ def campaign(request: CampaignRequest) -> CampaignReport:
 def _parts(request: CampaignRequest) -> list[tuple[Scenarios, Estimators, int]]:
     """Scenarios, estimators and number of runs of each part of a profile; what was asked for replaces them."""
     from simnav.leaderboard.campaign.campaign import RUNS
-    from simnav.leaderboard.profiles import read_profile
+
+    from .profiles import read_profile
 
     scenarios, estimators, runs = request.scenarios, request.estimators, request.runs
     if request.profile is None:

@@ -75,3 +75,16 @@ def test_no_import_cycle_between_files():
     assert for_types[1] in graph.find_modules_directly_imported_by(for_types[0])
     found = cycles([(a, b) for a in graph.modules for b in graph.find_modules_directly_imported_by(a)])
     assert found == []
+
+
+@pytest.mark.parametrize("package", ["estimators", "leaderboard"])
+def test_neighbours_in_a_folder_are_imported_relatively(package):
+    """So a folder reads and moves as a unit, and tools resolve it where there are no symbolic links."""
+    absolute = []
+    for path in (ROOT / package).rglob("*.py"):
+        folder = ".".join(["simnav", *path.parent.relative_to(ROOT).parts])
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.ImportFrom) and not node.level and node.module:
+                own = node.module == folder or node.module.rpartition(".")[0] == folder
+                absolute += [f"{path.relative_to(ROOT)}:{node.lineno}"] * own
+    assert absolute == []

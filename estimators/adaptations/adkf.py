@@ -9,10 +9,11 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from simnav.compiled import kernel
-from simnav.estimators.adaptations.base import Innovation
-from simnav.estimators.adaptations.noise import NoiseAdaptation, Posterior, normalised_square
-from simnav.estimators.adaptations.robust import igg3
 from simnav.types import Array, Instruments
+
+from .base import Innovation
+from .noise import NoiseAdaptation, Posterior, normalised_square
+from .robust import igg3
 
 __all__ = ["FACTORS", "AdaptiveFactor", "exponential", "three_segment", "two_segment"]
 

@@ -15,13 +15,14 @@ from pathlib import Path
 
 import numpy as np
 
-from simnav.estimators.adaptations.anfis_file import FEATURES, FeatureSet, Parameters, shipped
-from simnav.estimators.adaptations.base import Innovation
-from simnav.estimators.adaptations.noise import NoiseAdaptation
 from simnav.estimators.models.equations import equation_of_kind
 from simnav.estimators.models.measurements import wrap
 from simnav.kinds import BODY_VELOCITY, HEADING, WATER_SPEED
 from simnav.types import Array, Instruments
+
+from .anfis_file import FEATURES, FeatureSet, Parameters, shipped
+from .base import Innovation
+from .noise import NoiseAdaptation
 
 __all__ = ["Anfis", "Features", "Motion"]
 

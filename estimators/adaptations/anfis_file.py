@@ -10,8 +10,9 @@ from typing import Any, Literal
 
 import numpy as np
 
-from simnav.estimators.adaptations.sugeno import Sugeno
 from simnav.types import Array
+
+from .sugeno import Sugeno
 
 __all__ = ["FEATURES", "FORMAT", "FeatureSet", "Parameters", "ParametersError", "shipped"]
 

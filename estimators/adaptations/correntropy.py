@@ -8,9 +8,10 @@ from typing import Literal
 import numpy as np
 
 from simnav.compiled import kernel
-from simnav.estimators.adaptations.base import Innovation
-from simnav.estimators.adaptations.noise import NoiseAdaptation, posterior
 from simnav.types import Array
+
+from .base import Innovation
+from .noise import NoiseAdaptation, posterior
 
 __all__ = ["MaximumCorrentropy", "correntropy_noise"]
 

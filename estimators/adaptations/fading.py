@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from math import exp
 
-from simnav.estimators.adaptations.base import Innovation
-from simnav.estimators.adaptations.noise import NoiseAdaptation
 from simnav.types import Array, Instruments
+
+from .base import Innovation
+from .noise import NoiseAdaptation
 
 __all__ = ["FadingMemory"]
 

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from simnav.estimators.adaptations.base import Innovation
-from simnav.estimators.adaptations.noise import NoiseAdaptation, normalised_square
 from simnav.estimators.algebra.chi_square import chi_square_limits
 from simnav.types import Array, Instruments
+
+from .base import Innovation
+from .noise import NoiseAdaptation, normalised_square
 
 __all__ = ["ChiSquareGate"]
 

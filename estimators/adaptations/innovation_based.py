@@ -8,9 +8,10 @@ from typing import Literal
 import numpy as np
 
 from simnav.compiled import kernel
-from simnav.estimators.adaptations.base import Innovation
-from simnav.estimators.adaptations.noise import EstimatedNoise, Posterior, Scope
 from simnav.types import Array, Instruments
+
+from .base import Innovation
+from .noise import EstimatedNoise, Posterior, Scope
 
 __all__ = ["FixedWindow", "InnovationBased", "adaptive_window"]
 

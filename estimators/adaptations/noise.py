@@ -9,10 +9,11 @@ from typing import Literal
 import numpy as np
 
 from simnav.compiled import kernel
-from simnav.estimators.adaptations.base import Adaptation, Innovation
-from simnav.estimators.adaptations.prediction import PredictionTest
 from simnav.estimators.algebra.joseph import joseph_update
 from simnav.types import KINDS, Array, Instruments
+
+from .base import Adaptation, Innovation
+from .prediction import PredictionTest
 
 __all__ = ["EstimatedNoise", "NoiseAdaptation", "Posterior", "Scope", "normalised_square", "posterior", "scaled"]
 

@@ -7,10 +7,11 @@ from math import sqrt
 import numpy as np
 
 from simnav.compiled import kernel
-from simnav.estimators.adaptations.base import Innovation
 from simnav.estimators.algebra.chi_square import chi_square_limits
 from simnav.estimators.models.roles import fixes_and_logs
 from simnav.types import Array, Instruments
+
+from .base import Innovation
 
 __all__ = ["PredictionTest", "standardised"]
 

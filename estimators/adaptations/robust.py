@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import partial
 
-from simnav.estimators.adaptations.base import Innovation
-from simnav.estimators.adaptations.noise import NoiseAdaptation, scaled
-from simnav.estimators.adaptations.prediction import standardised
 from simnav.types import Array
+
+from .base import Innovation
+from .noise import NoiseAdaptation, scaled
+from .prediction import standardised
 
 __all__ = ["EquivalentWeights", "HuberWeights", "Igg3Weights", "huber", "igg3"]
 

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from simnav.compiled import kernel
-from simnav.estimators.adaptations.base import Innovation
-from simnav.estimators.adaptations.noise import EstimatedNoise, Scope
 from simnav.types import Array, Instruments
+
+from .base import Innovation
+from .noise import EstimatedNoise, Scope
 
 __all__ = ["SageHusa"]
 

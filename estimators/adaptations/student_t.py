@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from simnav.compiled import kernel
-from simnav.estimators.adaptations.base import Innovation
-from simnav.estimators.adaptations.noise import NoiseAdaptation, posterior
 from simnav.estimators.algebra.cholesky import factorise, invert_factor
 from simnav.types import Array
+
+from .base import Innovation
+from .noise import NoiseAdaptation, posterior
 
 __all__ = ["StudentT", "normalised_trace", "student_weight"]
 

@@ -22,12 +22,13 @@ from typing import Any
 
 import numpy as np
 
-from simnav.estimators.adaptations.base import Adaptation, Innovation
 from simnav.estimators.models.channels import of_channels, whole
 from simnav.estimators.models.fault_states import FaultState
 from simnav.recording import AidStream, FaultLabel, Recording
 from simnav.sensors.faults import FAULTS, effect_of, size_by_component, size_range
 from simnav.types import KINDS, Array, Instruments, Measurement
+
+from .base import Adaptation, Innovation
 
 __all__ = ["FisherNoise", "MixtureNoise", "NominalNoise", "TrueNoise", "fisher_information", "imu_faults"]
 

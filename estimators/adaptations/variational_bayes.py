@@ -7,9 +7,10 @@ from math import sqrt
 import numpy as np
 
 from simnav.compiled import kernel
-from simnav.estimators.adaptations.base import Innovation
-from simnav.estimators.adaptations.noise import EstimatedNoise, Scope, posterior
 from simnav.types import Array, Instruments
+
+from .base import Innovation
+from .noise import EstimatedNoise, Scope, posterior
 
 __all__ = ["VariationalBayes", "variational_noise"]
 

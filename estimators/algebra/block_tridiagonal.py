@@ -43,8 +43,9 @@ from typing import TypeAlias
 import numpy as np
 
 from simnav.compiled import kernel
-from simnav.estimators.algebra.cholesky import factorise
 from simnav.types import Array, Integers
+
+from .cholesky import factorise
 
 __all__ = [
     "Aids", "Elimination", "after_step", "error_after_step", "half_squares", "keep_weights", "solve_chain", "whiten",

@@ -9,8 +9,9 @@ from __future__ import annotations
 import numpy as np
 
 from simnav.compiled import kernel
-from simnav.estimators.algebra.cholesky import factorise, solve_factor
 from simnav.types import Array
+
+from .cholesky import factorise, solve_factor
 
 __all__ = ["joseph_update", "project"]
 

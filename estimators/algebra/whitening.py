@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from simnav.compiled import kernel
-from simnav.estimators.algebra.cholesky import factorise, invert_factor
 from simnav.types import Array
+
+from .cholesky import factorise, invert_factor
 
 __all__ = ["whitening"]
 

@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 from simnav.compiled import Array, Flags, Integers, kernel
 from simnav.estimators.algebra.cholesky import factorise, solve_factor
 from simnav.estimators.algebra.joseph import joseph_update, project
-from simnav.estimators.learning.features import LIMIT, MEMORY, PER_INSTRUMENT, PER_MEASUREMENT, WHITE
-from simnav.estimators.learning.reference import Events
+
+from .features import LIMIT, MEMORY, PER_INSTRUMENT, PER_MEASUREMENT, WHITE
+from .reference import Events
 
 __all__ = ["EVENTS", "MEMORY_COLUMNS", "STEPS", "Steps", "observe", "set_scales", "take"]
 

@@ -19,9 +19,10 @@ from numpy.typing import NDArray
 
 from simnav.environment.charted import ChartedEnv
 from simnav.environment.vector import autoreset_of, reset_mask, seeds_of
-from simnav.estimators.learning.environment import run_seed
-from simnav.estimators.learning.features import Numbers
-from simnav.estimators.learning.filters import checked_actions
+
+from .environment import run_seed
+from .features import Numbers
+from .filters import checked_actions
 
 __all__ = ["VoyagesVectorEnv"]
 

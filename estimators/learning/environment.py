@@ -23,14 +23,15 @@ from gymnasium import spaces
 from simnav.environment.charted import ChartedEnv
 from simnav.environment.rendering import Chart
 from simnav.environment.seeds import training_seed
-from simnav.estimators.learning.features import LIMIT, Numbers
-from simnav.estimators.learning.filters import Filters, checked_actions, layout_of_scenario
-from simnav.estimators.learning.rewards import NEED_ORACLE
-from simnav.estimators.learning.tasks import TASKS, Task
-from simnav.estimators.learning.voyage import Voyage
 from simnav.geometry.earth import displace
 from simnav.scenario import Scenario, load
 from simnav.types import KINDS
+
+from .features import LIMIT, Numbers
+from .filters import Filters, checked_actions, layout_of_scenario
+from .rewards import NEED_ORACLE
+from .tasks import TASKS, Task
+from .voyage import Voyage
 
 __all__ = ["FilterTaskEnv", "TaskOptions", "check_counts", "run_seed"]
 

@@ -10,10 +10,11 @@ import numpy as np
 from gymnasium.vector import AutoresetMode
 
 from simnav.environment.seeds import is_training
-from simnav.estimators.learning.features import Numbers
-from simnav.estimators.learning.vector import FilterTaskVectorEnv
 from simnav.scenario import Scenario
 from simnav.types import Array
+
+from .features import Numbers
+from .vector import FilterTaskVectorEnv
 
 __all__ = ["Agent", "Worth", "interval", "plain", "scoring_envs", "worth"]
 

@@ -9,13 +9,14 @@ from numpy.typing import NDArray
 
 from simnav.environment.navigation import most_samples
 from simnav.estimator import UnsuitableScenario
-from simnav.estimators.learning.bank import MEMORY_COLUMNS, observe, take
-from simnav.estimators.learning.features import observation_size
-from simnav.estimators.learning.reference import Linear, ReferenceFilter
-from simnav.estimators.learning.rewards import REWARDS, reward
-from simnav.estimators.learning.tasks import Decision, Task
 from simnav.scenario import Scenario
 from simnav.types import Array, InitialState, Instruments
+
+from .bank import MEMORY_COLUMNS, observe, take
+from .features import observation_size
+from .reference import Linear, ReferenceFilter
+from .rewards import REWARDS, reward
+from .tasks import Decision, Task
 
 __all__ = ["Filters", "Layout", "checked_actions", "layout_of", "layout_of_scenario"]
 

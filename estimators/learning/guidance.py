@@ -45,17 +45,18 @@ from numpy.typing import NDArray
 from simnav.environment.charted import ChartedEnv
 from simnav.environment.rendering import Chart
 from simnav.estimator import Estimator, make
-from simnav.estimators.learning.environment import check_counts, run_seed
-from simnav.estimators.learning.features import LIMIT, Numbers
-from simnav.estimators.learning.filters import checked_actions
-from simnav.estimators.learning.guidance_kernels import ASIDE, LARGEST_TURN, SIZE, judge, look, steer
-from simnav.estimators.learning.navigators import Navigators
-from simnav.estimators.learning.routes import Routes
 from simnav.scenario import Scenario, load
 from simnav.simulation.simulator import Simulator
 from simnav.simulation.steps import SteppedRuns
 from simnav.types import KINDS, Array
 from simnav.world import KinematicVessel, motion
+
+from .environment import check_counts, run_seed
+from .features import LIMIT, Numbers
+from .filters import checked_actions
+from .guidance_kernels import ASIDE, LARGEST_TURN, SIZE, judge, look, steer
+from .navigators import Navigators
+from .routes import Routes
 
 __all__ = ["GuidanceEnv", "GuidanceOptions", "GuidanceScores", "GuidedVoyages", "LineOfSight"]
 

@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simnav.compiled import Array, Flags, Integers, kernel
-from simnav.estimators.learning.features import GUIDANCE, LIMIT, SPEED, TURN_RATE
 from simnav.geometry.rotation import wrap_scalar
+
+from .features import GUIDANCE, LIMIT, SPEED, TURN_RATE
 
 __all__ = ["AGROUND", "ASIDE", "BERTH", "FUEL", "LARGEST_TURN", "SIZE", "Tracks", "judge", "look", "steer"]
 

@@ -14,10 +14,11 @@ from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
 from simnav.estimator import Estimator
-from simnav.estimators.learning.batch import Flags, VoyagesVectorEnv
-from simnav.estimators.learning.features import Numbers
-from simnav.estimators.learning.guidance import GuidanceOptions, GuidedVoyages
 from simnav.scenario import Scenario
+
+from .batch import Flags, VoyagesVectorEnv
+from .features import Numbers
+from .guidance import GuidanceOptions, GuidedVoyages
 
 __all__ = ["GuidanceVectorEnv"]
 

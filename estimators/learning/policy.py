@@ -16,10 +16,11 @@ from typing import Any
 import numpy as np
 
 from simnav.environment.seeds import FIRST_TRAINING_SEED, require_disjoint, training_seed
-from simnav.estimators.learning.features import GUIDANCE, Numbers, observation_size
-from simnav.estimators.learning.tasks import CORRECTIONS, TASKS
 from simnav.scenario import Scenario, load
 from simnav.types import Array
+
+from .features import GUIDANCE, Numbers, observation_size
+from .tasks import CORRECTIONS, TASKS
 
 __all__ = ["FORMAT", "Policy", "PolicyError", "record_of_training"]
 

@@ -9,14 +9,15 @@ import numpy as np
 
 from simnav.estimator import Estimator, UnsuitableScenario
 from simnav.estimator.needs import Needs
-from simnav.estimators.learning.features import Context
-from simnav.estimators.learning.filters import Filters, Layout
-from simnav.estimators.learning.policy import Policy, PolicyError
-from simnav.estimators.learning.reference import ReferenceFilter
-from simnav.estimators.learning.tasks import TASKS
 from simnav.estimators.models.channels import by_channel
 from simnav.estimators.models.suitable import Suitable
 from simnav.types import KINDS, Array, Estimate, InitialState, Instruments, Measurements
+
+from .features import Context
+from .filters import Filters, Layout
+from .policy import Policy, PolicyError
+from .reference import ReferenceFilter
+from .tasks import TASKS
 
 __all__ = ["PolicyEstimator"]
 

@@ -9,11 +9,12 @@ from collections import OrderedDict
 import numpy as np
 from numpy.typing import NDArray
 
-from simnav.estimators.learning.environment import TaskOptions
-from simnav.estimators.learning.features import CONTEXT
-from simnav.estimators.learning.reference import Linear
-from simnav.estimators.learning.voyage import Prepared, prepare
 from simnav.types import Array, InitialState, Instruments
+
+from .environment import TaskOptions
+from .features import CONTEXT
+from .reference import Linear
+from .voyage import Prepared, prepare
 
 __all__ = ["Pool", "capacity_within"]
 

@@ -26,8 +26,9 @@ from math import log, sqrt
 import numpy as np
 
 from simnav.compiled import Array, Flags, Integers, kernel
-from simnav.estimators.learning.bank import EVENTS, STEPS, Steps
-from simnav.estimators.learning.reference import Events
+
+from .bank import EVENTS, STEPS, Steps
+from .reference import Events
 
 __all__ = ["NEED_ORACLE", "REWARDS", "reward"]
 

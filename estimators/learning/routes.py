@@ -5,12 +5,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from simnav.estimators.learning.guidance_kernels import Tracks
 from simnav.geometry.earth import principal_radii, relative_position
 from simnav.scenario import Scenario
 from simnav.types import Array
 from simnav.world import KinematicVessel, World
 from simnav.world.track import PlannedTrack
+
+from .guidance_kernels import Tracks
 
 __all__ = ["Routes"]
 

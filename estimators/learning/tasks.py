@@ -29,9 +29,10 @@ from typing import Any, ClassVar
 import numpy as np
 from gymnasium import spaces
 
-from simnav.estimators.learning.bank import set_scales
-from simnav.estimators.learning.features import LARGEST_SCALE
 from simnav.types import Array
+
+from .bank import set_scales
+from .features import LARGEST_SCALE
 
 __all__ = ["CORRECTIONS", "TASKS", "Correction", "Decision", "Detection", "Task", "Tuning"]
 

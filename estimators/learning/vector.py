@@ -15,12 +15,13 @@ import numpy as np
 from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
-from simnav.estimators.learning.batch import Flags, VoyagesVectorEnv
-from simnav.estimators.learning.environment import TaskOptions, check_counts
-from simnav.estimators.learning.features import Numbers
-from simnav.estimators.learning.filters import Filters
-from simnav.estimators.learning.pool import Pool, capacity_within
 from simnav.scenario import Scenario
+
+from .batch import Flags, VoyagesVectorEnv
+from .environment import TaskOptions, check_counts
+from .features import Numbers
+from .filters import Filters
+from .pool import Pool, capacity_within
 
 __all__ = ["FilterTaskVectorEnv"]
 

@@ -11,8 +11,6 @@ from numpy.typing import NDArray
 
 from simnav.estimator import UnsuitableScenario
 from simnav.estimators.adaptations.truth import TrueNoise
-from simnav.estimators.learning.features import Context
-from simnav.estimators.learning.reference import Linear, ReferenceFilter
 from simnav.estimators.solvers.oracle import OracleEstimator
 from simnav.geometry.earth import radii_scalar
 from simnav.log import LogWarning
@@ -20,6 +18,9 @@ from simnav.recording import AidStream, Recording
 from simnav.scenario import Scenario
 from simnav.source import open_source
 from simnav.types import Array, Estimate, InitialState, Instruments
+
+from .features import Context
+from .reference import Linear, ReferenceFilter
 
 __all__ = ["Prepared", "Voyage", "prepare", "recorded"]
 

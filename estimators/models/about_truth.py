@@ -36,11 +36,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from simnav.estimators.models.base import ErrorModel, Linearised, is_fast, stationary
-from simnav.estimators.models.equations import equation_of
-from simnav.estimators.models.inertial import CURRENT, CURRENT_TIME, InertialModel, roll_pitch_yaw
-from simnav.estimators.models.propagation import correct_inertial
-from simnav.estimators.models.state_blocks import StateBlocks
 from simnav.geometry.earth import principal_radii
 from simnav.geometry.rotation import dcm_from_rpy, rotation_vector_from_dcm
 from simnav.types import (
@@ -54,6 +49,12 @@ from simnav.types import (
     NavigationStates,
     TriadDatasheet,
 )
+
+from .base import ErrorModel, Linearised, is_fast, stationary
+from .equations import equation_of
+from .inertial import CURRENT, CURRENT_TIME, InertialModel, roll_pitch_yaw
+from .propagation import correct_inertial
+from .state_blocks import StateBlocks
 
 __all__ = ["AboutTruthModel"]
 

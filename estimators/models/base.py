@@ -11,7 +11,6 @@ import numpy as np
 
 from simnav.estimator.needs import Needs
 from simnav.estimators.algebra.joseph import joseph_update, project
-from simnav.estimators.models.own_observation import OwnObservation
 from simnav.geometry.rotation import left_jacobian
 from simnav.types import (
     NO_SIDE,
@@ -24,6 +23,8 @@ from simnav.types import (
     Measurement,
     TriadDatasheet,
 )
+
+from .own_observation import OwnObservation
 
 __all__ = [
     "ErrorModel", "GaussMarkov", "Linearised", "Observation", "aid_biases", "gauss_markov", "is_fast", "stationary",

@@ -28,7 +28,6 @@ from numpy.typing import NDArray
 from simnav.compiled import kernel
 from simnav.estimator.needs import Needs
 from simnav.estimators.algebra.whitening import whitening
-from simnav.estimators.models.base import ErrorModel, Linearised
 from simnav.types import (
     NO_SIDE,
     Array,
@@ -40,6 +39,8 @@ from simnav.types import (
     Integers,
     Measurement,
 )
+
+from .base import ErrorModel, Linearised
 
 __all__ = ["Chain", "Columns", "chain_of"]
 

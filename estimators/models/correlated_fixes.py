@@ -17,11 +17,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from simnav.estimators.models.base import ErrorModel
-from simnav.estimators.models.inertial import InertialModel
-from simnav.estimators.models.ship import ShipModel
-from simnav.estimators.models.suitable import Suitable
 from simnav.types import Array, InitialState, Instruments
+
+from .base import ErrorModel
+from .inertial import InertialModel
+from .ship import ShipModel
+from .suitable import Suitable
 
 __all__ = ["CorrelatedFixes", "with_correlated_fixes"]
 

@@ -39,12 +39,13 @@ import numpy as np
 
 from simnav.estimator import UnsuitableScenario
 from simnav.estimator.needs import IMU, Needs
-from simnav.estimators.models.base import Linearised
-from simnav.estimators.models.inertial import InertialModel
-from simnav.estimators.models.measurements import DVL, observe
 from simnav.geometry.earth import ROTATION_RATE, gravity
 from simnav.kinds import BODY_VELOCITY, POSITION, VELOCITY, kinds_with
 from simnav.types import Array, Datasheet, InitialState, Instruments, Measurement
+
+from .base import Linearised
+from .inertial import InertialModel
+from .measurements import DVL, observe
 
 __all__ = ["DELAY", "LEVER_ARM", "MISALIGNMENT", "SCALE", "DvlCalibrationModel"]
 

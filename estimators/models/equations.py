@@ -13,10 +13,11 @@ from typing import ClassVar
 import numpy as np
 
 from simnav import kinds
-from simnav.estimators.models import measurements as codes
-from simnav.estimators.models.readings import READINGS
 from simnav.kinds import NavigationPoint
 from simnav.types import KINDS, Array, Datasheet
+
+from . import measurements as codes
+from .readings import READINGS
 
 __all__ = ["EQUATIONS", "Equation", "equation_of", "equation_of_kind"]
 

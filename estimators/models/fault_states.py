@@ -18,8 +18,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from simnav.estimators.models.base import ErrorModel, Linearised
 from simnav.types import Array, Datasheet, Estimate, ImuSamples, InitialState, Instruments, Measurement
+
+from .base import ErrorModel, Linearised
 
 __all__ = ["FaultState", "FaultStateModel"]
 

@@ -27,14 +27,15 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from simnav.estimators.models.base import Linearised, aid_biases, is_fast
-from simnav.estimators.models.chain import Chain, Columns, chain_of
-from simnav.estimators.models.equations import EQUATIONS, equation_of
-from simnav.estimators.models.own_observation import OwnObservation
-from simnav.estimators.models.points import PointModel
-from simnav.estimators.models.state_blocks import StateBlocks
 from simnav.kinds import NavigationPoint
 from simnav.types import KINDS, NO_SIDE, Array, Datasheet, Estimate, InitialState, Instruments, Measurement
+
+from .base import Linearised, aid_biases, is_fast
+from .chain import Chain, Columns, chain_of
+from .equations import EQUATIONS, equation_of
+from .own_observation import OwnObservation
+from .points import PointModel
+from .state_blocks import StateBlocks
 
 __all__ = ["GeneralChain", "GeneralModel"]
 

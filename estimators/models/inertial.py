@@ -41,32 +41,6 @@ from numpy.typing import NDArray
 from simnav.compiled import kernel
 from simnav.estimator import UnsuitableScenario
 from simnav.estimator.needs import AID, IMU, Needs
-from simnav.estimators.models.base import (
-    ErrorModel,
-    Linearised,
-    Observation,
-    aid_biases,
-    is_fast,
-    stationary,
-    triad_bias,
-)
-from simnav.estimators.models.equations import EQUATIONS, equation_of
-from simnav.estimators.models.inertial_update import absorb_inertial, assimilate_inertial, innovate_inertial
-from simnav.estimators.models.measurements import (
-    HEADING,
-    Aid,
-    State,
-    observe,
-)
-from simnav.estimators.models.own_observation import OwnObservation
-from simnav.estimators.models.propagation import (
-    TURN_TIME,
-    Samples,
-    correct_inertial,
-    propagate_covariance,
-    propagate_inertial,
-)
-from simnav.estimators.models.state_blocks import StateBlocks
 from simnav.geometry.rotation import dcm_from_rpy
 from simnav.types import (
     KINDS,
@@ -80,6 +54,33 @@ from simnav.types import (
     Instruments,
     Measurement,
 )
+
+from .base import (
+    ErrorModel,
+    Linearised,
+    Observation,
+    aid_biases,
+    is_fast,
+    stationary,
+    triad_bias,
+)
+from .equations import EQUATIONS, equation_of
+from .inertial_update import absorb_inertial, assimilate_inertial, innovate_inertial
+from .measurements import (
+    HEADING,
+    Aid,
+    State,
+    observe,
+)
+from .own_observation import OwnObservation
+from .propagation import (
+    TURN_TIME,
+    Samples,
+    correct_inertial,
+    propagate_covariance,
+    propagate_inertial,
+)
+from .state_blocks import StateBlocks
 
 __all__ = ["InertialModel", "roll_pitch_yaw"]
 

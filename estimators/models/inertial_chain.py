@@ -24,12 +24,13 @@ from numpy.typing import NDArray
 
 from simnav.compiled import kernel
 from simnav.estimators.algebra.block_tridiagonal import error_after_step
-from simnav.estimators.models.chain import Chain, Columns, chain_of
-from simnav.estimators.models.inertial import InertialModel
-from simnav.estimators.models.measurements import OWN, State, observe_inertial
-from simnav.estimators.models.propagation import correct_inertial
 from simnav.geometry.rotation import cross, rotated, rotation_coefficients
 from simnav.types import Array, InitialState, Instruments, Integers
+
+from .chain import Chain, Columns, chain_of
+from .inertial import InertialModel
+from .measurements import OWN, State, observe_inertial
+from .propagation import correct_inertial
 
 __all__ = ["InertialChain"]
 

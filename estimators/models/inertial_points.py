@@ -23,8 +23,13 @@ from math import atan2, ceil, cos, sin, sqrt
 import numpy as np
 
 from simnav.compiled import kernel
-from simnav.estimators.models.inertial import InertialModel
-from simnav.estimators.models.measurements import (
+from simnav.geometry.earth import radii_scalar
+from simnav.geometry.rotation import rotate_left, rotation_coefficients
+from simnav.strapdown import mechanize_step, sample_from_motion
+from simnav.types import Array, Measurement
+
+from .inertial import InertialModel
+from .measurements import (
     AID,
     HEADING,
     NAVIGATION_STATES,
@@ -34,11 +39,7 @@ from simnav.estimators.models.measurements import (
     State,
     observe_inertial,
 )
-from simnav.estimators.models.points import PointModel
-from simnav.geometry.earth import radii_scalar
-from simnav.geometry.rotation import rotate_left, rotation_coefficients
-from simnav.strapdown import mechanize_step, sample_from_motion
-from simnav.types import Array, Measurement
+from .points import PointModel
 
 __all__ = ["PIECE", "InertialPoints", "observe_points", "propagate_points"]
 

@@ -12,9 +12,10 @@ import numpy as np
 
 from simnav.compiled import kernel
 from simnav.estimators.algebra.joseph import joseph_update, project
-from simnav.estimators.models.measurements import AID, STATE, Aid, State, observe_inertial
-from simnav.estimators.models.propagation import correct_inertial
 from simnav.types import Array
+
+from .measurements import AID, STATE, Aid, State, observe_inertial
+from .propagation import correct_inertial
 
 __all__ = ["absorb_inertial", "assimilate_inertial", "innovate_inertial"]
 

@@ -12,11 +12,12 @@ import numpy as np
 
 from simnav.estimator import UnsuitableScenario
 from simnav.estimator.needs import Needs
-from simnav.estimators.models.base import ErrorModel, Linearised
-from simnav.estimators.models.equations import equation_of
-from simnav.estimators.models.measurements import radii, wrap
 from simnav.kinds import POSITION, VELOCITY, kinds_with
 from simnav.types import Array, Datasheet, Estimate, InitialState, Instruments, Measurement
+
+from .base import ErrorModel, Linearised
+from .equations import equation_of
+from .measurements import radii, wrap
 
 __all__ = ["KinematicModel"]
 

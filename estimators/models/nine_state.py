@@ -15,10 +15,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from simnav.estimators.models.base import Linearised
-from simnav.estimators.models.equations import equation_of
-from simnav.estimators.models.inertial import InertialModel
 from simnav.types import Array, InitialState, Instruments, Measurement
+
+from .base import Linearised
+from .equations import equation_of
+from .inertial import InertialModel
 
 __all__ = ["NineStateModel"]
 

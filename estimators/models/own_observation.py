@@ -23,12 +23,13 @@ from typing import Any
 import numpy as np
 
 from simnav.blocks import NAVIGATION
-from simnav.estimators.models.channels import ChannelDatasheet, whole
 from simnav.geometry.earth import earth_rate, principal_radii
 from simnav.geometry.rotation import dcm_from_rotation_vector
 from simnav.kinds import NavigationPoint
 from simnav.plugins import place_of
 from simnav.types import KINDS, NO_SIDE, Array, Datasheet
+
+from .channels import ChannelDatasheet, whole
 
 __all__ = ["OwnObservation"]
 

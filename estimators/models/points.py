@@ -8,8 +8,9 @@ from __future__ import annotations
 
 from abc import abstractmethod
 
-from simnav.estimators.models.base import ErrorModel
 from simnav.types import Array, Measurement
+
+from .base import ErrorModel
 
 __all__ = ["PointModel"]
 

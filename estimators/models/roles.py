@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from simnav.estimators.models.equations import equation_of
 from simnav.types import Instruments
+
+from .equations import equation_of
 
 __all__ = ["fixes_and_logs"]
 

@@ -28,10 +28,12 @@ from numpy.typing import NDArray
 from simnav import kinds
 from simnav.estimator import UnsuitableScenario
 from simnav.estimator.needs import Needs
-from simnav.estimators.models.base import ErrorModel, GaussMarkov, Linearised, aid_biases, is_fast, stationary
-from simnav.estimators.models.equations import equation_of
-from simnav.estimators.models.measurements import wrap
-from simnav.estimators.models.ship_kernels import (
+from simnav.types import KINDS, NO_SIDE, Array, Datasheet, Estimate, InitialState, Instruments, Measurement
+
+from .base import ErrorModel, GaussMarkov, Linearised, aid_biases, is_fast, stationary
+from .equations import equation_of
+from .measurements import wrap
+from .ship_kernels import (
     BODY_VELOCITY,
     HEADING,
     LOG,
@@ -46,9 +48,8 @@ from simnav.estimators.models.ship_kernels import (
     describe_ship,
     observe_ship,
 )
-from simnav.estimators.models.ship_observation import HEEL, VERTICAL_SPEED, ShipObservation
-from simnav.estimators.models.state_blocks import StateBlocks
-from simnav.types import KINDS, NO_SIDE, Array, Datasheet, Estimate, InitialState, Instruments, Measurement
+from .ship_observation import HEEL, VERTICAL_SPEED, ShipObservation
+from .state_blocks import StateBlocks
 
 __all__ = ["OBSERVED", "POSITIONS", "E", "N", "ShipModel"]
 

@@ -18,9 +18,12 @@ from numpy.typing import NDArray
 
 from simnav.compiled import kernel
 from simnav.estimators.algebra.block_tridiagonal import error_after_step
-from simnav.estimators.models.chain import Chain, Columns, chain_of
-from simnav.estimators.models.ship import ShipModel
-from simnav.estimators.models.ship_kernels import (
+from simnav.geometry.earth import radii_scalar
+from simnav.types import Array, InitialState, Instruments, Integers
+
+from .chain import Chain, Columns, chain_of
+from .ship import ShipModel
+from .ship_kernels import (
     VELOCITY,
     E,
     N,
@@ -32,8 +35,6 @@ from simnav.estimators.models.ship_kernels import (
     set_identity,
     steps_of,
 )
-from simnav.geometry.earth import radii_scalar
-from simnav.types import Array, InitialState, Instruments, Integers
 
 __all__ = ["ShipChain"]
 

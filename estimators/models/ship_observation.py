@@ -12,11 +12,12 @@ from math import cos, sin
 
 import numpy as np
 
-from simnav.estimators.models.base import Linearised
-from simnav.estimators.models.own_observation import OwnObservation
-from simnav.estimators.models.ship_kernels import CE, CN, PSI, E, N, R, U, displace_ship
 from simnav.kinds import NavigationPoint
 from simnav.types import NO_SIDE, Array, Datasheet
+
+from .base import Linearised
+from .own_observation import OwnObservation
+from .ship_kernels import CE, CN, PSI, E, N, R, U, displace_ship
 
 __all__ = ["HEEL", "VERTICAL_SPEED", "ShipObservation"]
 

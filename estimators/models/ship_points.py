@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from simnav.estimators.models.equations import equation_of
-from simnav.estimators.models.points import PointModel
-from simnav.estimators.models.ship import ShipModel
-from simnav.estimators.models.ship_kernels import move_ships, read_ships
 from simnav.types import Array, Measurement
+
+from .equations import equation_of
+from .points import PointModel
+from .ship import ShipModel
+from .ship_kernels import move_ships, read_ships
 
 __all__ = ["ShipPoints"]
 

@@ -12,8 +12,9 @@ from dataclasses import replace
 import numpy as np
 
 from simnav.blocks import StateBlock, blocks_of
-from simnav.estimators.models.channels import instrument_of
 from simnav.types import Array, Datasheet, Instruments
+
+from .channels import instrument_of
 
 __all__ = ["StateBlocks", "without_shared_blocks"]
 

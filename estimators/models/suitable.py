@@ -5,10 +5,11 @@ from __future__ import annotations
 from typing import Protocol
 
 from simnav.estimator.needs import AID, IMU, Needs
-from simnav.estimators.models.base import ErrorModel
-from simnav.estimators.models.inertial import InertialModel
-from simnav.estimators.models.ship import ShipModel
 from simnav.types import Instruments
+
+from .base import ErrorModel
+from .inertial import InertialModel
+from .ship import ShipModel
 
 __all__ = ["ModelChoice", "Suitable"]
 

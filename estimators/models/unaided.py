@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from simnav.estimator import UnsuitableScenario
 from simnav.estimator.needs import IMU, Needs
-from simnav.estimators.models.base import ErrorModel
-from simnav.estimators.models.inertial import InertialModel
 from simnav.types import Datasheet, Instruments
+
+from .base import ErrorModel
+from .inertial import InertialModel
 
 __all__ = ["UnaidedModel"]
 

@@ -6,7 +6,6 @@ All but the gradient-adaptive ones also isolate faults (`simnav.estimators.weigh
 from simnav.estimator import register
 from simnav.estimators.composition import Row, piece
 from simnav.estimators.models.suitable import Suitable
-from simnav.estimators.rows.windows import SwFgoPaper
 from simnav.estimators.solvers.window import WindowEstimator
 from simnav.estimators.weightings.dynamic_covariance_scaling import DynamicCovarianceScaling
 from simnav.estimators.weightings.fault_isolation import FaultIsolation
@@ -15,6 +14,8 @@ from simnav.estimators.weightings.graduated_non_convexity import GraduatedNonCon
 from simnav.estimators.weightings.m_estimators import TunedMEstimator, cauchy, geman_mcclure, huber, tukey
 from simnav.estimators.weightings.max_mixture import MaxMixture
 from simnav.estimators.weightings.switchable_constraints import SwitchableConstraints
+
+from .windows import SwFgoPaper
 
 __all__ = ["CauchyFgo", "DcsFgo", "GaFgo", "GaFgoPaper", "GmFgo", "GncFgo", "HuberFgo", "MaxMixtureFgo"]
 __all__ += ["SwitchableFgo", "TukeyFgo"]

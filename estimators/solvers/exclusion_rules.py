@@ -14,9 +14,10 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from math import hypot, radians, sqrt
 
-from simnav.estimators.solvers.separation import KNOWN_HEADING
-from simnav.estimators.solvers.state_difference import difference
 from simnav.types import Estimate
+
+from .separation import KNOWN_HEADING
+from .state_difference import difference
 
 __all__ = ["COASTING", "ExclusionRules", "RulesWithoutImu"]
 

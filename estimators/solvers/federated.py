@@ -57,8 +57,9 @@ from simnav.estimators.models.nine_state import NineStateModel
 from simnav.estimators.models.propagation import propagate_covariance
 from simnav.estimators.models.state_blocks import without_shared_blocks
 from simnav.estimators.models.unaided import UnaidedModel
-from simnav.estimators.solvers.kalman import KalmanEstimator
 from simnav.types import Array, Estimate, InitialState, Instruments, Measurement
+
+from .kalman import KalmanEstimator
 
 __all__ = ["FederatedEstimator"]
 

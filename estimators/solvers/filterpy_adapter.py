@@ -17,7 +17,6 @@ import numpy as np
 
 from simnav.estimator import Estimator, UnsuitableScenario, lacking
 from simnav.estimators.models.channels import by_channel, instrument_of
-from simnav.estimators.solvers.admission import Admission
 from simnav.geometry.earth import displace, relative_position
 from simnav.types import (
     COMPONENTS,
@@ -30,6 +29,8 @@ from simnav.types import (
     Measurement,
     Measurements,
 )
+
+from .admission import Admission
 
 __all__ = ["FilterpyEstimator"]
 

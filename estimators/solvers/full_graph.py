@@ -12,10 +12,11 @@ import numpy as np
 from simnav.estimators.adaptations.base import Adaptation
 from simnav.estimators.models.chains import Chain
 from simnav.estimators.models.suitable import ModelChoice
-from simnav.estimators.solvers.smoother import smoother_gains
-from simnav.estimators.solvers.window import WindowEstimator
 from simnav.estimators.weightings.base import Isolation, Weighting
 from simnav.types import Array, Estimate, InitialState, Instruments, Measurements, NavigationStates
+
+from .smoother import smoother_gains
+from .window import WindowEstimator
 
 __all__ = ["FullGraph"]
 

@@ -25,10 +25,11 @@ from simnav.compiled import kernel
 from simnav.estimators.models.base import Linearised
 from simnav.estimators.models.inertial import InertialModel
 from simnav.estimators.models.measurements import DVL, GNSS_POSITION, GNSS_VELOCITY, SPEED_LOG, observe_inertial
-from simnav.estimators.solvers.gtsam_preintegration import Preintegration
-from simnav.estimators.solvers.tangent_frame import TangentFrame, tangent_state
 from simnav.geometry.rotation import rpy_from_dcm
 from simnav.types import Array, Estimate, InitialState, Instruments, Measurement
+
+from .gtsam_preintegration import Preintegration
+from .tangent_frame import TangentFrame, tangent_state
 
 __all__ = ["InertialGraph", "Observation", "observe_tangent"]
 

@@ -35,9 +35,10 @@ from simnav.estimators.models.propagation import (
     Samples,
     next_stretch,
 )
-from simnav.estimators.solvers.tangent_frame import TangentFrame
 from simnav.geometry.rotation import cross
 from simnav.types import Array, ImuSamples
+
+from .tangent_frame import TangentFrame
 
 __all__ = ["Preintegration", "imu_pieces"]
 

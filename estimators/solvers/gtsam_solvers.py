@@ -33,9 +33,10 @@ from simnav.estimator.needs import AID, IMU, Needs
 from simnav.estimators.composition import Solver
 from simnav.estimators.models.channels import by_channel
 from simnav.estimators.models.inertial import InertialModel
-from simnav.estimators.solvers.admission import LATE, Admission
-from simnav.estimators.solvers.gtsam_graph import InertialGraph, Observation
 from simnav.types import Array, Estimate, InitialState, Instruments, Measurement, Measurements, NavigationStates
+
+from .admission import LATE, Admission
+from .gtsam_graph import InertialGraph, Observation
 
 __all__ = ["BatchEstimator", "FixedLagEstimator", "GncEstimator", "GtsamEstimator", "Isam2Estimator"]
 

@@ -32,10 +32,11 @@ from simnav.estimators.algebra.chi_square import chi_square_limits
 from simnav.estimators.composition import Solver
 from simnav.estimators.models.base import Observation
 from simnav.estimators.models.suitable import ModelChoice
-from simnav.estimators.solvers.kalman import KalmanEstimator
-from simnav.estimators.solvers.state_difference import difference, displaced
 from simnav.geometry.rotation import wrap_angle
 from simnav.types import Array, Estimate, InitialState, Instruments, Measurements
+
+from .kalman import KalmanEstimator
+from .state_difference import difference, displaced
 
 __all__ = ["HeadingBank", "initial_headings"]
 

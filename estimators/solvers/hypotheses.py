@@ -16,9 +16,10 @@ import numpy as np
 from simnav.estimators.adaptations.base import Adaptation, Innovation
 from simnav.estimators.adaptations.noise import normalised_square
 from simnav.estimators.algebra.chi_square import chi_square_limits
-from simnav.estimators.solvers.kalman import KalmanEstimator
-from simnav.estimators.solvers.state_difference import difference
 from simnav.types import Array, Estimate, InitialState, Instruments
+
+from .kalman import KalmanEstimator
+from .state_difference import difference
 
 __all__ = ["Exclusion", "Hypothesis", "ImuHypothesis", "WatchedFilter", "disturbed_imu", "uncertain_start"]
 

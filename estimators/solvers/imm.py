@@ -14,9 +14,10 @@ from simnav.estimators.adaptations.prediction import PredictionTest
 from simnav.estimators.algebra.cholesky import factorise, invert_factor
 from simnav.estimators.models.channels import by_channel, summary
 from simnav.estimators.models.suitable import ModelChoice
-from simnav.estimators.solvers.kalman import KalmanEstimator
-from simnav.estimators.solvers.smoother import Smoother
 from simnav.types import KINDS, Array, Estimate, InitialState, Instruments, Measurement, Measurements
+
+from .kalman import KalmanEstimator
+from .smoother import Smoother
 
 __all__ = ["ImmEstimator", "mixture_update"]
 

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 from collections import deque
 
-from simnav.estimators.solvers.cost_consistency import ConsistencyTest
+from .cost_consistency import ConsistencyTest
 
 __all__ = ["InnovationTest"]
 

@@ -46,9 +46,10 @@ from simnav.estimators.adaptations.base import Adaptation
 from simnav.estimators.algebra.joseph import joseph_update
 from simnav.estimators.models.base import Observation
 from simnav.estimators.models.inertial import InertialModel
-from simnav.estimators.solvers.kalman import KalmanEstimator
 from simnav.geometry.rotation import left_jacobian, skew
 from simnav.types import Array
+
+from .kalman import KalmanEstimator
 
 __all__ = ["InvariantKalmanEstimator"]
 

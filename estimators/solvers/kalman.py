@@ -28,11 +28,12 @@ from simnav.estimators.composition import Solver
 from simnav.estimators.models.base import ErrorModel, Linearised, Observation
 from simnav.estimators.models.channels import by_channel, owners, summary
 from simnav.estimators.models.suitable import ModelChoice
-from simnav.estimators.solvers.admission import Admission
-from simnav.estimators.solvers.innovation_consistency import InnovationTest
-from simnav.estimators.solvers.iterated import Iteration, absorb_iterated
-from simnav.estimators.solvers.smoother import Smoother
 from simnav.types import Array, Estimate, InitialState, Instruments, Measurement, Measurements, NavigationStates
+
+from .admission import Admission
+from .innovation_consistency import InnovationTest
+from .iterated import Iteration, absorb_iterated
+from .smoother import Smoother
 
 __all__ = ["KalmanEstimator"]
 

@@ -37,8 +37,9 @@ from simnav.estimators.adaptations.base import Adaptation
 from simnav.estimators.algebra.joseph import joseph_update
 from simnav.estimators.models.base import Observation
 from simnav.estimators.models.suitable import ModelChoice
-from simnav.estimators.solvers.kalman import KalmanEstimator
 from simnav.types import Estimate, InitialState, Instruments, Measurement, Measurements
+
+from .kalman import KalmanEstimator
 
 __all__ = ["LinearKalmanEstimator"]
 

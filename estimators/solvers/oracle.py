@@ -16,8 +16,6 @@ from simnav.estimators.models.base import ErrorModel
 from simnav.estimators.models.fault_states import FaultStateModel
 from simnav.estimators.models.inertial import InertialModel
 from simnav.estimators.models.true_motion import levelled, true_motion, with_imu
-from simnav.estimators.solvers.kalman import KalmanEstimator
-from simnav.estimators.solvers.smoother import Smoother
 from simnav.recording import Recording
 from simnav.types import (
     Array,
@@ -29,6 +27,9 @@ from simnav.types import (
     NavigationStates,
     TapStates,
 )
+
+from .kalman import KalmanEstimator
+from .smoother import Smoother
 
 __all__ = ["OracleEstimator"]
 

@@ -21,9 +21,10 @@ from math import radians, sqrt
 
 import numpy as np
 
-from simnav.estimators.solvers.hypotheses import Hypothesis
-from simnav.estimators.solvers.state_difference import difference
 from simnav.types import Array, Estimate
+
+from .hypotheses import Hypothesis
+from .state_difference import difference
 
 __all__ = ["KNOWN_HEADING", "SeparationTest"]
 

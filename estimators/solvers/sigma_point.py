@@ -41,8 +41,9 @@ from simnav.estimators.adaptations.base import Adaptation
 from simnav.estimators.algebra.cholesky import factorise
 from simnav.estimators.models.base import Observation
 from simnav.estimators.models.points import PointModel
-from simnav.estimators.solvers.kalman import KalmanEstimator
 from simnav.types import Array, InitialState, Instruments, Measurement
+
+from .kalman import KalmanEstimator
 
 __all__ = ["SigmaPointEstimator", "draw_points"]
 

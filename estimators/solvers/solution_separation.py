@@ -97,8 +97,10 @@ from simnav.estimators.composition import Solver
 from simnav.estimators.models.channels import by_channel, owners, reading_of, summary
 from simnav.estimators.models.roles import fixes_and_logs
 from simnav.estimators.models.suitable import ModelChoice
-from simnav.estimators.solvers.exclusion_rules import COASTING, ExclusionRules, RulesWithoutImu
-from simnav.estimators.solvers.hypotheses import (
+from simnav.types import KINDS, Array, Estimate, InitialState, Instruments, Measurements
+
+from .exclusion_rules import COASTING, ExclusionRules, RulesWithoutImu
+from .hypotheses import (
     Exclusion,
     Hypothesis,
     ImuHypothesis,
@@ -106,10 +108,9 @@ from simnav.estimators.solvers.hypotheses import (
     disturbed_imu,
     uncertain_start,
 )
-from simnav.estimators.solvers.iterated import Iteration
-from simnav.estimators.solvers.kalman import KalmanEstimator
-from simnav.estimators.solvers.separation import KNOWN_HEADING, SeparationTest
-from simnav.types import KINDS, Array, Estimate, InitialState, Instruments, Measurements
+from .iterated import Iteration
+from .kalman import KalmanEstimator
+from .separation import KNOWN_HEADING, SeparationTest
 
 __all__ = ["SolutionSeparation"]
 

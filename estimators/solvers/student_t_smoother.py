@@ -35,8 +35,9 @@ from simnav.compiled import kernel
 from simnav.estimators.adaptations.student_t import normalised_trace
 from simnav.estimators.algebra.joseph import joseph_update, project
 from simnav.estimators.models.base import ErrorModel, Linearised
-from simnav.estimators.solvers.smoother import Smoother, smoother_gains
 from simnav.types import Array, Datasheet, Integers
+
+from .smoother import Smoother, smoother_gains
 
 __all__ = ["StudentTSmoother"]
 

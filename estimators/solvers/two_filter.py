@@ -41,8 +41,9 @@ import numpy as np
 from simnav.estimator import UnsuitableScenario
 from simnav.estimators.algebra.joseph import joseph_update
 from simnav.estimators.models.base import ErrorModel, Linearised
-from simnav.estimators.solvers.smoother import Smoother, Stretches, scale_of
 from simnav.types import Array, Datasheet
+
+from .smoother import Smoother, Stretches, scale_of
 
 __all__ = ["TwoFilterSmoother"]
 

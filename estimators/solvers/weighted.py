@@ -27,9 +27,10 @@ from simnav.estimators.algebra.joseph import joseph_update
 from simnav.estimators.algebra.whitening import whitening
 from simnav.estimators.models.channels import by_channel
 from simnav.estimators.models.suitable import ModelChoice
-from simnav.estimators.solvers.kalman import KalmanEstimator
 from simnav.estimators.weightings.base import Factors, Weighting
 from simnav.types import Array, Estimate, InitialState, Instruments, Measurement, Measurements
+
+from .kalman import KalmanEstimator
 
 __all__ = ["WeightedKalmanEstimator"]
 

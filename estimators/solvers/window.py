@@ -57,10 +57,11 @@ from simnav.estimators.models.base import ErrorModel
 from simnav.estimators.models.chains import Chain, chain_of
 from simnav.estimators.models.channels import by_channel, owners, summary
 from simnav.estimators.models.suitable import ModelChoice
-from simnav.estimators.solvers.admission import Admission
-from simnav.estimators.solvers.cost_consistency import CostTest
 from simnav.estimators.weightings.base import Factors, Isolation, Weighting
 from simnav.types import Array, Estimate, InitialState, Instruments, Measurement, Measurements
+
+from .admission import Admission
+from .cost_consistency import CostTest
 
 __all__ = ["WindowEstimator"]
 

@@ -29,8 +29,9 @@ from simnav.estimators.adaptations.anfis_file import FEATURES, Parameters
 from simnav.estimators.adaptations.base import Adaptation, Innovation
 from simnav.estimators.adaptations.sugeno import Sugeno
 from simnav.estimators.models.equations import equation_of_kind
-from simnav.estimators.training.hybrid_learning import Learned, learn, rmse
 from simnav.types import Array, Instruments
+
+from .hybrid_learning import Learned, learn, rmse
 
 if TYPE_CHECKING:
     from simnav.recording import AidStream, Recording

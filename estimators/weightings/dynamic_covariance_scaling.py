@@ -17,8 +17,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from simnav.estimators.weightings.m_estimators import MEstimator, constants
 from simnav.types import Array
+
+from .m_estimators import MEstimator, constants
 
 __all__ = ["DynamicCovarianceScaling", "covariance_scaling"]
 

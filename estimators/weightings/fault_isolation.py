@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 from simnav.compiled import kernel
 from simnav.estimators.algebra.chi_square import chi_square_limits
 from simnav.estimators.models.roles import fixes_and_logs
-from simnav.estimators.weightings.base import Factors
 from simnav.types import Array, Instruments, Integers
+
+from .base import Factors
 
 __all__ = ["FaultIsolation"]
 

@@ -38,9 +38,10 @@ import numpy as np
 
 from simnav.compiled import kernel
 from simnav.estimators.models.channels import instrument_of, owners
-from simnav.estimators.weightings.base import Factors, Weighting
 from simnav.kinds import POSITION, VELOCITY
 from simnav.types import Array, Instruments, Integers
+
+from .base import Factors, Weighting
 
 __all__ = ["GradientAdaptive", "Shape", "medians"]
 

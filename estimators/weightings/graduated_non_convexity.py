@@ -20,10 +20,11 @@ from typing import Literal
 
 import numpy as np
 
-from simnav.estimators.weightings.base import Factors
-from simnav.estimators.weightings.m_estimators import constants, geman_mcclure, truncated
-from simnav.estimators.weightings.robust_weighting import RobustWeighting
 from simnav.types import Array, Instruments
+
+from .base import Factors
+from .m_estimators import constants, geman_mcclure, truncated
+from .robust_weighting import RobustWeighting
 
 __all__ = ["GraduatedNonConvexity", "softened_geman_mcclure", "softened_truncated"]
 

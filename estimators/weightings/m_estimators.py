@@ -32,9 +32,10 @@ from functools import cache
 
 import numpy as np
 
-from simnav.estimators.weightings.base import Factors
-from simnav.estimators.weightings.robust_weighting import RobustWeighting
 from simnav.types import Array
+
+from .base import Factors
+from .robust_weighting import RobustWeighting
 
 __all__ = [
     "MEstimator",

@@ -20,8 +20,9 @@ from math import log
 
 import numpy as np
 
-from simnav.estimators.weightings.m_estimators import MEstimator
 from simnav.types import Array
+
+from .m_estimators import MEstimator
 
 __all__ = ["MaxMixture"]
 

@@ -14,8 +14,9 @@ from functools import cache
 import numpy as np
 
 from simnav.compiled import kernel
-from simnav.estimators.weightings.base import Factors, Weighting
 from simnav.types import Array
+
+from .base import Factors, Weighting
 
 __all__ = ["RobustWeighting", "weigh_motion"]
 

@@ -18,7 +18,7 @@ Geman and McClure with ``c = 1/sigma_s``: the two methods differ only in the cho
 
 from __future__ import annotations
 
-from simnav.estimators.weightings.m_estimators import MEstimator, geman_mcclure
+from .m_estimators import MEstimator, geman_mcclure
 
 __all__ = ["SwitchableConstraints"]
 

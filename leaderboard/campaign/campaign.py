@@ -20,22 +20,9 @@ from pathlib import Path
 from typing import TypeAlias
 
 from simnav.leaderboard.calls import call, option, request
-from simnav.leaderboard.campaign.cluster import ClusterError, run_on_cluster
 from simnav.leaderboard.campaign.confinement.attempt import chosen_confinement
 from simnav.leaderboard.campaign.confinement.privileges import PrivilegesWarning, kept_rights
 from simnav.leaderboard.campaign.confinement.session import Limits, ServerError
-from simnav.leaderboard.campaign.entrant import Entrant
-from simnav.leaderboard.campaign.fingerprint import recording_digest, simulator_version
-from simnav.leaderboard.campaign.options import CampaignOptions, PathLike
-from simnav.leaderboard.campaign.own_scores import own_scores, scoring_code, scoring_differs
-from simnav.leaderboard.campaign.plan import Plan
-from simnav.leaderboard.campaign.recorder import time_limit
-from simnav.leaderboard.campaign.request import EstimatorRequest
-from simnav.leaderboard.campaign.rescoring import rescore_results
-from simnav.leaderboard.campaign.resolution import own_files, resolve, variant_of
-from simnav.leaderboard.campaign.seal import PUBLIC, Seal
-from simnav.leaderboard.campaign.training_runs import require_unseen
-from simnav.leaderboard.campaign.worker import Unit, run_unit, start_worker
 from simnav.leaderboard.results import requested, store, trials
 from simnav.leaderboard.results.errors import RequestError, mistakes
 from simnav.leaderboard.results.provenance import numerics
@@ -43,6 +30,20 @@ from simnav.leaderboard.results.versions import declared_recording, declared_var
 from simnav.scenario import Scenario
 from simnav.simulation.version import SIMULATOR_VERSION
 from simnav.spec import closest
+
+from .cluster import ClusterError, run_on_cluster
+from .entrant import Entrant
+from .fingerprint import recording_digest, simulator_version
+from .options import CampaignOptions, PathLike
+from .own_scores import own_scores, scoring_code, scoring_differs
+from .plan import Plan
+from .recorder import time_limit
+from .request import EstimatorRequest
+from .rescoring import rescore_results
+from .resolution import own_files, resolve, variant_of
+from .seal import PUBLIC, Seal
+from .training_runs import require_unseen
+from .worker import Unit, run_unit, start_worker
 
 __all__ = [
     "MEMORY",

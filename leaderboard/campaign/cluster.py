@@ -19,10 +19,11 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from simnav.leaderboard.campaign.fingerprint import simulator_version
-from simnav.leaderboard.campaign.worker import Unit, run_unit
 from simnav.leaderboard.results import store
 from simnav.leaderboard.results.scratch import scratch
+
+from .fingerprint import simulator_version
+from .worker import Unit, run_unit
 
 __all__ = ["ClusterError", "run_on_cluster"]
 

@@ -15,11 +15,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from simnav.leaderboard.campaign.own_scores import same_code, scoring_code
 from simnav.leaderboard.results.impossible import impossible
 from simnav.leaderboard.results.provenance import distinct, is_commit
 from simnav.leaderboard.results.versions import is_declared
 from simnav.scoring import SCORES
+
+from .own_scores import same_code, scoring_code
 
 if TYPE_CHECKING:
     from simnav.leaderboard.results.provenance import Provenance

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 from simnav.estimator import find, make
 from simnav.estimator.registry import discover_point
-from simnav.leaderboard.campaign.request import enlist
-from simnav.leaderboard.campaign.session_class import receive
+
+from .request import enlist
+from .session_class import receive
 
 if TYPE_CHECKING:
     from simnav.estimator import Estimator

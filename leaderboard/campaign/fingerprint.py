@@ -25,10 +25,11 @@ from types import FunctionType
 from typing import TYPE_CHECKING, Any
 
 from simnav.estimator.parameters import parameters_of
-from simnav.leaderboard.campaign import sources
-from simnav.leaderboard.campaign.session_class import is_session, source_of
-from simnav.leaderboard.campaign.sources import digest, files_digest, folder_code, followed, is_installed
 from simnav.log import channel
+
+from . import sources
+from .session_class import is_session, source_of
+from .sources import digest, files_digest, folder_code, followed, is_installed
 
 if TYPE_CHECKING:
     from simnav.estimator import Estimator

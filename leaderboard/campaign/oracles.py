@@ -6,7 +6,8 @@ from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 from simnav.estimator import Estimator, EstimatorError, find
-from simnav.leaderboard.campaign.request import EstimatorRequest, file_of
+
+from .request import EstimatorRequest, file_of
 
 if TYPE_CHECKING:
     from simnav.scenario import Scenario

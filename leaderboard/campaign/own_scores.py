@@ -6,11 +6,12 @@ import json
 from dataclasses import dataclass
 from pathlib import Path
 
-from simnav.leaderboard.campaign import sources
-from simnav.leaderboard.campaign.session_class import is_session, pickle_class, receive
-from simnav.leaderboard.campaign.sources import folder_code
 from simnav.plugins import is_file_module, load_plugin, place_of
 from simnav.scoring import SCORES, registry
+
+from . import sources
+from .session_class import is_session, pickle_class, receive
+from .sources import folder_code
 
 __all__ = ["OwnScores", "changed_code", "own_scores", "same_code", "scoring_code", "scoring_differs"]
 

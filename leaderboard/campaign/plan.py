@@ -6,9 +6,10 @@ from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
-from simnav.leaderboard.campaign.entrant import Entrant
-from simnav.leaderboard.campaign.worker import Unit
 from simnav.scenario import Scenario
+
+from .entrant import Entrant
+from .worker import Unit
 
 __all__ = ["Plan"]
 

@@ -10,10 +10,6 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from simnav.leaderboard.campaign.fingerprint import recording_digest, simulator_version
-from simnav.leaderboard.campaign.own_scores import same_code, scoring_code, scoring_differs
-from simnav.leaderboard.campaign.seal import PUBLIC, Seal
-from simnav.leaderboard.campaign.single_run import record
 from simnav.leaderboard.results import store, trials
 from simnav.leaderboard.results.catalogued import catalogued_scenario
 from simnav.leaderboard.results.errors import RequestError
@@ -21,6 +17,11 @@ from simnav.leaderboard.results.versions import is_declared
 from simnav.scoring import SCORES, score
 from simnav.simulation.version import SIMULATOR_VERSION
 from simnav.spec import closest
+
+from .fingerprint import recording_digest, simulator_version
+from .own_scores import same_code, scoring_code, scoring_differs
+from .seal import PUBLIC, Seal
+from .single_run import record
 
 if TYPE_CHECKING:
     from simnav.leaderboard.results.result import Result

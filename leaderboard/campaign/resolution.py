@@ -16,8 +16,10 @@ from simnav.estimator.registry import is_own_reference, point_of
 from simnav.leaderboard.campaign.confinement.attempt import describe, prepare
 from simnav.leaderboard.campaign.confinement.isolation import isolate
 from simnav.leaderboard.campaign.confinement.session import Limits
-from simnav.leaderboard.campaign.entrant import Entrant
-from simnav.leaderboard.campaign.fingerprint import (
+from simnav.leaderboard.results.errors import RequestError, mistakes
+
+from .entrant import Entrant
+from .fingerprint import (
     digest,
     estimator_source,
     named_files,
@@ -25,10 +27,9 @@ from simnav.leaderboard.campaign.fingerprint import (
     variant,
     with_library,
 )
-from simnav.leaderboard.campaign.request import EstimatorRequest, comes_with_simnav, file_of
-from simnav.leaderboard.campaign.session_class import is_session, pickle_class
-from simnav.leaderboard.campaign.training_runs import declared_ranges, ranges_of, record_of
-from simnav.leaderboard.results.errors import RequestError, mistakes
+from .request import EstimatorRequest, comes_with_simnav, file_of
+from .session_class import is_session, pickle_class
+from .training_runs import declared_ranges, ranges_of, record_of
 
 __all__ = ["own_files", "resolve", "variant_of"]
 

@@ -21,8 +21,9 @@ from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 
-from simnav.leaderboard.campaign.sources import digest
 from simnav.leaderboard.results.errors import RequestError
+
+from .sources import digest
 
 __all__ = ["PUBLIC", "Seal", "make_key", "mix_public", "read_seal"]
 

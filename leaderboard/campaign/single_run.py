@@ -10,11 +10,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from simnav.kinds import EQUATIONS, KINDS
-from simnav.leaderboard.campaign.request import EstimatorRequest
 from simnav.leaderboard.figures.run_figure import run_figure
 from simnav.leaderboard.results.errors import RequestError, mistakes, printable
 from simnav.leaderboard.results.frame import frame
 from simnav.scoring import SCORES, protection_levels, score, stanford
+
+from .request import EstimatorRequest
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

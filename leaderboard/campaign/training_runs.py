@@ -10,8 +10,9 @@ from simnav.estimator import Estimator
 from simnav.leaderboard.results.errors import RequestError
 
 if TYPE_CHECKING:
-    from simnav.leaderboard.campaign.entrant import Entrant
     from simnav.scenario import Scenario
+
+    from .entrant import Entrant
 
 __all__ = ["declared_ranges", "ranges_of", "record_of", "require_unseen"]
 

@@ -11,8 +11,15 @@ from typing import TYPE_CHECKING, Any
 
 from simnav.estimator import EstimatorError
 from simnav.estimator.registry import registered
-from simnav.leaderboard.campaign.campaign import MEMORY, run_campaign
-from simnav.leaderboard.campaign.comparison import (
+from simnav.leaderboard.results import store
+from simnav.leaderboard.results.catalogued import catalogued_scenario
+from simnav.leaderboard.results.errors import RequestError, sentence
+from simnav.leaderboard.results.provenance import here
+from simnav.leaderboard.results.scratch import scratch
+from simnav.leaderboard.results.versions import declared, is_declared
+
+from .campaign import MEMORY, run_campaign
+from .comparison import (
     CLAIMED,
     CLOSE,
     Comparison,
@@ -23,17 +30,11 @@ from simnav.leaderboard.campaign.comparison import (
     proven,
     too_quick,
 )
-from simnav.leaderboard.campaign.fingerprint import named_files
-from simnav.leaderboard.campaign.recorder import time_limit
-from simnav.leaderboard.campaign.request import EstimatorRequest
-from simnav.leaderboard.campaign.sampling import findable, sample_size
-from simnav.leaderboard.campaign.seal import PUBLIC, Seal
-from simnav.leaderboard.results import store
-from simnav.leaderboard.results.catalogued import catalogued_scenario
-from simnav.leaderboard.results.errors import RequestError, sentence
-from simnav.leaderboard.results.provenance import here
-from simnav.leaderboard.results.scratch import scratch
-from simnav.leaderboard.results.versions import declared, is_declared
+from .fingerprint import named_files
+from .recorder import time_limit
+from .request import EstimatorRequest
+from .sampling import findable, sample_size
+from .seal import PUBLIC, Seal
 
 if TYPE_CHECKING:
     from simnav.leaderboard.results.result import Result

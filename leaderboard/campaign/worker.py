@@ -18,16 +18,17 @@ import numpy as np
 from simnav.estimator.registry import discover_own
 from simnav.leaderboard.campaign.confinement.attempt import Attempt, close_server, prepare, try_estimator
 from simnav.leaderboard.campaign.confinement.session import Limits
-from simnav.leaderboard.campaign.entrant import Entrant
-from simnav.leaderboard.campaign.own_scores import OwnScores
-from simnav.leaderboard.campaign.recorder import NoRecordingError, record_within, time_limit
-from simnav.leaderboard.campaign.seal import PUBLIC, Seal
 from simnav.leaderboard.results import store, trials
 from simnav.leaderboard.results.errors import named, printable
 from simnav.leaderboard.results.provenance import here
 from simnav.leaderboard.results.result import Result
 from simnav.scoring import score, series
 from simnav.simulation.version import SIMULATOR_VERSION
+
+from .entrant import Entrant
+from .own_scores import OwnScores
+from .recorder import NoRecordingError, record_within, time_limit
+from .seal import PUBLIC, Seal
 
 if TYPE_CHECKING:
     from simnav.recording import Recording

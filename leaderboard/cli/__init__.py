@@ -2,6 +2,6 @@
 
 from __future__ import annotations
 
-from simnav.leaderboard.cli.application import app, main
+from .application import app, main
 
 __all__ = ["app", "main"]

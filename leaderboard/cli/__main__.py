@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from simnav.leaderboard.cli.application import main
+from .application import main
 
 if __name__ == "__main__":
     main()

@@ -14,10 +14,11 @@ from typing import Annotated
 
 import typer
 
-from simnav.leaderboard.cli.commands import COMMANDS, GROUPS
-from simnav.leaderboard.cli.console import USER, Output
-from simnav.leaderboard.cli.derived import command
 from simnav.leaderboard.results.errors import shortened
+
+from .commands import COMMANDS, GROUPS
+from .console import USER, Output
+from .derived import command
 
 __all__ = ["app", "main"]
 

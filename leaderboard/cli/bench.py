@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from simnav.leaderboard.cli.commands import BenchCommand
-from simnav.leaderboard.cli.console import FAILED, Output
 from simnav.leaderboard.costing import bench, costs
 from simnav.leaderboard.ranking.costs import cost_table, multiple_table
 from simnav.leaderboard.results.errors import RequestError
+
+from .commands import BenchCommand
+from .console import FAILED, Output
 
 __all__ = ["show"]
 

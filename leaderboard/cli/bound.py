@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from simnav.leaderboard.cli.commands import BoundCommand
-from simnav.leaderboard.cli.console import Output
-from simnav.leaderboard.cli.options import absolute
 from simnav.leaderboard.given import scenario_of
 from simnav.leaderboard.inspection import bound
 from simnav.leaderboard.ranking import tables
 from simnav.leaderboard.results.errors import mistakes
+
+from .commands import BoundCommand
+from .console import Output
+from .options import absolute
 
 if TYPE_CHECKING:
     from rich.table import Table

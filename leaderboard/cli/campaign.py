@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 from shlex import quote
 
-from simnav.leaderboard.cli.console import FAILED, Output
-from simnav.leaderboard.cli.options import campaign_progress
 from simnav.leaderboard.given import scenarios_of
 from simnav.leaderboard.ranking import tables
 from simnav.leaderboard.ranking.confinement import confinement_line
@@ -14,6 +12,9 @@ from simnav.leaderboard.ranking.failures import failure_table
 from simnav.leaderboard.ranking.ranking_table import ranking_tables
 from simnav.leaderboard.requests import CampaignRequest
 from simnav.leaderboard.running import campaign
+
+from .console import FAILED, Output
+from .options import campaign_progress
 
 __all__ = ["show"]
 

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from simnav.leaderboard.cli.commands import CheckCommand
-from simnav.leaderboard.cli.console import FAILED, Output
 from simnav.leaderboard.ranking import tables
 from simnav.leaderboard.running import check
+
+from .commands import CheckCommand
+from .console import FAILED, Output
 
 __all__ = ["show"]
 

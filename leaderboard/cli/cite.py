@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from simnav.leaderboard.cli.commands import CiteCommand
-from simnav.leaderboard.cli.console import Output
 from simnav.leaderboard.inspection import cite
+
+from .commands import CiteCommand
+from .console import Output
 
 __all__ = ["show"]
 

@@ -12,8 +12,9 @@ from typing import Annotated, Any
 import typer
 
 from simnav.leaderboard.calls import UNSET, option_of, options_of
-from simnav.leaderboard.cli.console import session
 from simnav.leaderboard.results.errors import RequestError
+
+from .console import session
 
 __all__ = ["command", "parameters", "requested"]
 

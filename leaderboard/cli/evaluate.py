@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from simnav.leaderboard.cli.console import FAILED, Output
-from simnav.leaderboard.cli.options import campaign_progress
 from simnav.leaderboard.given import scenarios_of
 from simnav.leaderboard.ranking.failures import failure_table
 from simnav.leaderboard.ranking.ranking_table import ranking_tables
@@ -13,6 +11,9 @@ from simnav.leaderboard.ranking.standing import standing_table
 from simnav.leaderboard.requests import EvaluateRequest
 from simnav.leaderboard.results.errors import RequestError
 from simnav.leaderboard.running import evaluate
+
+from .console import FAILED, Output
+from .options import campaign_progress
 
 __all__ = ["show"]
 

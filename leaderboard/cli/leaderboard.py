@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from simnav.leaderboard.cli.console import Output
 from simnav.leaderboard.publishing import site
 from simnav.leaderboard.publishing_requests import SiteRequest
 from simnav.leaderboard.ranking.agreement import LEAST, correlation_table
 from simnav.leaderboard.ranking.confinement import confinement_line
 from simnav.leaderboard.ranking.failures import failure_table
 from simnav.leaderboard.ranking.ranking_table import ranking_tables
+
+from .console import Output
 
 __all__ = ["show"]
 

@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 from simnav import sensors
 from simnav.estimator import describe, names
-from simnav.leaderboard.cli.commands import ListCommand, Topic
-from simnav.leaderboard.cli.console import Output
 from simnav.leaderboard.ranking import tables
 from simnav.scenario.catalogue import headers
+
+from .commands import ListCommand, Topic
+from .console import Output
 
 if TYPE_CHECKING:
     from rich.table import Table

@@ -9,11 +9,12 @@ from shlex import quote
 
 from simnav.estimator import names
 from simnav.leaderboard.campaign.request import kebab as to_kebab
-from simnav.leaderboard.cli.commands import NewEstimatorCommand
-from simnav.leaderboard.cli.console import Output
-from simnav.leaderboard.cli.options import absolute
 from simnav.leaderboard.results.errors import RequestError
 from simnav.scenario.catalogue import headers
+
+from .commands import NewEstimatorCommand
+from .console import Output
+from .options import absolute
 
 __all__ = ["show", "write_estimator"]
 

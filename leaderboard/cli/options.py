@@ -11,7 +11,8 @@ from simnav.leaderboard.results.errors import RequestError
 
 if TYPE_CHECKING:
     from simnav.leaderboard.campaign.campaign import Progress
-    from simnav.leaderboard.cli.console import ProgressBar
+
+    from .console import ProgressBar
 
 __all__ = ["absolute", "campaign_progress", "require_figure"]
 

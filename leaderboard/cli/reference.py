@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import math
 
-from simnav.leaderboard.cli.commands import ReferenceCommand
-from simnav.leaderboard.cli.console import Output
-from simnav.leaderboard.cli.options import absolute
 from simnav.leaderboard.given import scenarios_of
 from simnav.leaderboard.ranking import reference, tables
 from simnav.leaderboard.ranking.reference_measurement import measure, save
 from simnav.leaderboard.results.errors import mistakes
 from simnav.leaderboard.results.store import StoreError
+
+from .commands import ReferenceCommand
+from .console import Output
+from .options import absolute
 
 __all__ = ["show"]
 

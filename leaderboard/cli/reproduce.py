@@ -5,12 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-from simnav.leaderboard.cli.console import Output
-from simnav.leaderboard.cli.options import absolute, campaign_progress
 from simnav.leaderboard.inspection import reproduce
 from simnav.leaderboard.papers import figures, page, report
 from simnav.leaderboard.papers.comparison import RULES
 from simnav.leaderboard.requests import ReproduceRequest
+
+from .console import Output
+from .options import absolute, campaign_progress
 
 __all__ = ["show"]
 

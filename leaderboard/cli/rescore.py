@@ -5,9 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 from shlex import quote
 
-from simnav.leaderboard.cli.console import Output
 from simnav.leaderboard.inspection import rescore
 from simnav.leaderboard.requests import RescoreRequest
+
+from .console import Output
 
 __all__ = ["show"]
 

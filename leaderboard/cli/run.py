@@ -6,9 +6,6 @@ import math
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from simnav.leaderboard.cli.commands import RunCommand
-from simnav.leaderboard.cli.console import FAILED, USER, Output
-from simnav.leaderboard.cli.options import absolute, require_figure
 from simnav.leaderboard.figures.stanford import stanford_diagrams
 from simnav.leaderboard.figures.style import save_as
 from simnav.leaderboard.given import scenario_of
@@ -16,6 +13,10 @@ from simnav.leaderboard.ranking import tables
 from simnav.leaderboard.results.errors import RequestError
 from simnav.leaderboard.running import run
 from simnav.scoring.consistency import ending
+
+from .commands import RunCommand
+from .console import FAILED, USER, Output
+from .options import absolute, require_figure
 
 if TYPE_CHECKING:
     from simnav.leaderboard.campaign.single_run import RunReport

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from simnav.leaderboard.cli.console import Output
-from simnav.leaderboard.cli.options import absolute
 from simnav.leaderboard.inspection import seal
 from simnav.leaderboard.requests import SealRequest
+
+from .console import Output
+from .options import absolute
 
 __all__ = ["show"]
 

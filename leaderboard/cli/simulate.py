@@ -5,14 +5,15 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from simnav.leaderboard.cli.commands import SimulateCommand
-from simnav.leaderboard.cli.console import Output
-from simnav.leaderboard.cli.options import absolute
 from simnav.leaderboard.given import scenario_of
 from simnav.leaderboard.ranking import tables
 from simnav.leaderboard.results.errors import RequestError
 from simnav.leaderboard.results.formats import formats, write
 from simnav.leaderboard.running import record
+
+from .commands import SimulateCommand
+from .console import Output
+from .options import absolute
 
 if TYPE_CHECKING:
     from simnav.recording import AidStream

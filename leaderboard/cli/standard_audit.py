@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from simnav.leaderboard.cli.console import FAILED, Output
 from simnav.leaderboard.publishing import audit_standard
 from simnav.leaderboard.publishing_requests import AuditRequest
+
+from .console import FAILED, Output
 
 __all__ = ["show"]
 

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from simnav.leaderboard.cli.console import FAILED, Output
 from simnav.leaderboard.publishing import check_standard
 from simnav.leaderboard.publishing_requests import CheckStandardRequest
+
+from .console import FAILED, Output
 
 __all__ = ["show"]
 

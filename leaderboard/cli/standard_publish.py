@@ -5,10 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-from simnav.leaderboard.cli.console import Output
 from simnav.leaderboard.publishing import publish_standard
 from simnav.leaderboard.publishing_requests import PublishRequest
 from simnav.leaderboard.standard.readme import BEGIN
+
+from .console import Output
 
 __all__ = ["show"]
 

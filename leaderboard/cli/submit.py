@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from simnav.leaderboard.cli.console import Output
-from simnav.leaderboard.cli.options import campaign_progress
 from simnav.leaderboard.publishing import submit
 from simnav.leaderboard.publishing_requests import SubmitRequest
+
+from .console import Output
+from .options import campaign_progress
 
 __all__ = ["show"]
 

@@ -7,9 +7,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from simnav.leaderboard.cli.commands import SweepCommand
-from simnav.leaderboard.cli.console import FAILED, Output
-from simnav.leaderboard.cli.options import absolute, campaign_progress, require_figure
 from simnav.leaderboard.figures.style import save_as
 from simnav.leaderboard.ranking import tables
 from simnav.leaderboard.ranking.ranking_table import between
@@ -17,6 +14,10 @@ from simnav.leaderboard.results.errors import mistakes
 from simnav.leaderboard.running import sweep
 from simnav.leaderboard.sweep.report import axis_label
 from simnav.scoring import SCORES
+
+from .commands import SweepCommand
+from .console import FAILED, Output
+from .options import absolute, campaign_progress, require_figure
 
 if TYPE_CHECKING:
     from simnav.leaderboard.sweep.report import Sweep

@@ -16,12 +16,13 @@ from simnav.estimators.training.anfis_training import (
     train,
 )
 from simnav.leaderboard.campaign.fingerprint import simulator_version
-from simnav.leaderboard.cli.commands import TrainAnfisCommand
-from simnav.leaderboard.cli.console import Output
-from simnav.leaderboard.cli.options import absolute
 from simnav.leaderboard.figures import training as training_figures
 from simnav.leaderboard.ranking import tables
 from simnav.leaderboard.results.errors import RequestError, mistakes
+
+from .commands import TrainAnfisCommand
+from .console import Output
+from .options import absolute
 
 if TYPE_CHECKING:
     from simnav.estimators.adaptations.anfis_file import Parameters

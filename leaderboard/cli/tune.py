@@ -5,13 +5,14 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from simnav.leaderboard.cli.commands import TuneCommand
-from simnav.leaderboard.cli.console import Output
-from simnav.leaderboard.cli.options import absolute, require_figure
 from simnav.leaderboard.figures.style import save_as
 from simnav.leaderboard.ranking import tables
 from simnav.leaderboard.results.errors import RequestError
 from simnav.leaderboard.running import tune
+
+from .commands import TuneCommand
+from .console import Output
+from .options import absolute, require_figure
 
 if TYPE_CHECKING:
     from rich.table import Table

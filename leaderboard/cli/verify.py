@@ -7,12 +7,13 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from simnav.leaderboard.campaign.comparison import CLOSE
-from simnav.leaderboard.cli.commands import VerifyCommand
-from simnav.leaderboard.cli.console import CLAIMED, FAILED, Output
-from simnav.leaderboard.cli.options import absolute
 from simnav.leaderboard.inspection import verify
 from simnav.leaderboard.publishing import verify_bundle
 from simnav.leaderboard.publishing_requests import VerifyBundleRequest
+
+from .commands import VerifyCommand
+from .console import CLAIMED, FAILED, Output
+from .options import absolute
 
 if TYPE_CHECKING:
     from simnav.leaderboard.submission.verifying import SubmissionReport

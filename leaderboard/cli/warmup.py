@@ -5,9 +5,10 @@ from __future__ import annotations
 import time
 
 from simnav.compiled import kernels
-from simnav.leaderboard.cli.commands import WarmupCommand
-from simnav.leaderboard.cli.console import Output
 from simnav.warmup import warmup
+
+from .commands import WarmupCommand
+from .console import Output
 
 __all__ = ["show"]
 

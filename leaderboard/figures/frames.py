@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from simnav.leaderboard.figures.style import GREY, SHADE, Style, figure
+from .style import GREY, SHADE, Style, figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from simnav.leaderboard.figures.frames import decimal_log_ticks, legend_below, named_lines, time_panels
-from simnav.leaderboard.figures.plots import Array, Curve
-from simnav.leaderboard.figures.style import GREY, INK, PAPER, Style, figure, styled
+from .frames import decimal_log_ticks, legend_below, named_lines, time_panels
+from .plots import Array, Curve
+from .style import GREY, INK, PAPER, Style, figure, styled
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from simnav.leaderboard.figures.appearance import titled
-from simnav.leaderboard.figures.frames import (
+from .appearance import titled
+from .frames import (
     decimal_log_ticks,
     legend_below,
     longest_time,
@@ -23,7 +23,7 @@ from simnav.leaderboard.figures.frames import (
     time_panels,
     time_unit,
 )
-from simnav.leaderboard.figures.style import GREY, INK, PALETTE, PAPER, TRUTH, Style, figure, styled
+from .style import GREY, INK, PALETTE, PAPER, TRUTH, Style, figure, styled
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -10,12 +10,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from simnav.geometry.earth import relative_position
-from simnav.leaderboard.figures.plots import Curve, Track, run_chart
-from simnav.leaderboard.figures.style import Style
 from simnav.scoring import errors
 from simnav.sensors.faults import effect_of
 from simnav.spec import UNITS
 from simnav.types import KINDS, Array
+
+from .plots import Curve, Track, run_chart
+from .style import Style
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from simnav.leaderboard.figures.frames import grid_of_panels
-from simnav.leaderboard.figures.style import GREY, INK, PALETTE, SHADE, styled
+from .frames import grid_of_panels
+from .style import GREY, INK, PALETTE, SHADE, styled
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

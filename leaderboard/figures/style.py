@@ -12,8 +12,9 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from simnav.leaderboard.figures.appearance import INKS, LINES, PALETTE
 from simnav.leaderboard.results.files import write_whole
+
+from .appearance import INKS, LINES, PALETTE
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from simnav.leaderboard.figures.frames import decimal_log_ticks, grid_of_panels, legend_below
-from simnav.leaderboard.figures.plots import Array
-from simnav.leaderboard.figures.style import GREY, Style, figure, styled
+from .frames import decimal_log_ticks, grid_of_panels, legend_below
+from .plots import Array
+from .style import GREY, Style, figure, styled
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

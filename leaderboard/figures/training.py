@@ -10,9 +10,10 @@ import numpy as np
 
 from simnav.estimators.adaptations.anfis_file import FEATURES, Parameters
 from simnav.estimators.training.hybrid_learning import Learned
-from simnav.leaderboard.figures.frames import legend_below
-from simnav.leaderboard.figures.style import GREY, PALETTE, figure, save_as, styled
 from simnav.types import Array
+
+from .frames import legend_below
+from .style import GREY, PALETTE, figure, save_as, styled
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from simnav.leaderboard.papers.declarations import drawings, error_figures, measured
-from simnav.leaderboard.papers.paper import (
+from .declarations import drawings, error_figures, measured
+from .paper import (
     ATTITUDE,
     HORIZONTAL,
     HORIZONTAL_VELOCITY,

@@ -30,8 +30,9 @@ from typing import Literal
 import numpy as np
 from scipy.special import stdtrit
 
-from simnav.leaderboard.papers.paper import Range, Rule
 from simnav.leaderboard.ranking.statistics import Interval
+
+from .paper import Range, Rule
 
 __all__ = [
     "FEWEST",

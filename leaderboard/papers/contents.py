@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from simnav.leaderboard.papers.paper import Paper
+    from .paper import Paper
 
 __all__ = ["Item", "contents"]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
-from simnav.leaderboard.papers.paper import Figure, NotShown, Value
+from .paper import Figure, NotShown, Value
 
 __all__ = ["DRAWING", "PHOTOGRAPH", "drawings", "error_figures", "measured"]
 

@@ -12,16 +12,17 @@ from __future__ import annotations
 from collections.abc import Iterable
 from pathlib import Path
 
-from simnav.leaderboard.papers import PAPERS
-from simnav.leaderboard.papers import paper as papers
-from simnav.leaderboard.papers.contents import contents
-from simnav.leaderboard.papers.figures import Drawn, write_figures
-from simnav.leaderboard.papers.paper import KINDS_OF_ROWS, Figure, Paper
-from simnav.leaderboard.papers.report import Sheet, sheets, single_run_sentence, verdicts
-from simnav.leaderboard.papers.reproduction import Reproduction, fill, find_method, load_results
-from simnav.leaderboard.papers.sequential import LIMIT
-from simnav.leaderboard.papers.stored import provenance, save, shipped_reproduction
 from simnav.leaderboard.results.provenance import Provenance
+
+from . import PAPERS
+from . import paper as papers
+from .contents import contents
+from .figures import Drawn, write_figures
+from .paper import KINDS_OF_ROWS, Figure, Paper
+from .report import Sheet, sheets, single_run_sentence, verdicts
+from .reproduction import Reproduction, fill, find_method, load_results
+from .sequential import LIMIT
+from .stored import provenance, save, shipped_reproduction
 
 __all__ = ["FOLDER", "blocks", "overview", "replaced", "update"]
 

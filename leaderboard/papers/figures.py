@@ -21,23 +21,25 @@ from simnav.leaderboard.figures.panels import Bar, bars, curves_over_time
 from simnav.leaderboard.figures.plots import Band, Curve, error_cdf, error_over_time, trajectory
 from simnav.leaderboard.figures.run_figure import fixes, outage_spans, relative_track, true_track
 from simnav.leaderboard.figures.style import Style, save
-from simnav.leaderboard.papers.comparison import as_gain
-from simnav.leaderboard.papers.measures import value_of
-from simnav.leaderboard.papers.paper import Figure, Gain, Range, Table, Value
-from simnav.leaderboard.papers.ratio_figure import EDGE, ratio_figure, ratios
 from simnav.leaderboard.ranking.runs import Runs
 from simnav.leaderboard.ranking.statistics import Interval, mean, mean_ratio
 from simnav.scoring import errors, smoothed_errors
 from simnav.types import KINDS, Array
+
+from .comparison import as_gain
+from .measures import value_of
+from .paper import Figure, Gain, Range, Table, Value
+from .ratio_figure import EDGE, ratio_figure, ratios
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
     import matplotlib.figure
 
-    from simnav.leaderboard.papers.findings import Findings
     from simnav.recording import Recording
     from simnav.trial import Trial
+
+    from .findings import Findings
 
 __all__ = ["ERRORS", "Drawn", "draw", "write_figures"]
 

@@ -6,9 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from simnav.leaderboard.papers.comparison import Single
-from simnav.leaderboard.papers.paper import Paper, Row
 from simnav.leaderboard.ranking.statistics import Interval
+
+from .comparison import Single
+from .paper import Paper, Row
 
 if TYPE_CHECKING:
     from simnav.leaderboard.campaign.request import EstimatorRequest

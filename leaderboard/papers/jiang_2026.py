@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
-from simnav.leaderboard.papers.declarations import drawings, error_figures, measured
-from simnav.leaderboard.papers.paper import (
+from simnav.scenario import Scenario
+from simnav.sensors.faults import NoiseStep
+
+from .declarations import drawings, error_figures, measured
+from .paper import (
     HORIZONTAL,
     HORIZONTAL_VELOCITY,
     Figure,
@@ -15,8 +18,6 @@ from simnav.leaderboard.papers.paper import (
     Table,
     Value,
 )
-from simnav.scenario import Scenario
-from simnav.sensors.faults import NoiseStep
 
 __all__ = ["PAPER"]
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from simnav.leaderboard.papers.declarations import PHOTOGRAPH, drawings, measured
-from simnav.leaderboard.papers.paper import POSITION, Figure, Gain, Method, NotShown, Paper, Row, Table, Value
+from .declarations import PHOTOGRAPH, drawings, measured
+from .paper import POSITION, Figure, Gain, Method, NotShown, Paper, Row, Table, Value
 
 __all__ = ["PAPER"]
 

@@ -12,16 +12,17 @@ from typing import TYPE_CHECKING
 
 from pydantic import TypeAdapter
 
-from simnav.leaderboard.papers import PAPERS
-from simnav.leaderboard.papers.comparison import RULES
-from simnav.leaderboard.papers.report import Sheet, Whereabouts, sheets, summary, whereabouts
 from simnav.leaderboard.results.files import write_whole
 from simnav.leaderboard.site.content import SiteFacts
 from simnav.leaderboard.site.pages import STATIC, TEMPLATES, environment
 
+from . import PAPERS
+from .comparison import RULES
+from .report import Sheet, Whereabouts, sheets, summary, whereabouts
+
 if TYPE_CHECKING:
-    from simnav.leaderboard.papers.figures import Drawn
-    from simnav.leaderboard.papers.reproduction import Reproduction
+    from .figures import Drawn
+    from .reproduction import Reproduction
 
 __all__ = ["PaperPage", "pages_in", "write"]
 
@@ -112,7 +113,7 @@ class PaperPage:
         (folder / place).mkdir(parents=True, exist_ok=True)
         document = self.document
         if self.stored is not None:
-            from simnav.leaderboard.papers.figures import write_figures
+            from .figures import write_figures
 
             drawn = write_figures(self.stored, folder / place, scores_only=True)
             document = _document(self.stored, drawn)
@@ -167,7 +168,7 @@ def _written(place: Path, key: str) -> PaperPage | None:
 
 def _stored(folder: Path, key: str) -> PaperPage | None:
     """The page from the stored results; None if there are none."""
-    from simnav.leaderboard.papers import paper, stored
+    from . import paper, stored
 
     try:
         found = stored.shipped_reproduction(paper.paper_of(key))

@@ -8,9 +8,10 @@ from dataclasses import dataclass, field, replace
 from importlib import import_module
 from typing import Literal
 
-from simnav.leaderboard.papers import key_of
 from simnav.scenario import Scenario
 from simnav.scenario import load as load_scenario
+
+from . import key_of
 
 __all__ = [
     "ATTITUDE",

@@ -13,16 +13,17 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from simnav.leaderboard.figures.style import GREY, INK, PALETTE, PAPER, SHADE, figure, styled
-from simnav.leaderboard.papers.comparison import GAIN, TOLERANCE
-from simnav.leaderboard.papers.measures import measure
-from simnav.leaderboard.papers.paper import Gain, kind_of
 from simnav.leaderboard.ranking import tables
+
+from .comparison import GAIN, TOLERANCE
+from .measures import measure
+from .paper import Gain, kind_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from simnav.leaderboard.papers.findings import Finding
+    from .findings import Finding
 
 __all__ = ["EDGE", "Ratio", "ratio_figure", "ratios"]
 

@@ -9,18 +9,19 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from simnav.leaderboard.papers.comparison import as_gain
-from simnav.leaderboard.papers.contents import contents
-from simnav.leaderboard.papers.measures import measure
-from simnav.leaderboard.papers.paper import KINDS_OF_ROWS, Gain, Range
 from simnav.leaderboard.ranking import tables
 from simnav.leaderboard.results.files import write_whole
+
+from .comparison import as_gain
+from .contents import contents
+from .measures import measure
+from .paper import KINDS_OF_ROWS, Gain, Range
 
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from simnav.leaderboard.papers.figures import Drawn
-    from simnav.leaderboard.papers.reproduction import Finding, Reproduction
+    from .figures import Drawn
+    from .reproduction import Finding, Reproduction
 
 __all__ = [
     "Sheet",

@@ -10,14 +10,15 @@ from typing import TYPE_CHECKING, Any
 
 from simnav.leaderboard.campaign.campaign import run_campaign
 from simnav.leaderboard.campaign.request import EstimatorRequest, split_estimators
-from simnav.leaderboard.papers.comparison import Single, Verdict, as_gain, judge, judge_gain, judge_single, single_runs
-from simnav.leaderboard.papers.figures import draw
-from simnav.leaderboard.papers.findings import Finding, Findings
-from simnav.leaderboard.papers.measures import measure, value_of
-from simnav.leaderboard.papers.paper import Gain, Method, Paper, Row, kind_of
 from simnav.leaderboard.ranking.statistics import mean, mean_ratio
 from simnav.leaderboard.results.errors import RequestError
 from simnav.leaderboard.results.frame import frame
+
+from .comparison import Single, Verdict, as_gain, judge, judge_gain, judge_single, single_runs
+from .figures import draw
+from .findings import Finding, Findings
+from .measures import measure, value_of
+from .paper import Gain, Method, Paper, Row, kind_of
 
 if TYPE_CHECKING:
     import matplotlib.figure

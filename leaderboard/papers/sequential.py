@@ -17,8 +17,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from simnav.leaderboard.papers.paper import Gain, Paper
-from simnav.leaderboard.papers.reproduction import Reproduction, fill, find_method, load_results, run
+from .paper import Gain, Paper
+from .reproduction import Reproduction, fill, find_method, load_results, run
 
 if TYPE_CHECKING:
     from simnav.leaderboard.campaign.campaign import Progress

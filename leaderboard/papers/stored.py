@@ -16,11 +16,12 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from simnav.leaderboard.papers.measures import scores_of
-from simnav.leaderboard.papers.paper import Gain, Paper
-from simnav.leaderboard.papers.reproduction import Reproduction, fill, find_method
 from simnav.leaderboard.results.provenance import Provenance, distinct
 from simnav.leaderboard.results.result import Result
+
+from .measures import scores_of
+from .paper import Gain, Paper
+from .reproduction import Reproduction, fill, find_method
 
 if TYPE_CHECKING:
     from simnav.leaderboard.campaign.request import EstimatorRequest

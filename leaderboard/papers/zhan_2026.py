@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from simnav.leaderboard.papers.declarations import DRAWING, PHOTOGRAPH, error_figures, measured
-from simnav.leaderboard.papers.paper import (
+from simnav.scenario import Scenario
+
+from .declarations import DRAWING, PHOTOGRAPH, error_figures, measured
+from .paper import (
     ATTITUDE,
     POSITION,
     VELOCITY,
@@ -16,7 +18,6 @@ from simnav.leaderboard.papers.paper import (
     Table,
     Value,
 )
-from simnav.scenario import Scenario
 
 __all__ = ["PAPER"]
 

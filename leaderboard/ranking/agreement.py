@@ -15,8 +15,8 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
-from simnav.leaderboard.ranking import tables
-from simnav.leaderboard.ranking.board import Ranking, TrackRanking
+from . import tables
+from .board import Ranking, TrackRanking
 
 if TYPE_CHECKING:
     from rich.table import Table

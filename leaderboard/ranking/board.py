@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-from simnav.leaderboard.ranking.ranking_figure import ranking_figure
-from simnav.leaderboard.ranking.rows import (
+from .ranking_figure import ranking_figure
+from .rows import (
     FIRM_REFERENCE,
     Consistency,
     Reference,
@@ -29,8 +29,8 @@ from simnav.leaderboard.ranking.rows import (
     TrackRow,
     TrackTable,
 )
-from simnav.leaderboard.ranking.stored_costs import cost_of
-from simnav.leaderboard.ranking.summary import sentence
+from .stored_costs import cost_of
+from .summary import sentence
 
 __all__ = [
     "FIRM_REFERENCE",

@@ -10,12 +10,13 @@ from functools import partial
 
 from simnav.estimator import Estimator, UnsuitableScenario, lacking, make
 from simnav.leaderboard.campaign.request import EstimatorRequest
-from simnav.leaderboard.ranking.plain_row import plain_rows
-from simnav.leaderboard.ranking.stored_costs import CostMultiple
-from simnav.leaderboard.ranking.tracks import SMOOTHED
 from simnav.recording import Recording
 from simnav.testing.cost import started
 from simnav.testing.paired_time import multiple
+
+from .plain_row import plain_rows
+from .stored_costs import CostMultiple
+from .tracks import SMOOTHED
 
 __all__ = ["SCENARIOS", "Unmeasured", "multiples_of"]
 

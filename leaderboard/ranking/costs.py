@@ -10,12 +10,13 @@ from typing import TYPE_CHECKING, Any
 from simnav.leaderboard.campaign.request import EstimatorRequest
 from simnav.leaderboard.figures.panels import Bar, bars
 from simnav.leaderboard.figures.style import Style
-from simnav.leaderboard.ranking import tables
-from simnav.leaderboard.ranking.cost_measurement import Unmeasured
-from simnav.leaderboard.ranking.stored_costs import CostMultiple
 from simnav.leaderboard.results.errors import mistakes
 from simnav.leaderboard.results.frame import frame
 from simnav.testing.cost import Cost, measure
+
+from . import tables
+from .cost_measurement import Unmeasured
+from .stored_costs import CostMultiple
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

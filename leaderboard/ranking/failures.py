@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from simnav.leaderboard.ranking import tables
+from . import tables
 
 if TYPE_CHECKING:
     from rich.table import Table

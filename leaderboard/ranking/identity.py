@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING
 
 from simnav.estimator import EstimatorError
 from simnav.estimator.registry import registered
-from simnav.leaderboard.ranking.tracks import SMOOTHED
+
+from .tracks import SMOOTHED
 
 if TYPE_CHECKING:
-    from simnav.leaderboard.ranking.runs import Runs
+    from .runs import Runs
 
 __all__ = ["real_time_twin"]
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Container, Mapping
 
-from simnav.leaderboard.ranking.tracks import SMOOTHED
+from .tracks import SMOOTHED
 
 __all__ = ["PLAIN", "plain_row", "plain_rows"]
 

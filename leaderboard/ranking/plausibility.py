@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 if TYPE_CHECKING:
-    from simnav.leaderboard.ranking.board import Reference
+    from .board import Reference
 
 __all__ = ["FLOORS", "LEAST_ERROR", "MARGIN", "beats", "below_floor", "too_good"]
 

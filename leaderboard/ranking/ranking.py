@@ -35,7 +35,11 @@ from numpy.typing import NDArray
 from simnav.estimator import EstimatorError
 from simnav.estimator.registry import registered
 from simnav.leaderboard.campaign.request import comes_with_simnav
-from simnav.leaderboard.ranking.board import (
+from simnav.leaderboard.results.errors import RequestError
+from simnav.scoring import SCORES, badge
+from simnav.spec import closest
+
+from .board import (
     Consistency,
     Ranking,
     Reference,
@@ -46,10 +50,10 @@ from simnav.leaderboard.ranking.board import (
     TrackRanking,
     TrackRow,
 )
-from simnav.leaderboard.ranking.evidence import lacking
-from simnav.leaderboard.ranking.identity import real_time_twin
-from simnav.leaderboard.ranking.learning import learned_by
-from simnav.leaderboard.ranking.remarks import (
+from .evidence import lacking
+from .identity import real_time_twin
+from .learning import learned_by
+from .remarks import (
     learned_remarks,
     recorded_remarks,
     reference_remarks,
@@ -57,9 +61,9 @@ from simnav.leaderboard.ranking.remarks import (
     request_remarks,
     seed_remarks,
 )
-from simnav.leaderboard.ranking.runs import Runs, group
-from simnav.leaderboard.ranking.scenario_runs import Cell, ScenarioRuns
-from simnav.leaderboard.ranking.statistics import (
+from .runs import Runs, group
+from .scenario_runs import Cell, ScenarioRuns
+from .statistics import (
     Gain,
     Interval,
     Separation,
@@ -72,11 +76,8 @@ from simnav.leaderboard.ranking.statistics import (
     unorderable,
     weighted_quantile,
 )
-from simnav.leaderboard.ranking.tracks import Track, catalogued, tracks_of
-from simnav.leaderboard.ranking.variants import families, surplus
-from simnav.leaderboard.results.errors import RequestError
-from simnav.scoring import SCORES, badge
-from simnav.spec import closest
+from .tracks import Track, catalogued, tracks_of
+from .variants import families, surplus
 
 if TYPE_CHECKING:
     from simnav.leaderboard.results.result import Result

@@ -11,7 +11,7 @@ from simnav.leaderboard.figures.style import Style
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from simnav.leaderboard.ranking.rows import TrackRow, TrackTable
+    from .rows import TrackRow, TrackTable
 
 __all__ = ["ranking_figure"]
 

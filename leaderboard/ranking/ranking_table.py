@@ -6,14 +6,15 @@ import math
 from collections.abc import Callable, Collection
 from typing import TYPE_CHECKING, Any
 
-from simnav.leaderboard.ranking import tables
-from simnav.leaderboard.ranking.statistics import FAILURE
-from simnav.leaderboard.ranking.stored_costs import NOT_MEASURED, cost_of, not_measured
-from simnav.leaderboard.ranking.summary import sentence
 from simnav.scoring import SCORES
 
+from . import tables
+from .statistics import FAILURE
+from .stored_costs import NOT_MEASURED, cost_of, not_measured
+from .summary import sentence
+
 if TYPE_CHECKING:
-    from simnav.leaderboard.ranking.board import Consistency, Ranking, Row, TrackRanking
+    from .board import Consistency, Ranking, Row, TrackRanking
 
 __all__ = [
     "between",

@@ -18,11 +18,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from simnav.leaderboard.ranking.board import Reference
 from simnav.leaderboard.results.errors import RequestError
 
+from .board import Reference
+
 if TYPE_CHECKING:
-    from simnav.leaderboard.ranking.runs import Runs
+    from .runs import Runs
 
 __all__ = ["FILE", "FORMAT", "ORACLES", "PLAIN", "entry", "figure", "reference_of", "stored"]
 

@@ -17,10 +17,11 @@ from typing import TYPE_CHECKING, Any
 
 from simnav.leaderboard.campaign.campaign import run_campaign
 from simnav.leaderboard.campaign.request import requests
-from simnav.leaderboard.ranking import reference
-from simnav.leaderboard.ranking.board import Reference
-from simnav.leaderboard.ranking.oracle_runs import OracleRuns
 from simnav.leaderboard.results import store
+
+from . import reference
+from .board import Reference
+from .oracle_runs import OracleRuns
 
 if TYPE_CHECKING:
     from simnav.scenario import Scenario

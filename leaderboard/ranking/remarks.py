@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from typing import TYPE_CHECKING
 
-from simnav.leaderboard.ranking.board import FIRM_REFERENCE
-from simnav.leaderboard.ranking.statistics import FEWEST, Separation, smallest_p_value
+from .board import FIRM_REFERENCE
+from .statistics import FEWEST, Separation, smallest_p_value
 
 if TYPE_CHECKING:
-    from simnav.leaderboard.ranking.board import Reference, Row
+    from .board import Reference, Row
 
 __all__ = ["learned_remarks", "recorded_remarks", "reference_remarks", "remarks", "request_remarks", "seed_remarks"]
 

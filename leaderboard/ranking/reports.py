@@ -7,14 +7,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from simnav.leaderboard.ranking.board import Ranking
-from simnav.leaderboard.ranking.confinement import confined
-from simnav.leaderboard.ranking.failures import failures
-from simnav.leaderboard.ranking.standing import Standing
 from simnav.leaderboard.results.export import table
 from simnav.leaderboard.results.frame import frame
 from simnav.leaderboard.results.plain import as_json
 from simnav.leaderboard.results.result import Result
+
+from .board import Ranking
+from .confinement import confined
+from .failures import failures
+from .standing import Standing
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -7,8 +7,9 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Literal
 
 if TYPE_CHECKING:
-    from simnav.leaderboard.ranking.statistics import Gain
     from simnav.scoring.consistency import Badge
+
+    from .statistics import Gain
 
 __all__ = [
     "FIRM_REFERENCE",

@@ -12,9 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simnav.leaderboard.figures.plots import Array, Band
-from simnav.leaderboard.ranking.statistics import Interval, median
 from simnav.leaderboard.results.stored_scores import score_matrix
 from simnav.scoring import SCORES
+
+from .statistics import Interval, median
 
 if TYPE_CHECKING:
     from simnav.leaderboard.results.result import Result, Series

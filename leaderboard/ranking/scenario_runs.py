@@ -20,15 +20,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from simnav.leaderboard.ranking.board import Reference
-from simnav.leaderboard.ranking.evidence import common_seeds, notes_by_seed
-from simnav.leaderboard.ranking.plain_row import PLAIN as PLAIN_ROWS
-from simnav.leaderboard.ranking.plain_row import plain_row
-from simnav.leaderboard.ranking.plausibility import beats, below_floor, too_good
-from simnav.leaderboard.ranking.reference import ORACLES, PLAIN, reference_of
-from simnav.leaderboard.ranking.runs import Runs
-from simnav.leaderboard.ranking.statistics import FAILURE
-from simnav.leaderboard.ranking.tracks import RECORDED, SMOOTHED, Track
+from .board import Reference
+from .evidence import common_seeds, notes_by_seed
+from .plain_row import PLAIN as PLAIN_ROWS
+from .plain_row import plain_row
+from .plausibility import beats, below_floor, too_good
+from .reference import ORACLES, PLAIN, reference_of
+from .runs import Runs
+from .statistics import FAILURE
+from .tracks import RECORDED, SMOOTHED, Track
 
 __all__ = ["CAP", "Cell", "ScenarioRuns"]
 

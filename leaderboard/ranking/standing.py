@@ -8,11 +8,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from simnav.leaderboard.ranking import tables
-from simnav.leaderboard.ranking.statistics import compare
+from . import tables
+from .statistics import compare
 
 if TYPE_CHECKING:
-    from simnav.leaderboard.ranking.runs import Runs
+    from .runs import Runs
 
 __all__ = ["Standing", "StandingRow", "standing", "standing_table"]
 

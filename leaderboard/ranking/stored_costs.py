@@ -16,10 +16,11 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from simnav.leaderboard.ranking.plain_row import plain_rows
 from simnav.leaderboard.results.errors import RequestError, sentence
 from simnav.leaderboard.results.files import write_whole
 from simnav.leaderboard.results.provenance import Provenance, here
+
+from .plain_row import plain_rows
 
 __all__ = ["FILE", "NOT_MEASURED", "CostMultiple", "Costs", "cost_of", "not_measured", "read", "save", "stored"]
 

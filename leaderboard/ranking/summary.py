@@ -6,10 +6,10 @@ import math
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
-from simnav.leaderboard.ranking import tables
+from . import tables
 
 if TYPE_CHECKING:
-    from simnav.leaderboard.ranking.rows import Row, TrackTable
+    from .rows import Row, TrackTable
 
 __all__ = ["best_rows", "gain_text", "less", "sentence", "spread"]
 

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 from simnav.estimator.registry import discover_own, is_own, is_own_reference, snapshot
 
 if TYPE_CHECKING:
-    from simnav.leaderboard.results.result import Result
+    from .result import Result
 
 __all__ = ["LONGEST_LABEL", "STATUSES", "admitted", "fault_of", "is_scenario_id", "label_fault", "look",
            "lookalikes"]  # fmt: skip

@@ -6,9 +6,10 @@ which file that is. A scenario that is not in the catalogue is given by the user
 
 from __future__ import annotations
 
-from simnav.leaderboard.results.admission import is_scenario_id
-from simnav.leaderboard.results.errors import RequestError, mistakes
 from simnav.scenario import Scenario, headers, load
+
+from .admission import is_scenario_id
+from .errors import RequestError, mistakes
 
 __all__ = ["catalogued_scenario"]
 

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from datetime import UTC, datetime
 
-from simnav.leaderboard.results.provenance import BENCHMARK, Provenance, benchmark_of, distinct
+from .provenance import BENCHMARK, Provenance, benchmark_of, distinct
 
 __all__ = ["AUTHORS", "TITLE", "Citation", "citation"]
 

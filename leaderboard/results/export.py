@@ -20,17 +20,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from simnav.leaderboard.results.files import FORMULA, complete_file
-from simnav.leaderboard.results.formats import writes
-from simnav.leaderboard.results.plain import as_json
-from simnav.leaderboard.results.provenance import Provenance, benchmark_of, distinct
-from simnav.leaderboard.results.stored_scores import score_matrix
 from simnav.scoring import SCORES
+
+from .files import FORMULA, complete_file
+from .formats import writes
+from .plain import as_json
+from .provenance import Provenance, benchmark_of, distinct
+from .stored_scores import score_matrix
 
 if TYPE_CHECKING:
     import pyarrow as pa
 
-    from simnav.leaderboard.results.result import Result
+    from .result import Result
 
 __all__ = ["MOST_IN_JSON", "SCHEMA_VERSION", "Document", "table", "write_csv", "write_json", "write_parquet"]
 

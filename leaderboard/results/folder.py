@@ -25,10 +25,10 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO, TypeVar
 
-from simnav.leaderboard.results.errors import StoreError
-from simnav.leaderboard.results.former_names import under_present_labels
-from simnav.leaderboard.results.provenance import BENCHMARK
-from simnav.leaderboard.results.result import FORMAT, READABLE, batches
+from .errors import StoreError
+from .former_names import under_present_labels
+from .provenance import BENCHMARK
+from .result import FORMAT, READABLE, batches
 
 if TYPE_CHECKING:
     import pyarrow as pa

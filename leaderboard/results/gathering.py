@@ -15,13 +15,13 @@ from collections.abc import Collection, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from simnav.leaderboard.results import requested, store
-from simnav.leaderboard.results.admission import is_scenario_id, label_fault, lookalikes
-from simnav.leaderboard.results.errors import StoreError
-from simnav.leaderboard.results.folder import COMPACTED, LOOSE, TRIALS, DamagedError, tables_of
-from simnav.leaderboard.results.provenance import BENCHMARK
-from simnav.leaderboard.results.result import Result
-from simnav.leaderboard.results.versions import is_declared
+from . import requested, store
+from .admission import is_scenario_id, label_fault, lookalikes
+from .errors import StoreError
+from .folder import COMPACTED, LOOSE, TRIALS, DamagedError, tables_of
+from .provenance import BENCHMARK
+from .result import Result
+from .versions import is_declared
 
 __all__ = ["contradiction", "gather"]
 

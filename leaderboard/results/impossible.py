@@ -18,7 +18,7 @@ from packaging.utils import canonicalize_name
 from packaging.version import InvalidVersion, Version
 
 if TYPE_CHECKING:
-    from simnav.leaderboard.results.provenance import Provenance
+    from .provenance import Provenance
 
 __all__ = ["CONFINEMENTS", "impossible"]
 

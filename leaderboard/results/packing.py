@@ -17,9 +17,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from simnav.leaderboard.results import store
-from simnav.leaderboard.results.result import Result, to_table, write_tables
-from simnav.leaderboard.results.scratch import scratch
+from . import store
+from .result import Result, to_table, write_tables
+from .scratch import scratch
 
 if TYPE_CHECKING:
     import pyarrow as pa

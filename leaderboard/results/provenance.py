@@ -23,7 +23,7 @@ from typing import Any
 
 from llvmlite.binding import get_host_cpu_name
 
-from simnav.leaderboard.results.errors import RequestError
+from .errors import RequestError
 
 __all__ = ["BENCHMARK", "Provenance", "benchmark_of", "distinct", "here", "is_commit", "numerics"]
 

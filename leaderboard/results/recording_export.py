@@ -15,10 +15,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from simnav.leaderboard.results.files import write_whole
-from simnav.leaderboard.results.formats import writes
 from simnav.spec import UNITS
 from simnav.types import KINDS, Array
+
+from .files import write_whole
+from .formats import writes
 
 if TYPE_CHECKING:
     from simnav.recording import Recording

@@ -11,7 +11,7 @@ import os
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
-from simnav.leaderboard.results.files import write_whole
+from .files import write_whole
 
 __all__ = ["FILE", "add", "copy", "read", "together"]
 

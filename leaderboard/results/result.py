@@ -13,13 +13,14 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from simnav.leaderboard.results.ahead import made_ahead
-from simnav.leaderboard.results.errors import printable
-from simnav.leaderboard.results.former_names import present_label, present_parameters
-from simnav.leaderboard.results.plain import table_of
-from simnav.leaderboard.results.provenance import Provenance
-from simnav.leaderboard.results.stored_scores import StoredScores
 from simnav.scoring.consistency import ending
+
+from .ahead import made_ahead
+from .errors import printable
+from .former_names import present_label, present_parameters
+from .plain import table_of
+from .provenance import Provenance
+from .stored_scores import StoredScores
 
 if TYPE_CHECKING:
     import pyarrow as pa

@@ -22,9 +22,9 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from simnav.leaderboard.results.admission import admitted
-from simnav.leaderboard.results.errors import StoreError
-from simnav.leaderboard.results.folder import (
+from .admission import admitted
+from .errors import StoreError
+from .folder import (
     COMPACTED,
     FILES,
     LOOSE,
@@ -47,9 +47,9 @@ from simnav.leaderboard.results.folder import (
     steadily,
     tables_of,
 )
-from simnav.leaderboard.results.provenance import Provenance
-from simnav.leaderboard.results.result import BATCH, FORMAT, Result, listed, rows, schema, to_table, write_tables
-from simnav.leaderboard.results.stored_series import StoredSeries
+from .provenance import Provenance
+from .result import BATCH, FORMAT, Result, listed, rows, schema, to_table, write_tables
+from .stored_series import StoredSeries
 
 if TYPE_CHECKING:
     import pyarrow as pa

@@ -14,9 +14,9 @@ from functools import lru_cache
 from pathlib import Path
 from types import MappingProxyType
 
-from simnav.leaderboard.results.errors import StoreError
-from simnav.leaderboard.results.folder import StoreWarning, set_aside
-from simnav.leaderboard.results.result import Series, SeriesColumn
+from .errors import StoreError
+from .folder import StoreWarning, set_aside
+from .result import Series, SeriesColumn
 
 __all__ = ["LostSeriesError", "StoredSeries", "read_ahead"]
 

@@ -16,10 +16,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from simnav.leaderboard.results.errors import StoreError
-from simnav.leaderboard.results.folder import atomic
 from simnav.trial import Trial
 from simnav.types import Array, NavigationStates
+
+from .errors import StoreError
+from .folder import atomic
 
 if TYPE_CHECKING:
     from simnav.recording import Recording

@@ -18,8 +18,8 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import Any
 
-from simnav.leaderboard.results.provenance import BENCHMARK
-from simnav.leaderboard.results.result import Result
+from .provenance import BENCHMARK
+from .result import Result
 
 __all__ = ["declared", "declared_recording", "declared_variant", "is_declared"]
 

@@ -19,10 +19,11 @@ import numpy as np
 from simnav.leaderboard.campaign.fingerprint import recording_digest
 from simnav.leaderboard.campaign.sources import code_of, digest
 from simnav.leaderboard.figures.run_figure import fixes, innovation_unit, true_track
-from simnav.leaderboard.site.charts import NO_BOUND, columns
-from simnav.leaderboard.site.facts import EVENT, catalogued, datasheets, events
-from simnav.leaderboard.site.library import cache, write_cache
-from simnav.leaderboard.site.rounding import short, spaced
+
+from .charts import NO_BOUND, columns
+from .facts import EVENT, catalogued, datasheets, events
+from .library import cache, write_cache
+from .rounding import short, spaced
 
 if TYPE_CHECKING:
     from simnav.recording import Recording

@@ -9,7 +9,8 @@ from typing import Protocol
 
 from simnav.leaderboard.results.citation import Citation
 from simnav.leaderboard.results.provenance import Provenance
-from simnav.leaderboard.site.facts import EstimatorFacts
+
+from .facts import EstimatorFacts
 
 __all__ = ["PLAIN", "EstimatorEntry", "ExtraPage", "Fact", "ScenarioEntry", "SiteFacts"]
 

@@ -16,9 +16,10 @@ from numpy.typing import NDArray
 
 from simnav.leaderboard.ranking.runs import at_times, has_series
 from simnav.leaderboard.results.stored_series import read_ahead
-from simnav.leaderboard.site.rounding import shorts, spaced
 from simnav.scoring.integrity import RISK, Stanford
 from simnav.scoring.plot_series import DIAGNOSTICS
+
+from .rounding import shorts, spaced
 
 if TYPE_CHECKING:
     from simnav.leaderboard.results.result import Result, Series

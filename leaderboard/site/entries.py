@@ -8,8 +8,9 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from simnav.leaderboard.ranking import tables
-from simnav.leaderboard.site.content import EstimatorEntry, Fact, ScenarioEntry
-from simnav.leaderboard.site.facts import catalogued, estimator_facts, toml_of
+
+from .content import EstimatorEntry, Fact, ScenarioEntry
+from .facts import catalogued, estimator_facts, toml_of
 
 if TYPE_CHECKING:
     from simnav.leaderboard.ranking.board import Ranking

@@ -12,19 +12,21 @@ import numpy as np
 from simnav.leaderboard.ranking import tables
 from simnav.leaderboard.ranking.stored_costs import NOT_MEASURED, cost_of
 from simnav.leaderboard.results.stored_scores import score_matrix
-from simnav.leaderboard.site import charts, curves
-from simnav.leaderboard.site.background import Background
-from simnav.leaderboard.site.columns import SCORES_SHOWN, Column, column_dicts
-from simnav.leaderboard.site.content import PLAIN, Fact
-from simnav.leaderboard.site.losses import losses
-from simnav.leaderboard.site.rounding import short, shorts
-from simnav.leaderboard.site.scenario_page import inside_chart, track_from
+
+from . import charts, curves
+from .background import Background
+from .columns import SCORES_SHOWN, Column, column_dicts
+from .content import PLAIN, Fact
+from .losses import losses
+from .rounding import short, shorts
+from .scenario_page import inside_chart, track_from
 
 if TYPE_CHECKING:
     from simnav.leaderboard.ranking.board import Ranking, ScenarioRanking, ScenarioRow
     from simnav.leaderboard.ranking.runs import Runs
     from simnav.leaderboard.results.result import Result
-    from simnav.leaderboard.site.content import EstimatorEntry, ScenarioEntry
+
+    from .content import EstimatorEntry, ScenarioEntry
 
 __all__ = ["errors_data", "estimator_data", "facts_of", "runs_data", "worst_runs"]
 

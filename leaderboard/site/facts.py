@@ -16,8 +16,9 @@ from simnav.estimator import describe
 from simnav.estimator.registry import registered
 from simnav.leaderboard.ranking import tables
 from simnav.leaderboard.results.catalogued import catalogued_scenario
-from simnav.leaderboard.site.charts import columns
 from simnav.scenario.catalogue import headers
+
+from .charts import columns
 
 if TYPE_CHECKING:
     from simnav.recording import Recording

@@ -9,13 +9,15 @@ from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
 from simnav.leaderboard.ranking.statistics import FAILURE
-from simnav.leaderboard.site.columns import Column, column_dicts
-from simnav.leaderboard.site.facts import catalogued
-from simnav.leaderboard.site.rounding import short
+
+from .columns import Column, column_dicts
+from .facts import catalogued
+from .rounding import short
 
 if TYPE_CHECKING:
     from simnav.leaderboard.ranking.board import Ranking
-    from simnav.leaderboard.site.content import ScenarioEntry
+
+    from .content import ScenarioEntry
 
 __all__ = ["LOSS", "faults_of", "losses"]
 

@@ -9,14 +9,16 @@ from typing import TYPE_CHECKING, Any
 from simnav.leaderboard.ranking.confinement import confined
 from simnav.leaderboard.ranking.ranking_table import score_caption, score_title
 from simnav.leaderboard.ranking.stored_costs import NOT_MEASURED, CostMultiple, cost_of, not_measured
-from simnav.leaderboard.site.charts import accuracy_and_cost, columns, detection, spread, spread_data
-from simnav.leaderboard.site.columns import Column, column_dicts
-from simnav.leaderboard.site.rounding import short
+
+from .charts import accuracy_and_cost, columns, detection, spread, spread_data
+from .columns import Column, column_dicts
+from .rounding import short
 
 if TYPE_CHECKING:
     from simnav.leaderboard.ranking.board import Ranking, Row, TrackRanking, TrackRow
     from simnav.leaderboard.ranking.runs import Runs
-    from simnav.leaderboard.site.content import EstimatorEntry, ScenarioEntry
+
+    from .content import EstimatorEntry, ScenarioEntry
 
 __all__ = ["BOARD_COLUMNS", "bar_scale", "board_columns", "board_row", "overview"]
 

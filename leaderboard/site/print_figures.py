@@ -8,8 +8,9 @@ from typing import Any
 
 from simnav.leaderboard.figures.appearance import DASHES, INKS, PALETTE
 from simnav.leaderboard.results.files import write_whole
-from simnav.leaderboard.site.charts import Chart, Spec
-from simnav.leaderboard.site.library import VEGA_LITE
+
+from .charts import Chart, Spec
+from .library import VEGA_LITE
 
 __all__ = ["filled", "write_figure"]
 

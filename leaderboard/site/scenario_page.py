@@ -11,22 +11,24 @@ from simnav.leaderboard.ranking import tables
 from simnav.leaderboard.ranking.evidence import notes_by_seed
 from simnav.leaderboard.ranking.stored_costs import cost_of
 from simnav.leaderboard.results.result import Result
-from simnav.leaderboard.site import charts, curves
-from simnav.leaderboard.site.background import Background, faulty_points, fix_points, truth_of
-from simnav.leaderboard.site.charts import NO_BOUND, NO_FAULTS, Chart, spread_data, timed
-from simnav.leaderboard.site.columns import SCORES_SHOWN
-from simnav.leaderboard.site.content import PLAIN
-from simnav.leaderboard.site.curves import Curves, Gathered
-from simnav.leaderboard.site.overview import bar_scale, board_columns, board_row
-from simnav.leaderboard.site.rounding import short
-from simnav.leaderboard.site.sweeps import SweepFile
 from simnav.scoring.integrity import ALERT_LIMITS
 from simnav.scoring.plot_series import DIAGNOSTICS
+
+from . import charts, curves
+from .background import Background, faulty_points, fix_points, truth_of
+from .charts import NO_BOUND, NO_FAULTS, Chart, spread_data, timed
+from .columns import SCORES_SHOWN
+from .content import PLAIN
+from .curves import Curves, Gathered
+from .overview import bar_scale, board_columns, board_row
+from .rounding import short
+from .sweeps import SweepFile
 
 if TYPE_CHECKING:
     from simnav.leaderboard.ranking.board import ScenarioRanking
     from simnav.leaderboard.ranking.runs import Runs
-    from simnav.leaderboard.site.content import EstimatorEntry, ScenarioEntry
+
+    from .content import EstimatorEntry, ScenarioEntry
 
 __all__ = ["RUNS_SHOWN", "ScenarioData", "inside_chart", "scenario_data", "seeds_to_show", "shown_first", "track_from"]
 

@@ -35,19 +35,20 @@ from simnav.leaderboard.results.errors import RequestError
 from simnav.leaderboard.results.export import Document
 from simnav.leaderboard.results.formats import formats, write
 from simnav.leaderboard.results.provenance import benchmark_of, distinct
-from simnav.leaderboard.site.background import background_of, prepare
-from simnav.leaderboard.site.columns import glossary
-from simnav.leaderboard.site.content import ExtraPage, Fact, ScenarioEntry, SiteFacts
-from simnav.leaderboard.site.curves import BAND_RUNS, Gathered, gather, one_run
-from simnav.leaderboard.site.entries import argument_of, entries
-from simnav.leaderboard.site.estimator_page import errors_data, estimator_data, facts_of, runs_data, worst_runs
-from simnav.leaderboard.site.facts import catalogued, name_of
-from simnav.leaderboard.site.library import bundle
-from simnav.leaderboard.site.overview import BOARD_COLUMNS, overview
-from simnav.leaderboard.site.pages import STATIC, TEMPLATES, environment
-from simnav.leaderboard.site.print_figures import filled, write_figure
-from simnav.leaderboard.site.scenario_page import RUNS_SHOWN, ScenarioData, scenario_data, seeds_to_show
-from simnav.leaderboard.site.sweeps import SweepFile
+
+from .background import background_of, prepare
+from .columns import glossary
+from .content import ExtraPage, Fact, ScenarioEntry, SiteFacts
+from .curves import BAND_RUNS, Gathered, gather, one_run
+from .entries import argument_of, entries
+from .estimator_page import errors_data, estimator_data, facts_of, runs_data, worst_runs
+from .facts import catalogued, name_of
+from .library import bundle
+from .overview import BOARD_COLUMNS, overview
+from .pages import STATIC, TEMPLATES, environment
+from .print_figures import filled, write_figure
+from .scenario_page import RUNS_SHOWN, ScenarioData, scenario_data, seeds_to_show
+from .sweeps import SweepFile
 
 if TYPE_CHECKING:
     from simnav.leaderboard.ranking.board import Ranking

@@ -16,9 +16,10 @@ from simnav.leaderboard.results.errors import RequestError
 from simnav.leaderboard.results.files import write_whole
 from simnav.leaderboard.results.former_names import present_label
 from simnav.leaderboard.results.plain import as_json
-from simnav.leaderboard.site.charts import Chart, columns, dial
-from simnav.leaderboard.site.rounding import short
 from simnav.leaderboard.sweep.report import Sweep
+
+from .charts import Chart, columns, dial
+from .rounding import short
 
 __all__ = ["SweepFile", "sweeps_in", "write"]
 

@@ -12,7 +12,8 @@ from simnav.leaderboard.results.citation import TITLE, Citation
 from simnav.leaderboard.results.files import csv_text, write_whole
 from simnav.leaderboard.site.content import SiteFacts
 from simnav.leaderboard.site.pages import environment
-from simnav.leaderboard.standard.history import Line, editions
+
+from .history import Line, editions
 
 __all__ = ["EditionPage", "pages_of"]
 

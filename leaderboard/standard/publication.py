@@ -24,11 +24,12 @@ from simnav.leaderboard.results.packing import shortened, write_packed
 from simnav.leaderboard.results.provenance import BENCHMARK
 from simnav.leaderboard.results.result import SINCE_VERSIONS, Result
 from simnav.leaderboard.results.versions import declared, is_declared
-from simnav.leaderboard.standard import shipped
-from simnav.leaderboard.standard.currency import changes, outdated
-from simnav.leaderboard.standard.history import append
-from simnav.leaderboard.standard.readme import PICTURE, draw, replaced, tables
 from simnav.scenario import load
+
+from . import shipped
+from .currency import changes, outdated
+from .history import append
+from .readme import PICTURE, draw, replaced, tables
 
 __all__ = ["Published", "begin", "missing", "publish", "run"]
 

@@ -25,8 +25,9 @@ from simnav.leaderboard.campaign.request import EstimatorRequest, file_of
 from simnav.leaderboard.results.admission import is_scenario_id, label_fault, lookalikes
 from simnav.leaderboard.results.errors import MOST_RUNS, RequestError
 from simnav.leaderboard.results.files import complete_file
-from simnav.leaderboard.submission.archive import digest_of, opened, unpack, write_archive
-from simnav.leaderboard.submission.requirement import requirement
+
+from .archive import digest_of, opened, unpack, write_archive
+from .requirement import requirement
 
 __all__ = ["SUFFIX", "Bundle", "Contents", "File", "Row", "open_bundle", "write_bundle"]
 

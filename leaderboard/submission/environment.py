@@ -14,7 +14,8 @@ from pathlib import Path
 
 from simnav.leaderboard.campaign.sources import LIBRARY
 from simnav.leaderboard.results.errors import RequestError
-from simnav.leaderboard.submission.requirement import requirement
+
+from .requirement import requirement
 
 __all__ = ["clean_python", "install_requirements", "search_variables"]
 

@@ -20,8 +20,9 @@ from simnav.leaderboard.campaign.fingerprint import named_files
 from simnav.leaderboard.campaign.request import EstimatorRequest, comes_with_simnav, file_of, request
 from simnav.leaderboard.campaign.sources import code_of, followed
 from simnav.leaderboard.results.errors import RequestError, mistakes
-from simnav.leaderboard.submission.archive import write_archive
-from simnav.leaderboard.submission.requirement import here, requirement
+
+from .archive import write_archive
+from .requirement import here, requirement
 
 __all__ = ["Source", "requirements_of", "source_of"]
 

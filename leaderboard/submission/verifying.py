@@ -29,11 +29,12 @@ from simnav.leaderboard.results.errors import RequestError, mistakes
 from simnav.leaderboard.results.provenance import BENCHMARK, Provenance, benchmark_of, distinct
 from simnav.leaderboard.results.scratch import scratch
 from simnav.leaderboard.results.versions import is_declared
-from simnav.leaderboard.submission.bundle import Bundle, open_bundle
-from simnav.leaderboard.submission.environment import clean_python, install_requirements, search_variables
-from simnav.leaderboard.submission.repetition import Again, Asked, Wanted
 from simnav.scenario import load as load_scenario
 from simnav.scoring import SCORES
+
+from .bundle import Bundle, open_bundle
+from .environment import clean_python, install_requirements, search_variables
+from .repetition import Again, Asked, Wanted
 
 if TYPE_CHECKING:
     from simnav.leaderboard.results.result import Result

@@ -13,17 +13,19 @@ import numpy as np
 from simnav.leaderboard.figures.sweep_figure import Line, Map, error_against_dial, error_maps
 from simnav.leaderboard.ranking.statistics import Interval, median
 from simnav.leaderboard.results.frame import frame
-from simnav.leaderboard.sweep.breaking import BreakingPoint, breaking_point
-from simnav.leaderboard.sweep.settings import clean_value
 from simnav.scenario import Dial
 from simnav.scoring import SCORES
+
+from .breaking import BreakingPoint, breaking_point
+from .settings import clean_value
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from simnav.leaderboard.campaign.campaign import Summary
     from simnav.leaderboard.results.result import Result
-    from simnav.leaderboard.sweep.settings import Setting
+
+    from .settings import Setting
 
 __all__ = ["Sweep", "SweepPoint"]
 

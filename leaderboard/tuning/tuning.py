@@ -27,9 +27,10 @@ from simnav.leaderboard.figures.training import objective_curve
 from simnav.leaderboard.results.errors import RequestError
 from simnav.leaderboard.results.frame import frame
 from simnav.leaderboard.results.provenance import here
-from simnav.leaderboard.tuning.objective import CLEAN, LARGEST, PRICE, Figures, Voyages, only_training
-from simnav.leaderboard.tuning.space import Range, space_of
 from simnav.scenario import Scenario
+
+from .objective import CLEAN, LARGEST, PRICE, Figures, Voyages, only_training
+from .space import Range, space_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

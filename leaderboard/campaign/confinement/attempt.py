@@ -12,12 +12,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from simnav.leaderboard.campaign.confinement import bubblewrap
-from simnav.leaderboard.campaign.confinement.cores import own_core
-from simnav.leaderboard.campaign.confinement.estimator_process import seed_generators
-from simnav.leaderboard.campaign.confinement.isolation import isolate
-from simnav.leaderboard.campaign.confinement.limits import interrupted
-from simnav.leaderboard.campaign.confinement.session import (
+from simnav.leaderboard.results.errors import named
+from simnav.trial import FailureError, Trial, run_session, run_trial
+from simnav.trial.log import TrialLog
+from simnav.trial.wire import InvalidOutputError
+
+from . import bubblewrap
+from .cores import own_core
+from .estimator_process import seed_generators
+from .isolation import isolate
+from .limits import interrupted
+from .session import (
     LOST,
     EstimatorServer,
     Limits,
@@ -25,10 +30,6 @@ from simnav.leaderboard.campaign.confinement.session import (
     ServerError,
     StoppedError,
 )
-from simnav.leaderboard.results.errors import named
-from simnav.trial import FailureError, Trial, run_session, run_trial
-from simnav.trial.log import TrialLog
-from simnav.trial.wire import InvalidOutputError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

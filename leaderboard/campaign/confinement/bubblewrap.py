@@ -13,7 +13,7 @@ import subprocess
 from collections.abc import Sequence
 from pathlib import Path
 
-from simnav.leaderboard.campaign.confinement.server import COPY_FROM
+from .server import COPY_FROM
 
 __all__ = ["available", "wrapped"]
 

@@ -11,14 +11,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from simnav.estimator import Estimator, EstimatorError, UnsuitableScenario
-from simnav.leaderboard.campaign.confinement.kinds import load_kinds
-from simnav.leaderboard.campaign.confinement.messages import Down, Up, answer, read_message, write_all
 from simnav.leaderboard.campaign.fingerprint import own_code
 from simnav.leaderboard.campaign.training_runs import declared_ranges
 from simnav.leaderboard.results.errors import named
 from simnav.trial import describe_failure
 from simnav.trial.wire import VECTORS, EstimateEncoder, InvalidOutputError, PacketDecoder, real_array
 from simnav.types import NavigationStates
+
+from .kinds import load_kinds
+from .messages import Down, Up, answer, read_message, write_all
 
 if TYPE_CHECKING:
     from simnav.leaderboard.campaign.entrant import Entrant

@@ -23,7 +23,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from simnav.leaderboard.campaign.confinement.limits import (
+from simnav.leaderboard.results.errors import named
+
+from .limits import (
     RSS_UNIT,
     WATCH,
     begin_alone,
@@ -34,7 +36,6 @@ from simnav.leaderboard.campaign.confinement.limits import (
     resident,
     why_it_died,
 )
-from simnav.leaderboard.results.errors import named
 
 __all__ = ["Outcome", "isolate"]
 

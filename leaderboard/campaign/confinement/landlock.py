@@ -16,7 +16,7 @@ import struct
 import sys
 from collections.abc import Iterable
 
-from simnav.leaderboard.campaign.confinement.limits import PR_SET_NO_NEW_PRIVS, prctl
+from .limits import PR_SET_NO_NEW_PRIVS, prctl
 
 __all__ = ["Unreadable", "available", "restrict", "signals_are_scoped"]
 

@@ -14,7 +14,7 @@ import struct
 import sys
 import warnings
 
-from simnav.leaderboard.campaign.confinement.limits import prctl
+from .limits import prctl
 
 __all__ = ["PrivilegesWarning", "give_up", "kept_rights", "user_for"]
 

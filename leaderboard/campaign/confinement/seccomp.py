@@ -20,7 +20,7 @@ import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from simnav.leaderboard.campaign.confinement.limits import PR_SET_NO_NEW_PRIVS, prctl
+from .limits import PR_SET_NO_NEW_PRIVS, prctl
 
 __all__ = ["DENIED", "available", "deny"]
 

@@ -29,10 +29,12 @@ from pathlib import Path
 from typing import Any
 
 from simnav.kinds import INSTRUMENTS
-from simnav.leaderboard.campaign.confinement import privileges, seccomp
-from simnav.leaderboard.campaign.confinement.estimator_process import LIBRARIES, live
-from simnav.leaderboard.campaign.confinement.landlock import Unreadable, restrict
-from simnav.leaderboard.campaign.confinement.limits import (
+from simnav.leaderboard.results.scratch import scratch
+
+from . import privileges, seccomp
+from .estimator_process import LIBRARIES, live
+from .landlock import Unreadable, restrict
+from .limits import (
     RSS_UNIT,
     WATCH,
     become_reaper,
@@ -47,8 +49,7 @@ from simnav.leaderboard.campaign.confinement.limits import (
     resident,
     use_huge_pages,
 )
-from simnav.leaderboard.campaign.confinement.watch import Watch
-from simnav.leaderboard.results.scratch import scratch
+from .watch import Watch
 
 __all__ = ["COPY_FROM", "main"]
 

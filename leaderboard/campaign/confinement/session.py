@@ -20,17 +20,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from simnav.leaderboard.campaign.confinement import bubblewrap, landlock, privileges
-from simnav.leaderboard.campaign.confinement.estimator_process import LIBRARIES
-from simnav.leaderboard.campaign.confinement.kinds import homes_of_kinds
-from simnav.leaderboard.campaign.confinement.limits import why_it_died
-from simnav.leaderboard.campaign.confinement.memory_group import MemoryGroup
-from simnav.leaderboard.campaign.confinement.messages import LARGEST, Down, Up, command
-from simnav.leaderboard.campaign.confinement.watch import PROCESSES
 from simnav.leaderboard.campaign.request import file_of
 from simnav.trial import FailureError, LostError
 from simnav.trial.wire import ANSWER, ESTIMATE, InvalidOutputError, PacketEncoder
 from simnav.types import NavigationStates
+
+from . import bubblewrap, landlock, privileges
+from .estimator_process import LIBRARIES
+from .kinds import homes_of_kinds
+from .limits import why_it_died
+from .memory_group import MemoryGroup
+from .messages import LARGEST, Down, Up, command
+from .watch import PROCESSES
 
 if TYPE_CHECKING:
     from simnav.leaderboard.campaign.entrant import Entrant

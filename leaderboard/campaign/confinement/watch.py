@@ -8,7 +8,7 @@ import signal
 import time
 from pathlib import Path
 
-from simnav.leaderboard.campaign.confinement.limits import children_of, resident
+from .limits import children_of, resident
 
 __all__ = ["PROCESSES", "Watch"]
 

@@ -11,8 +11,8 @@ Intervals are of 95 % and come as `Interval`. ``docs/statistics.md`` has what wa
 - `reliability`: whether the rows can be ordered at all, `unorderable`.
 """
 
-from simnav.leaderboard.ranking.statistics.gains import Gain, gain, scenario_interval
-from simnav.leaderboard.ranking.statistics.intervals import (
+from .gains import Gain, gain, scenario_interval
+from .intervals import (
     FAILURE,
     FEWEST,
     FEWEST_SEEDS,
@@ -24,9 +24,9 @@ from simnav.leaderboard.ranking.statistics.intervals import (
     share,
     weighted_quantile,
 )
-from simnav.leaderboard.ranking.statistics.pairs import Comparison, compare
-from simnav.leaderboard.ranking.statistics.reliability import reliability, unorderable
-from simnav.leaderboard.ranking.statistics.separation import Separation, separate, smallest_p_value, unlucky_excess
+from .pairs import Comparison, compare
+from .reliability import reliability, unorderable
+from .separation import Separation, separate, smallest_p_value, unlucky_excess
 
 __all__ = [
     "FAILURE",

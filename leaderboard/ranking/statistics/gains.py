@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from simnav.leaderboard.ranking.statistics.intervals import Interval, codes, mean, score
+from .intervals import Interval, codes, mean, score
 
 __all__ = ["FEWEST_SCENARIOS", "WORSE", "Gain", "gain", "scenario_interval"]
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from simnav.leaderboard.ranking.statistics.intervals import FAILURE, FEWEST, mean
-from simnav.leaderboard.ranking.statistics.separation import separate
+from .intervals import FAILURE, FEWEST, mean
+from .separation import separate
 
 __all__ = ["Comparison", "compare"]
 

@@ -8,7 +8,7 @@ from collections.abc import Hashable, Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from simnav.leaderboard.ranking.statistics.intervals import codes
+from .intervals import codes
 
 __all__ = ["FEWEST_ROWS", "NEAR", "RELIABLE", "reliability", "unorderable"]
 

@@ -38,7 +38,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from simnav.leaderboard.ranking.statistics.intervals import FEWEST, codes
+from .intervals import FEWEST, codes
 
 __all__ = ["RELEVANT", "Separation", "separate", "smallest_p_value", "unlucky_excess"]
 
