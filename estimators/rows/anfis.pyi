@@ -4,8 +4,8 @@ import typing
 from simnav.estimator import register
 from simnav.estimators.adaptations.anfis import Anfis
 from simnav.estimators.composition import piece
-from simnav.estimators.rows.kalman import ShipEkf
-from simnav.estimators.rows.windows import ShipFgo
+from .kalman import ShipEkf
+from .windows import ShipFgo
 
 __all__ = ["AnfisEkf", "AnfisFgo", "AnfisFgoMotion"]
 

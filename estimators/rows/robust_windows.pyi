@@ -4,7 +4,6 @@ import typing
 from simnav.estimator import register
 from simnav.estimators.composition import Row, piece
 from simnav.estimators.models.suitable import Suitable
-from simnav.estimators.rows.windows import SwFgoPaper
 from simnav.estimators.solvers.window import WindowEstimator
 from simnav.estimators.weightings.dynamic_covariance_scaling import DynamicCovarianceScaling
 from simnav.estimators.weightings.fault_isolation import FaultIsolation
@@ -13,6 +12,7 @@ from simnav.estimators.weightings.graduated_non_convexity import GraduatedNonCon
 from simnav.estimators.weightings.m_estimators import TunedMEstimator, cauchy, geman_mcclure, huber, tukey
 from simnav.estimators.weightings.max_mixture import MaxMixture
 from simnav.estimators.weightings.switchable_constraints import SwitchableConstraints
+from .windows import SwFgoPaper
 
 __all__ = ["CauchyFgo", "DcsFgo", "GaFgo", "GaFgoPaper", "GmFgo", "GncFgo", "HuberFgo", "MaxMixtureFgo"]
 __all__ += ["SwitchableFgo", "TukeyFgo"]

@@ -3,10 +3,10 @@
 from simnav.estimator import register
 from simnav.estimators.composition import Row
 from simnav.estimators.models.inertial import InertialModel
-from simnav.estimators.rows.kalman import Ekf, ShipEkf
 from simnav.estimators.solvers.kalman import KalmanEstimator
 from simnav.estimators.solvers.smoother import Smoother
 from simnav.estimators.solvers.two_filter import TwoFilterSmoother
+from .kalman import Ekf, ShipEkf
 
 __all__ = ["EkfRts", "EkfTwoFilter", "ShipEkfRts"]
 
