@@ -70,6 +70,10 @@ def _rows(module: types.ModuleType) -> list[type[Row]]:
     return [cls for cls in vars(module).values() if _is_row(cls) and cls.__module__ == module.__name__]
 
 
+def _is_relative(node: ast.stmt | None) -> bool:
+    return isinstance(node, ast.ImportFrom) and node.level > 0
+
+
 def _is_row(cls: Any) -> TypeGuard[type[Row]]:
     row = isinstance(cls, type) and issubclass(cls, Row)
     return row and hasattr(vars(cls).get("__init__"), "__signature__")
@@ -94,6 +98,8 @@ class _Stub:
         for before, node in zip([None, *statements], statements):
             if isinstance(before, (ast.Import, ast.ImportFrom)) and not isinstance(node, (ast.Import, ast.ImportFrom)):
                 yield ""
+            if _is_relative(node) and before is not None and not _is_relative(before):
+                yield ""  # as the style has it: neighbours of the folder come last, apart
             if isinstance(node, _KEPT):
                 yield indent + self._between(_start(node), (node.end_lineno or 0, node.end_col_offset or 0))
             elif isinstance(node, ast.ClassDef):

@@ -4,6 +4,7 @@ import typing
 from simnav.estimator import register
 from simnav.estimators.adaptations.anfis import Anfis
 from simnav.estimators.composition import piece
+
 from .kalman import ShipEkf
 from .windows import ShipFgo
 

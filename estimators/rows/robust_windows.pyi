@@ -12,6 +12,7 @@ from simnav.estimators.weightings.graduated_non_convexity import GraduatedNonCon
 from simnav.estimators.weightings.m_estimators import TunedMEstimator, cauchy, geman_mcclure, huber, tukey
 from simnav.estimators.weightings.max_mixture import MaxMixture
 from simnav.estimators.weightings.switchable_constraints import SwitchableConstraints
+
 from .windows import SwFgoPaper
 
 __all__ = ["CauchyFgo", "DcsFgo", "GaFgo", "GaFgoPaper", "GmFgo", "GncFgo", "HuberFgo", "MaxMixtureFgo"]

@@ -6,6 +6,7 @@ from simnav.estimators.models.inertial import InertialModel
 from simnav.estimators.solvers.kalman import KalmanEstimator
 from simnav.estimators.solvers.smoother import Smoother
 from simnav.estimators.solvers.two_filter import TwoFilterSmoother
+
 from .kalman import Ekf, ShipEkf
 
 __all__ = ["EkfRts", "EkfTwoFilter", "ShipEkfRts"]

@@ -24,7 +24,7 @@ def brute_force(x: Array) -> Array:
     excess = np.array([[e - statistics.median(row) for e in row] for row in excess.tolist()])
     scatter = np.sqrt(np.sum(excess**2, axis=0) / (runs - 1))
     far = max(e / s for row in excess.tolist() for e, s in zip(row, scatter))  # the worst of four rows
-    unlucky = far * np.maximum(scatter, math.sqrt(statistics.median(scatter**2)))
+    unlucky = far * np.maximum(scatter, math.sqrt(np.quantile(scatter**2, 0.75)))
     pairs = list(itertools.combinations(range(n), 2))
 
     def student(d: Array, floor: float) -> float:
