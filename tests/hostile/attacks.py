@@ -255,7 +255,7 @@ def vandals(folder: Path, confinement: str = "auto", workers: int = 2, seeds: in
     ours = [EstimatorRequest("gnss-only"), EstimatorRequest("oracle")]
     mixed = [requests[0], ours[0], *requests[1:], ours[1]]
     options: dict[str, Any] = {
-        "workers": workers, "time_limit": 4.0, "memory_limit": 300.0, "confinement": confinement,
+        "workers": workers, "time_limit": 2.5, "memory_limit": 300.0, "confinement": confinement,
     }  # fmt: skip
     options["keep_trials"] = True
     scenario = load(SCENARIO)
