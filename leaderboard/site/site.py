@@ -30,6 +30,7 @@ from simnav.leaderboard.ranking import tables
 from simnav.leaderboard.ranking.ranking_figure import ranking_figure
 from simnav.leaderboard.ranking.runs import group
 from simnav.leaderboard.ranking.statistics import FAILURE
+from simnav.leaderboard.ranking.summary import spread
 from simnav.leaderboard.results.citation import citation
 from simnav.leaderboard.results.errors import RequestError
 from simnav.leaderboard.results.export import Document
@@ -347,7 +348,7 @@ class _Site:
         return [
             Fact("Scenarios", len(self.scenarios)),
             Fact("Estimators", len(self.estimators)),
-            Fact("Seeds a scenario", max(len(s.seeds) for s in self.scenarios.values())),
+            Fact("Seeds a scenario", spread(len(s.seeds) for s in self.scenarios.values())),
             Fact("Runs", len(tried)),
             Fact("Failed runs", sum(r.status != "ok" for r in tried)),
         ]
