@@ -45,7 +45,7 @@ def summary(found: Reproduction) -> str:
     counts = [f"{plural}: {text}" for kind, plural in KINDS_OF_ROWS.items() if (text := verdicts(found, kind))]
     inside, known = found.single_runs
     if known:
-        counts.append(f"of {known} figures that do not agree, {inside} {_lies(inside)} in the range of our single runs")
+        counts.append(f"of {known} figures that do not agree, {_within(inside)}")
     others = {"absent": "without a registered estimator", "failed": "failed", "unsuitable": "not applicable"}
     counts += [f"{n} rows {words}" for verdict, words in others.items() if (n := found.count(verdict))]
     return f"{found.paper.short}, up to {len(found.seeds)} runs of each scenario; {'; '.join(counts)}"
@@ -56,13 +56,11 @@ def single_run_sentence(found: Reproduction) -> str:
     inside, known = found.single_runs
     if not known:
         return ""
-    return (
-        f"Of {known} figures that do not agree with our mean, {inside} {_lies(inside)} in the range of our single runs."
-    )
+    return f"Of {known} figures that do not agree with our mean, {_within(inside)}."
 
 
-def _lies(count: int) -> str:
-    return "lies" if count == 1 else "lie"
+def _within(count: int) -> str:
+    return f"{count} {'lies' if count == 1 else 'lie'} in the range of our single runs"
 
 
 def verdicts(found: Reproduction, kind: str) -> str:

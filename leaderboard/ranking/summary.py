@@ -16,6 +16,7 @@ __all__ = ["best_rows", "gain_text", "less", "sentence", "spread"]
 _NAMED = 4  # rows that a sentence names
 #: From this ratio of errors on it is written as a multiple, and beyond the largest it is not written.
 _TIMES, _MOST_TIMES = 2.0, 100
+_ERROR = " times the error"
 
 
 def best_rows(track: TrackTable) -> list[Row]:
@@ -87,7 +88,8 @@ def _less(ratios: Iterable[float]) -> str:
             return f"{spread([-low])} % more to {spread([high])} % less"
         return f"{spread([low, high])} % less" if high > 0.5 or low > -0.5 else f"{spread([-high, -low])} % more"
     if best >= _TIMES:
-        return f"{spread([best], '{:.2g}')} to {_multiple(worst)}" if best < worst else _multiple(worst)
+        first, last = _multiple(best), _multiple(worst)
+        return last if first == last else f"{first.removesuffix(_ERROR)} to {last}"
     change = less(best)
     return (
         f"{_multiple(worst)} to {spread([change])} % less" if change > 0.5 else f"{_more(change)} to {_multiple(worst)}"
@@ -99,7 +101,13 @@ def _more(change: float) -> str:
 
 
 def _multiple(ratio: float) -> str:
-    return f"over {_MOST_TIMES} times the error" if ratio > _MOST_TIMES else f"{ratio:.2g} times the error"
+    """A ratio of errors as a multiple, with two digits.
+
+    >>> _multiple(2.04), _multiple(13.4), _multiple(99.7), _multiple(1e4)
+    ('2 times the error', '13 times the error', '100 times the error', 'over 100 times the error')
+    """
+    number = f"over {_MOST_TIMES}" if ratio > _MOST_TIMES else f"{ratio:.0f}" if ratio >= 10.0 else f"{ratio:.2g}"
+    return f"{number}{_ERROR}"
 
 
 def sentence(track: TrackTable) -> str:
