@@ -172,13 +172,15 @@ def board_row(
         notes.append("provisional")
     if row.learned:
         notes.append("learned")
+    if row.superseded:
+        notes.append("older version")
     if same:
         notes.append(f"same result: {', '.join(same)}")
     return {
         "name": {"text": row.estimator, "page": entry.page, "note": ", ".join(notes)},
         "ranks": {"text": row.ranks.replace("-", "–") or None, "sort": row.rank_low},
         "best": row.may_be_best,
-        "score": {"value": short(row.score), "help": row.why or row.learned or None},
+        "score": {"value": short(row.score), "help": row.why or row.superseded or row.learned or None},
         "bar": {"value": short(row.score), "low": short(row.low), "high": short(row.high)},
         "interval": _ends(row.low, row.high),
         "over_scenarios": _ends(row.scenarios_low, row.scenarios_high),

@@ -59,6 +59,9 @@ def tables(ranking: Ranking, results: Sequence[Result], of: int | None = None) -
         "the same run; the oracle knows the true noise and every fault. Recorded voyages have no oracle: there the "
         "plain filter on the same run is the divisor. Smaller is better."
     ]
+    older = sorted({f"`{r.estimator}` ({r.superseded})" for t in tracks for r in t.rows if r.superseded})
+    if older:
+        parts.append(f"Results of an older version, until the next edition: {', '.join(older)}.")
     if tracks:
         parts.append("\n".join([
             "| track | scenarios | seeds | complete rows | may be the best (95 %) | error beside the plain row's "
