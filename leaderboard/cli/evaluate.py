@@ -24,10 +24,13 @@ def show(out: Output, request: EvaluateRequest) -> None:
     with out.progress("starting") as bar:
         report = evaluate.of(replace(request, progress=campaign_progress(bar)))
     out.document(report.to_dict())
-    out.print(*ranking_tables(report.ranking, report.estimators))
+    if len(report.scenarios) > 1:
+        out.print(*ranking_tables(report.ranking, report.estimators))
     for stand in report.standings:
         out.print(standing_table(stand))
     out.print(*failure_table(report.results))
+    plain = {s: t.plain for t in report.ranking.tracks for s in t.scenarios}
+    out.print(*(stand.verdict(plain.get(stand.scenario, "")) for stand in report.standings))
     for label in report.estimators:
         own = [r for r in report.results if r.estimator == label]
         if own and all(r.status == "unsuitable" for r in own):

@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING
+
+import numpy as np
 
 from simnav.leaderboard.figures.stanford import stanford_diagrams
 from simnav.leaderboard.figures.style import save_as
 from simnav.leaderboard.given import scenario_of
 from simnav.leaderboard.ranking import tables
+from simnav.leaderboard.ranking.board import Consistency
+from simnav.leaderboard.ranking.ranking_table import consistency
 from simnav.leaderboard.results.errors import RequestError
 from simnav.leaderboard.running import run
-from simnav.scoring.consistency import ending
+from simnav.scoring.consistency import badge, ending
 
 from .commands import RunCommand
 from .console import FAILED, USER, Output
@@ -56,6 +61,9 @@ def show(out: Output, request: RunCommand) -> None:
         if unseen:
             left = "it out" if len(unseen) == 1 else "them out"
             out.remark(f"{e.estimator} shows no innovation of {', '.join(unseen)}: most likely it leaves {left}")
+    doubtful = [e.estimator for e in report.estimators if ending(e.status, e.scores) == "inconsistent"]
+    if doubtful:
+        out.remark(f"{', '.join(doubtful)}: the self-test says that the measurements contradict the estimate")
     if drawn is not None:
         out.print(f"figure: {drawn}")
     if shown is not None:
@@ -64,6 +72,12 @@ def show(out: Output, request: RunCommand) -> None:
         out.code = FAILED
     elif all(e.status == "unsuitable" for e in report.estimators):
         out.code = USER
+
+
+def _covariance(scores: Mapping[str, float]) -> str:
+    """What the truth of this run says of the covariance: the verdict, and the NEES that it is from."""
+    nees = scores.get("nees_horizontal", math.nan)
+    return consistency(Consistency(badge(np.array([nees])), nees))
 
 
 def _table(report: RunReport) -> tables.Fitted:
@@ -75,16 +89,19 @@ def _table(report: RunReport) -> tables.Fitted:
 
     ordered = [report.estimators[k] for k in sorted(range(len(report.estimators)), key=order)]
     plain = ("horizontal_rmse", "r95", "horizontal_max", "vertical_rmse", "velocity_horizontal_rmse")
+    smoothed = any(math.isfinite(e.scores.get("smoothed_horizontal_rmse", math.nan)) for e in ordered)
     cells = [
-        [e.estimator + (" *" if e.reference else ""), ending(e.status, e.scores),
+        [e.estimator + (" *" if e.reference else ""), e.status,
          *(tables.number(e.scores.get(s)) for s in plain),
          tables.number(math.degrees(e.scores.get("heading_rmse", math.nan))),
-         tables.number(e.scores.get("nees_horizontal")), tables.percent(e.scores.get("coverage_95")),
-         tables.duration(e.scores.get("update_median"))]
+         _covariance(e.scores), tables.percent(e.scores.get("coverage_95")),
+         tables.duration(e.scores.get("update_median")),
+         tables.number(e.scores.get("smoothed_horizontal_rmse")) if smoothed else ""]
         for e in ordered
     ]  # fmt: skip
     columns = ["estimator", "status", "horizontal RMSE [m]", "R95 [m]", "max [m]", "vertical RMSE [m]",
-               "velocity RMSE [m/s]", "heading RMSE [deg]", "NEES/dof", "95 % coverage", "per epoch"]  # fmt: skip
+               "velocity RMSE [m/s]", "heading RMSE [deg]", "NEES/dof", "95 % coverage", "per epoch",
+               "smoothed [m]"]  # fmt: skip
     recording = report.recording
     note = f"; {recording.note}" if recording.note else ""
     reference = [i for i, e in enumerate(ordered) if e.reference]
@@ -96,6 +113,7 @@ def _table(report: RunReport) -> tables.Fitted:
             "estimator",
             "horizontal RMSE [m]",
             "status",
+            "smoothed [m]",
             "R95 [m]",
             "NEES/dof",
             "max [m]",

@@ -301,7 +301,7 @@ def test_evaluate_shows_where_an_estimator_stands(here):
     assert found["estimator"] == "mine"
     assert found["seeds"] == [0, 1, 2]
     (stand,) = found["comparisons"]
-    assert (stand["place"], stand["of"]) == (2, 2)
+    assert (stand["place"], stand["last"], stand["of"]) == (1, 2, 2)  # three seeds decide nothing
     other = next(r for r in stand["rows"] if r["estimator"] == "gnss-only")
     runs = [document("run", "pond.toml", "-e", "mine.py,gnss-only", "--seed", k)["estimators"] for k in range(3)]
     ratios = [mine["scores"]["horizontal_rmse"] / gnss["scores"]["horizontal_rmse"] for mine, gnss in runs]
@@ -309,7 +309,8 @@ def test_evaluate_shows_where_an_estimator_stands(here):
     assert other["better"] == pytest.approx(np.mean(np.array(ratios) < 1.0))
     assert sorted(p.name for p in here.iterdir()) == ["mine.py", "pond.toml"]  # results are not left behind
     shown = call(*words).stdout
-    assert "mine is 2 of 2" in shown
+    assert "mine may be 1 to 2 of 2" in shown
+    assert shown.strip().splitlines()[-1].startswith("mine may be 1 to 2 of 2 on pond-v1")
 
 
 def test_evaluate_of_a_broken_estimator_is_a_failure(here):
