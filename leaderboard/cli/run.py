@@ -2,29 +2,18 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING
-
-import numpy as np
 
 from simnav.leaderboard.figures.stanford import stanford_diagrams
 from simnav.leaderboard.figures.style import save_as
 from simnav.leaderboard.given import scenario_of
-from simnav.leaderboard.ranking import tables
-from simnav.leaderboard.ranking.board import Consistency
-from simnav.leaderboard.ranking.ranking_table import consistency
 from simnav.leaderboard.results.errors import RequestError
 from simnav.leaderboard.running import run
-from simnav.scoring.consistency import badge, ending
+from simnav.scoring.consistency import ending
 
 from .commands import RunCommand
 from .console import FAILED, USER, Output
 from .options import absolute, require_figure
-
-if TYPE_CHECKING:
-    from simnav.leaderboard.campaign.single_run import RunReport
 
 __all__ = ["show"]
 
@@ -53,7 +42,7 @@ def show(out: Output, request: RunCommand) -> None:
         integrity = {label: diagram.to_dict() for label, diagram in diagrams.items()}
         document |= {"stanford": integrity, "stanford_plot": None if shown is None else str(shown)}
     out.document(document)
-    out.print(_table(report))
+    out.print(*report.shown())
     for e in report.estimators:
         if e.status != "ok":
             out.remark(f"{e.estimator}: {e.status}: {e.reason}")
@@ -72,55 +61,3 @@ def show(out: Output, request: RunCommand) -> None:
         out.code = FAILED
     elif all(e.status == "unsuitable" for e in report.estimators):
         out.code = USER
-
-
-def _covariance(scores: Mapping[str, float]) -> str:
-    """What the truth of this run says of the covariance: the verdict, and the NEES that it is from."""
-    nees = scores.get("nees_horizontal", math.nan)
-    return consistency(Consistency(badge(np.array([nees])), nees))
-
-
-def _table(report: RunReport) -> tables.Fitted:
-    """Scores of the estimators, the best horizontal RMSE first."""
-
-    def order(k: int) -> tuple[bool, float]:
-        value = report.estimators[k].scores.get("horizontal_rmse", math.inf)
-        return report.estimators[k].status != "ok", value if math.isfinite(value) else math.inf
-
-    ordered = [report.estimators[k] for k in sorted(range(len(report.estimators)), key=order)]
-    plain = ("horizontal_rmse", "r95", "horizontal_max", "vertical_rmse", "velocity_horizontal_rmse")
-    smoothed = any(math.isfinite(e.scores.get("smoothed_horizontal_rmse", math.nan)) for e in ordered)
-    cells = [
-        [e.estimator + (" *" if e.reference else ""), e.status,
-         *(tables.number(e.scores.get(s)) for s in plain),
-         tables.number(math.degrees(e.scores.get("heading_rmse", math.nan))),
-         _covariance(e.scores), tables.percent(e.scores.get("coverage_95")),
-         tables.duration(e.scores.get("update_median")),
-         tables.number(e.scores.get("smoothed_horizontal_rmse")) if smoothed else ""]
-        for e in ordered
-    ]  # fmt: skip
-    columns = ["estimator", "status", "horizontal RMSE [m]", "R95 [m]", "max [m]", "vertical RMSE [m]",
-               "velocity RMSE [m/s]", "heading RMSE [deg]", "NEES/dof", "95 % coverage", "per epoch",
-               "smoothed [m]"]  # fmt: skip
-    recording = report.recording
-    note = f"; {recording.note}" if recording.note else ""
-    reference = [i for i, e in enumerate(ordered) if e.reference]
-    return tables.Fitted(
-        f"{recording.scenario}, seed {recording.seed}, {tables.duration(recording.duration)}{note}",
-        columns,
-        cells,
-        [
-            "estimator",
-            "horizontal RMSE [m]",
-            "status",
-            "smoothed [m]",
-            "R95 [m]",
-            "NEES/dof",
-            "max [m]",
-            "heading RMSE [deg]",
-            "per epoch",
-        ],
-        numeric=columns[2:],
-        dim=reference,
-        caption="* reference: it is told the truth" if reference else None,
-    )
