@@ -69,6 +69,8 @@ _RC: dict[Any, Any] = {
     "xtick.labelsize": 8.0,
     "ytick.labelsize": 8.0,
     "text.color": INK,
+    "pdf.fonttype": 42,  # letters stay letters, as journals ask for it
+    "svg.fonttype": "none",
     "text.parse_math": False,  # names of estimators are not TeX
     "legend.fontsize": 8.0,
     "legend.frameon": False,
@@ -123,10 +125,10 @@ class Style:
 
 def figure(width: float, height: float) -> Figure:
     """An empty figure in the common style; ``width`` and ``height`` in inches."""
-    from matplotlib.figure import Figure
+    from .notebook_figure import NotebookFigure
 
     with styled():
-        return Figure(figsize=(width, height), layout="constrained")
+        return NotebookFigure(figsize=(width, height), layout="constrained")
 
 
 def styled() -> Any:

@@ -28,6 +28,10 @@ def test_a_notebook_shows_the_table_of_the_command(report) -> None:
     assert len(page) < 10_000
 
 
+def test_a_notebook_shows_a_figure_without_pyplot(report) -> None:
+    assert report.plot()._repr_png_()[1:4] == b"PNG"
+
+
 def test_an_evaluation_shows_its_verdict() -> None:
     made = simnav.evaluate("gnss-only", "ship-straight", runs=2, against="ship-ekf", workers=1)
     assert repr(made).startswith("<EvaluationReport: gnss-only may be 1 to 2 of 2 on ship-straight-v1")
