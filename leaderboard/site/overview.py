@@ -12,6 +12,7 @@ from simnav.leaderboard.ranking.stored_costs import NOT_MEASURED, CostMultiple, 
 
 from .charts import accuracy_and_cost, columns, detection, spread, spread_data
 from .columns import Column, column_dicts
+from .heatmap import heatmap
 from .rounding import short
 
 if TYPE_CHECKING:
@@ -296,6 +297,7 @@ def _track(
             "columns": board_columns(title, explanation, bar_scale(scored), more),
             "rows": rows,
         },
+        "map": None if (drawn := heatmap(track, scored, scenarios)) is None else drawn.to_dict(),
         "charts": [c.to_dict() for c in _charts(track, scored, title, estimators, runs)],
         "scenarios": [
             {"id": s, "name": scenarios[s].name, "title": scenarios[s].title, "page": scenarios[s].page}
