@@ -33,6 +33,7 @@ if TYPE_CHECKING:
         publish_standard,
         run_standard,
         site,
+        standard,
         submit,
         verify_bundle,
     )
@@ -115,6 +116,7 @@ __all__ = [
     "score",
     "seal",
     "site",
+    "standard",
     "submit",
     "sweep",
     "tune",
@@ -160,6 +162,7 @@ _HOMES = {
         "publish_standard",
         "run_standard",
         "site",
+        "standard",
         "submit",
         "verify_bundle",
     ),
