@@ -12,7 +12,7 @@ from simnav.estimator.registry import registered
 from simnav.leaderboard.ranking.board import Ranking, TrackRanking, TrackRow
 from simnav.leaderboard.ranking.ranking_figure import ranking_figure
 from simnav.leaderboard.ranking.ranking_table import gain_cell, ratio
-from simnav.leaderboard.ranking.summary import best_rows, gain_text, sentence, spread
+from simnav.leaderboard.ranking.summary import best_rows, gain_text, limits, sentence, spread
 from simnav.leaderboard.ranking.tables import MISSING
 from simnav.leaderboard.results.errors import RequestError
 from simnav.leaderboard.results.provenance import distinct
@@ -70,7 +70,7 @@ def tables(ranking: Ranking, results: Sequence[Result], of: int | None = None) -
         ]))  # fmt: skip
     main = _main(ranking)
     if main is not None:
-        parts.append(sentence(main))
+        parts.append(f"{sentence(main)} {limits(main)}".strip())
         parts.append(f"![Scores of the track {main.title} with their 95 % intervals]({PICTURE})")
         ranked = [r for r in main.rows if r.ranked]
         parts.append(
