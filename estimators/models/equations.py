@@ -70,12 +70,6 @@ class Equation:
     def _add_rate_noise(self, noise: Array, arm: Array, rate_variance: float) -> None:
         """Add the noise of the gyroscopes to that of a velocity, in place; here there is none."""
 
-    def scale_sigmas(self, sheet: Datasheet) -> tuple[float, ...]:
-        """The sigmas of scale factor and misalignment, which are states; empty without any error."""
-        if not (self.calibrates and (sheet.scale or np.any(sheet.misalignment))):
-            return ()
-        return (sheet.scale, *(sheet.misalignment if self.in_body else ()))
-
     def uncalibrated_noise(self, sheet: Datasheet, predicted: Array) -> Array:
         """(d, d) noise in place of a scale factor and a misalignment without states, at a ``predicted`` velocity."""
         u, m = predicted**2, sheet.misalignment**2

@@ -30,12 +30,14 @@ from numpy.typing import NDArray
 from simnav.kinds import NavigationPoint
 from simnav.types import KINDS, NO_SIDE, Array, Datasheet, Estimate, InitialState, Instruments, Measurement
 
-from .base import Linearised, aid_biases, is_fast
+from .base import Linearised
 from .chain import Chain, Columns, chain_of
+from .declared_errors import bias_of
 from .equations import EQUATIONS, equation_of
 from .own_observation import OwnObservation
 from .points import PointModel
 from .state_blocks import StateBlocks
+from .sum_of_processes import merged
 
 __all__ = ["GeneralChain", "GeneralModel"]
 
@@ -117,24 +119,20 @@ class GeneralModel(PointModel):
         x, own = self.initial(start, instruments)
         self.x, self.n_own = np.array(x, dtype=np.float64), len(own)
         self.sheets = {name: s for name, s in instruments.items() if self.observes(s)}
-        rates: list[tuple[float, float, float]] = []
+        self.blocks = StateBlocks(self.n_own)
         self._bias_at: dict[str, int] = {}
         self._white: dict[str, Array] = {}
         for name, sheet in self.sheets.items():
-            white = sheet.sigma**2 + (sheet.bias_instability**2 if is_fast(sheet) else 0.0)
-            self._white[name] = np.diag(white)
-            biases = aid_biases(sheet)
-            if any(b.variance or b.noise for b in biases):
-                self._bias_at[name] = len(rates)
-                rates += [(b.variance, b.decay, b.noise) for b in biases]
+            bias = bias_of(sheet)
+            self._white[name] = np.diag(sheet.sigma**2 + bias.white_variance())
+            if bias.slow:
+                self._bias_at[name] = self.blocks.add(name, "bias", merged(bias)) - self.n_own
         brought = [s for s in self.sheets.values() if KINDS[s.kind].observation is not None]
-        self.blocks = StateBlocks(brought, self.n_own + len(rates))
-        rates += self.blocks.states
-        places = {s.name: self.blocks.places(s.name, self.n_own) for s in brought}
-        self.own = {s.name: OwnObservation(s, places[s.name], start.time) for s in brought}
-        self.extra = np.zeros(len(rates))
-        variance, self._decay, self._density = np.array(rates).reshape(-1, 3).T.copy()
-        self.size = self.n_own + len(rates)
+        self.blocks.bring(brought)
+        self.own = {s.name: OwnObservation(s, self.blocks.places(s.name, self.n_own), start.time) for s in brought}
+        self.size = self.blocks.size
+        self.extra = np.zeros(self.size - self.n_own)
+        variance, self._decay, self._density = self.blocks.columns(self.n_own)
         covariance = np.zeros((self.size, self.size))
         covariance[: self.n_own, : self.n_own] = own
         covariance[range(self.n_own, self.size), range(self.n_own, self.size)] = variance
@@ -211,9 +209,7 @@ class GeneralModel(PointModel):
 
     def _extra_of(self, name: str) -> list[int]:
         """Which of ``extra`` an instrument depends on."""
-        at = self._bias_at.get(name)
-        biases = [] if at is None else list(range(at, at + len(self._white[name])))
-        return biases + [k - self.n_own for place in self.blocks.of(name) for k in range(place.start, place.stop)]
+        return [k - self.n_own for place in self.blocks.of(name) for k in range(place.start, place.stop)]
 
     def measure(self, measurement: Measurement) -> Linearised | None:
         """Linearise one measurement at the present state."""
@@ -260,7 +256,7 @@ class GeneralModel(PointModel):
         """The state as an estimate."""
         m = self.n_own
         estimate = self.describe(self.x.copy(), self.time, covariance[:m, :m])
-        states = self.blocks.report(self.extra, m, covariance) if self.blocks else {}
+        states = self.blocks.report(self.extra, m, covariance, self.reports_all)
         return replace(estimate, states={**estimate.states, **states})
 
 

@@ -28,9 +28,10 @@ import numpy as np
 from simnav.estimator import UnsuitableScenario
 from simnav.estimator.needs import IMU, Needs
 from simnav.estimators.composition import Solver
-from simnav.estimators.models.base import triad_bias
+from simnav.estimators.models.declared_errors import errors_of_triad
 from simnav.estimators.models.equations import equation_of
 from simnav.estimators.models.measurements import radii, wrap
+from simnav.estimators.models.sum_of_processes import merged
 from simnav.geometry.earth import gravity
 from simnav.geometry.rotation import dcm_from_rotation_vector, dcm_from_rpy, rpy_from_dcm
 from simnav.kinds import BODY_VELOCITY, DEPTH, HEADING, WATER_SPEED, kinds_with
@@ -104,9 +105,9 @@ class DeadReckoningEstimator(Solver):
         P[_PSI, _PSI] = start.covariance[8, 8]
         self._gyro_walk = 0.0
         if self._imu is not None:
-            drift = triad_bias(self._imu.gyroscope)
-            P[_GYRO, _GYRO] = drift.variance
-            self._gyro_walk = self._imu.gyroscope.random_walk**2 + drift.white
+            drift = errors_of_triad(self._imu.gyroscope, "deg_s")["bias"]
+            P[_GYRO, _GYRO] = merged(drift)[0].variance
+            self._gyro_walk = self._imu.gyroscope.random_walk**2 + float(drift.white_density()[0])
         self._covariance = P
         self._use(speeds[0])
 
