@@ -128,7 +128,7 @@ class AboutTruthModel(ErrorModel):
         #: Places of the blocks in y, and in the error of the nominal state, where their values are.
         self._block_at = [(self.blocks.at[label], self.nominal.blocks.at[label]) for label in self.blocks.brought]
         n = self.size = self.blocks.size
-        variance, self._rate, self._density = self.blocks.columns(_INERTIAL)
+        variance, _, _ = self.blocks.columns(_INERTIAL)
         covariance = np.zeros((n, n))
         covariance[:_INERTIAL, :_INERTIAL] = own[:_INERTIAL, :_INERTIAL]
         covariance[range(_INERTIAL, n), range(_INERTIAL, n)] = variance
@@ -245,7 +245,7 @@ class AboutTruthModel(ErrorModel):
         phi, m = self.transition, _INERTIAL
         phi[:m, :m] = self.nominal.transition
         index = np.arange(m, self.size)
-        decay = np.exp(-self._rate * elapsed)
+        decay, noise = self.blocks.step(elapsed)
         phi[index, index] = decay
         for at in self.blocks.clocks:
             phi[at, at + 1] = elapsed
@@ -253,9 +253,6 @@ class AboutTruthModel(ErrorModel):
             measured = self._measured(self.time, until)
             factor = np.append(measured, 1.0)[self._times]  # -1, for a bias, is the last
             phi[:_NAV, m : m + len(factor)] = factor * phi[:_NAV, self._axes]
-        noise = self._density * elapsed
-        moving = self._rate > 0.0
-        noise[moving] = self._density[moving] * (1.0 - decay[moving] ** 2) / (2.0 * self._rate[moving])
         covariance[:] = phi @ covariance @ phi.T
         covariance[:m, :m] += self.nominal.process_noise
         covariance[index, index] += noise

@@ -12,15 +12,18 @@ A subclass says in plain NumPy
 
 From these come the transition matrix, the Jacobian of each measurement, sigma points, and the chain for windows and
 full graphs (`GeneralChain`). Derivatives are central differences. A subclass may override `transition` or `read` with
-faster forms. After its own states come the biases of the instruments, if their datasheets have any, and the blocks that
-instruments bring along (`simnav.blocks`). Scale factors and misalignments have no states.
+faster forms. After its own states come the errors of its instruments
+(`simnav.estimators.models.sum_of_processes.merged_states`) and the blocks that instruments bring along
+(`simnav.blocks`).
 
-`simnav.estimators.models.inertial` and `simnav.estimators.models.ship` are compiled forms for their states.
+`simnav.estimators.models.inertial` and `simnav.estimators.models.ship` are compiled forms of such models. In the tests
+both stand in the general form, too, with the same blocks, and give the same numbers (``tests/cases/general_forms.py``).
 """
 
 from __future__ import annotations
 
 from abc import abstractmethod
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import ClassVar
 
@@ -37,7 +40,7 @@ from .equations import EQUATIONS, equation_of
 from .own_observation import OwnObservation
 from .points import PointModel
 from .state_blocks import StateBlocks
-from .sum_of_processes import merged
+from .sum_of_processes import merged_states
 
 __all__ = ["GeneralChain", "GeneralModel"]
 
@@ -53,17 +56,21 @@ class GeneralModel(PointModel):
     x : (m,) array
         The state of the motion.
     extra : (k,) array
-        Biases of the instruments, then the blocks that they bring along.
+        Errors of the instruments, then the blocks that they bring along.
     blocks : StateBlocks
         The blocks, and their places in the error.
     equations : tuple of str
         Measurement equations (`simnav.kinds.EQUATIONS`) that the model uses; also every kind with an observation of its
         own. Subclasses may override it.
+    errors : tuple of str
+        Errors of instruments that have states (`simnav.estimators.models.declared_errors`). A subclass leaves out what
+        is among its own states, and returns it from `own_errors`.
     """
 
     state = ("x", "extra")
     moving = (slice(0, 0), slice(0, 0))
     equations: ClassVar[tuple[str, ...]] = tuple(EQUATIONS)
+    errors: ClassVar[tuple[str, ...]] = ("bias", "current", "scale", "misalignment")
 
     @abstractmethod
     def initial(self, start: InitialState, instruments: Instruments) -> tuple[Array, Array]:
@@ -85,6 +92,10 @@ class GeneralModel(PointModel):
     def describe(self, x: Array, time: float, covariance: Array) -> Estimate:
         """A state with the (n, n) covariance of its error as an estimate."""
 
+    def own_errors(self, x: Array) -> Mapping[str, Array]:
+        """Values of errors that are among the model's own states, by name, like a ``current``; by default none."""
+        return {}
+
     def retract(self, x: Array, error: Array) -> Array:
         """The state that differs from another by an (n,) error; by default their sum."""
         return np.asarray(x + error)
@@ -94,20 +105,20 @@ class GeneralModel(PointModel):
         return np.asarray(x - reference)
 
     def read(self, x: Array, time: float, sheet: Datasheet, extra: Array, side: Array = NO_SIDE) -> Array | None:
-        """What an instrument should read at a state: (d,) array, or None; with its bias and the blocks in ``extra``.
+        """What an instrument should read at a state: (d,) array, or None; with its errors and the blocks in ``extra``.
 
         ``side`` is the (s,) side information of the reading of a channel.
         """
         own = self.own.get(sheet.name)
         point = self.navigation(x, time)
+        errors = {**self.own_errors(x), **{name: extra[at] for name, at in self._errors_at[sheet.name].items()}}
         if own is None:
-            reading = equation_of(sheet).read(point, sheet)
+            reading = equation_of(sheet).read(point, sheet, errors)
         else:
             reading = own.read(point._replace(blocks=own.blocks(extra), channel=own.channel, side=side))
-        at = self._bias_at.get(sheet.name, -1)
-        if reading is None or at < 0:
+        if reading is None or "bias" not in errors:
             return reading
-        return KINDS[sheet.kind].add_error(reading, extra[at : at + len(reading)])
+        return KINDS[sheet.kind].add_error(reading, errors["bias"])
 
     def observes(self, instrument: Datasheet) -> bool:
         """Whether the model uses an instrument."""
@@ -120,19 +131,21 @@ class GeneralModel(PointModel):
         self.x, self.n_own = np.array(x, dtype=np.float64), len(own)
         self.sheets = {name: s for name, s in instruments.items() if self.observes(s)}
         self.blocks = StateBlocks(self.n_own)
-        self._bias_at: dict[str, int] = {}
+        self._errors_at: dict[str, dict[str, slice]] = {}
         self._white: dict[str, Array] = {}
         for name, sheet in self.sheets.items():
-            bias = bias_of(sheet)
-            self._white[name] = np.diag(sheet.sigma**2 + bias.white_variance())
-            if bias.slow:
-                self._bias_at[name] = self.blocks.add(name, "bias", merged(bias)) - self.n_own
+            self._white[name] = np.diag(sheet.sigma**2 + bias_of(sheet).white_variance())
+            at = self._errors_at[name] = {}
+            for error, rates in merged_states(sheet).items():
+                if error in self.errors:
+                    first = self.blocks.add(name, error, rates) - self.n_own
+                    at[error] = slice(first, first + len(rates))
         brought = [s for s in self.sheets.values() if KINDS[s.kind].observation is not None]
         self.blocks.bring(brought)
         self.own = {s.name: OwnObservation(s, self.blocks.places(s.name, self.n_own), start.time) for s in brought}
         self.size = self.blocks.size
         self.extra = np.zeros(self.size - self.n_own)
-        variance, self._decay, self._density = self.blocks.columns(self.n_own)
+        variance, _, _ = self.blocks.columns(self.n_own)
         covariance = np.zeros((self.size, self.size))
         covariance[: self.n_own, : self.n_own] = own
         covariance[range(self.n_own, self.size), range(self.n_own, self.size)] = variance
@@ -144,8 +157,8 @@ class GeneralModel(PointModel):
     # --- what follows
 
     def moved_extra(self, extra: Array, elapsed: float) -> Array:
-        """(k,) or (j, k) biases and blocks after a time [s]."""
-        moved = np.asarray(extra * np.exp(-self._decay * elapsed))
+        """(k,) or (j, k) errors and blocks after a time [s]."""
+        moved = np.asarray(extra * self.blocks.step(elapsed)[0])
         self.blocks.carry_values(moved.T, self.n_own, elapsed)
         return moved
 
@@ -158,7 +171,7 @@ class GeneralModel(PointModel):
             step[j] = self._steps[j]
             ends = [self.difference(self.move(self.retract(x, s * step), elapsed), moved) for s in (1.0, -1.0)]
             F[:m, j] = (ends[0] - ends[1]) / (2.0 * step[j])
-        F[range(m, self.size), range(m, self.size)] = np.exp(-self._decay * elapsed)
+        F[range(m, self.size), range(m, self.size)] = self.blocks.step(elapsed)[0]
         for at in self.blocks.clocks:
             F[at, at + 1] = elapsed
         return F
@@ -170,13 +183,9 @@ class GeneralModel(PointModel):
             return
         moved = self.move(self.x, elapsed)
         F = self._last = self.transition(self.x, moved, elapsed)
-        added = self._density * elapsed
-        varies = self._decay > 0.0
-        rate = self._decay[varies]
-        added[varies] = self._density[varies] * -np.expm1(-2.0 * rate * elapsed) / (2.0 * rate)
         covariance[:] = F @ covariance @ F.T
         covariance[:m, :m] += self.noise(self.x, elapsed)
-        covariance[range(m, self.size), range(m, self.size)] += added
+        covariance[range(m, self.size), range(m, self.size)] += self.blocks.step(elapsed)[1]
         self.blocks.add_noise(covariance, elapsed)
         covariance[:] = 0.5 * (covariance + covariance.T)
         self.x[:], self.extra[:], self.time = moved, self.moved_extra(self.extra, elapsed), until

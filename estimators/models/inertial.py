@@ -31,7 +31,7 @@ added to the next increment, so that its sum stays within one step; it is neglec
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from math import atan2, exp, hypot
 from typing import Any, ClassVar
@@ -57,7 +57,7 @@ from simnav.types import (
 )
 
 from .base import ErrorModel, Linearised, Observation
-from .declared_errors import CURRENT, Error, errors_of, errors_of_triad
+from .declared_errors import CURRENT, bias_of, errors_of_triad
 from .equations import EQUATIONS, equation_of
 from .inertial_update import absorb_inertial, assimilate_inertial, innovate_inertial
 from .measurements import (
@@ -75,7 +75,7 @@ from .propagation import (
     propagate_inertial,
 )
 from .state_blocks import StateBlocks
-from .sum_of_processes import merged
+from .sum_of_processes import merged, merged_states
 
 __all__ = ["InertialModel", "roll_pitch_yaw"]
 
@@ -101,12 +101,6 @@ def _carry(transition: Array, rate: Array, elapsed: float, error: Array) -> None
         decay = exp(-rate[i - m] * elapsed)
         for j in range(columns):
             error[i, j] *= decay
-
-
-def _has_scales(sheet: Datasheet, errors: Mapping[str, Error]) -> bool:
-    """Whether scale factor and misalignment of an aid are states, or noise in a model without such states."""
-    both = (errors[name] for name in ("scale", "misalignment") if name in errors)
-    return equation_of(sheet).calibrates and any(error.processes for error in both)
 
 
 class InertialModel(ErrorModel):
@@ -247,14 +241,16 @@ class InertialModel(ErrorModel):
         self.own: dict[str, OwnObservation] = {}
         observed = [sheet for sheet in self.instruments.values() if self.observes(sheet)]
         for sheet in observed:
-            errors, equation = errors_of(sheet), equation_of(sheet)
-            white = errors["bias"].white_variance()
+            bias, equation, states = bias_of(sheet), equation_of(sheet), merged_states(sheet)
+            white = bias.white_variance()
             if self.calibrate:
-                self._calibrate(sheet, errors)
+                at = {name: self.blocks.add(sheet.name, name, rates) for name, rates in states.items()}
+                self.bias_at |= {sheet.name: at["bias"]} if "bias" in at else {}
+                self.scale_at |= {sheet.name: at["scale"]} if "scale" in at else {}
             else:
                 along_keel = CURRENT**2 if equation.through_water else 0.0
-                white = white + [rates.variance + along_keel for rates in merged(errors["bias"])]
-                if _has_scales(sheet, errors):
+                white = white + [rates.variance + along_keel for rates in merged(bias)]
+                if "scale" in states:
                     self.uncalibrated.add(sheet.name)
             self.noise[sheet.name] = equation.white_noise(sheet, white, self._rate_variance)
             self.aid_parameters[sheet.name] = (
@@ -268,18 +264,6 @@ class InertialModel(ErrorModel):
         for sheet in own:
             self.own[sheet.name] = OwnObservation(sheet, self.blocks.places(sheet.name, _NAV), self.time)
         self._fused = set(self.noise) - self.uncalibrated - set(self.own) if self.fused else set()
-
-    def _calibrate(self, sheet: Datasheet, errors: Mapping[str, Error]) -> None:
-        """The states of an aid where the compiled loops expect them: bias, current; scale factor, misalignment."""
-        name, bias = sheet.name, merged(errors["bias"])
-        if "current" in errors or any(rates.variance or rates.noise for rates in bias):
-            self.bias_at[name] = self.blocks.add(name, "bias", bias)
-        if "current" in errors:
-            self.blocks.add(name, "current", merged(errors["current"]))
-        if _has_scales(sheet, errors):
-            self.scale_at[name] = self.blocks.add(name, "scale", merged(errors["scale"]))
-            if "misalignment" in errors:
-                self.blocks.add(name, "misalignment", merged(errors["misalignment"]))
 
     def _more_blocks(self) -> None:
         """A hook: append further blocks of calibration states."""

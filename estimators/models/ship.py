@@ -32,7 +32,7 @@ from simnav.estimator.needs import Needs
 from simnav.types import KINDS, NO_SIDE, Array, Datasheet, Estimate, InitialState, Instruments, Measurement
 
 from .base import ErrorModel, Linearised
-from .declared_errors import bias_of, errors_of
+from .declared_errors import bias_of
 from .equations import equation_of
 from .measurements import wrap
 from .ship_kernels import (
@@ -52,7 +52,7 @@ from .ship_kernels import (
 )
 from .ship_observation import HEEL, VERTICAL_SPEED, ShipObservation
 from .state_blocks import StateBlocks
-from .sum_of_processes import merged, with_variance
+from .sum_of_processes import merged_states, with_variance
 
 __all__ = ["OBSERVED", "POSITIONS", "E", "N", "ShipModel"]
 
@@ -193,12 +193,12 @@ class ShipModel(ErrorModel):
             return
         if not own and not (equation.is_heading or equation.is_position or equation.through_water):
             return
-        errors = errors_of(sheet)
-        bias = merged(errors["bias"])[: None if own else 2 if equation.is_position else 1]
+        states = merged_states(sheet)
+        bias = states.get("bias", [])[: None if own else 2 if equation.is_position else 1]
         if any(rates.variance or rates.noise for rates in bias):
             self.bias_at[sheet.name] = self.blocks.add(sheet.name, "bias", bias)
-        if equation.through_water and errors["scale"].processes:
-            self.scale_at[sheet.name] = self.blocks.add(sheet.name, "scale", merged(errors["scale"]))
+        if "scale" in states:
+            self.scale_at[sheet.name] = self.blocks.add(sheet.name, "scale", states["scale"])
 
     def _tabulate(self) -> None:
         """The instruments: those for the kernels, and those with an equation of their own."""

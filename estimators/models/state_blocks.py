@@ -69,6 +69,7 @@ class StateBlocks:
         self._names: dict[str, tuple[str, ...]] = {}
         self.clocks: list[int] = []
         self._clocks: list[tuple[int, StateBlock]] = []
+        self._rates: tuple[Array, Array, Array] | None = None
 
     def __len__(self) -> int:
         return len(self.at)
@@ -113,7 +114,20 @@ class StateBlocks:
     def _append(self, label: str, rates: Sequence[Rates]) -> slice:
         at = self.at[label] = slice(self.size, self.size + len(rates))
         self.states += rates
+        self._rates = None
         return at
+
+    def step(self, elapsed: float) -> tuple[Array, Array]:
+        """What a time [s] does to the components: factors by which they decay, and variances that are added to them.
+
+        What belongs to clocks beyond that is done by `carry` and `add_noise`.
+        """
+        if self._rates is None:
+            self._rates = self.columns(self.first)
+        _, rate, density = self._rates
+        decay, noise, moving = np.exp(-rate * elapsed), density * elapsed, rate > 0.0
+        noise[moving] = density[moving] * (1.0 - decay[moving] ** 2) / (2.0 * rate[moving])
+        return decay, noise
 
     def columns(self, first: int) -> tuple[Array, Array, Array]:
         """Initial variance, decay and noise density of the components from an index of the error state on."""

@@ -13,11 +13,12 @@ from math import inf
 import numpy as np
 
 from simnav.blocks import Rates, StateBlock
-from simnav.types import Array
+from simnav.types import Array, Datasheet
 
-from .declared_errors import Error
+from .declared_errors import Error, errors_of
+from .equations import equation_of
 
-__all__ = ["apart", "merged", "with_variance"]
+__all__ = ["apart", "merged", "merged_states", "with_variance"]
 
 
 def merged(error: Error) -> list[Rates]:
@@ -57,6 +58,23 @@ def _merged(processes: list[tuple[str, float, Rates]]) -> Rates:
         return Rates(constant, 0.0, walk)
     total = constant + moving
     return Rates(total, moving / (total * time), 2.0 * moving / time + walk)
+
+
+def merged_states(sheet: Datasheet) -> dict[str, list[Rates]]:
+    """The states that a filter or window has for an aid, by name of the error, in the order of the compiled loops.
+
+    These are ``bias``, with ``current`` behind it for a log, and ``scale``, with ``misalignment`` behind it for a
+    velocity in body axes. Errors that are zero have no states, unless another one has its place behind them. The scale
+    factor of a depth sensor and the deviation of a compass have no states.
+    """
+    errors = errors_of(sheet)
+    groups = [("bias", "current"), *([("scale", "misalignment")] if equation_of(sheet).calibrates else [])]
+    found: dict[str, list[Rates]] = {}
+    for group in groups:
+        known = [errors[name] for name in group if name in errors]
+        if any(error.slow for error in known):
+            found |= {error.name: merged(error) for error in known}
+    return found
 
 
 def apart(error: Error) -> list[tuple[StateBlock, int, Rates]]:

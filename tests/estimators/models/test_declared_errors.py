@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from simnav.blocks import StateBlock
+from simnav.estimator import make
 from simnav.estimators.models import declared_errors
 from simnav.estimators.models.about_truth import AboutTruthModel
 from simnav.estimators.models.chain import chain_of
@@ -19,7 +20,10 @@ from simnav.estimators.models.ship import ShipModel
 from simnav.estimators.models.state_blocks import StateBlocks
 from simnav.estimators.models.sum_of_processes import apart, merged, with_variance
 from simnav.plugins import import_file
+from simnav.scenario import load
+from simnav.source import record
 from simnav.testing.contract_check import contract_recording
+from simnav.trial import run_trial
 from simnav.types import Datasheet, Instruments, TriadDatasheet
 
 
@@ -216,3 +220,17 @@ def test_the_states_of_faults_have_names():
     covariance = model.begin(recording.start, recording.instruments)
     _, sigma = model.estimate(covariance).states["dvl.fault_0"]
     assert sigma == pytest.approx([0.3, 0.2])
+
+
+@pytest.mark.parametrize("row", ["ekf", "ukf", "sw-fgo", "ship-ekf", "oracle"])
+def test_a_row_reports_all_states_on_request_and_estimates_the_same(row):
+    scenario = load("fishing-vessel" if row == "ship-ekf" else "harbour-multipath")
+    recording = record(scenario.model_copy(update={"duration": 4.0}), 1)
+    plain, asked = make(row), make(row)
+    asked.solver.reports_all = True
+    first, second = run_trial(plain, recording), run_trial(asked, recording)
+    assert not any(name.startswith("state.") for name in first.diagnostics)
+    found = {name.removeprefix("sigma.") for name in second.diagnostics if name.startswith("sigma.")}
+    assert any("bias" in name or "turn_on" in name or "scale" in name for name in found), found
+    assert np.array_equal(first.position, second.position)
+    assert np.array_equal(first.covariance, second.covariance, equal_nan=True)
