@@ -123,10 +123,13 @@ class StateBlock:
 
     def _figures(self, field: str) -> tuple[float, ...]:
         given = getattr(self, field)
-        try:
-            figures = np.broadcast_to(np.asarray(given, dtype=np.float64), (self.size,)).tolist()
-        except (TypeError, ValueError):
-            figures = []
+        if type(given) is float:
+            figures = [given] * self.size
+        else:
+            try:
+                figures = np.broadcast_to(np.asarray(given, dtype=np.float64), (self.size,)).tolist()
+            except (TypeError, ValueError):
+                figures = []
         if not figures or not all(isfinite(x) and x >= 0.0 for x in figures):
             raise ValueError(
                 f"block {self.name!r}: {field} = {given!r} should be one number or {self.size}, finite and not negative"

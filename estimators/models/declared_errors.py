@@ -29,8 +29,8 @@ from simnav.types import KINDS, Array, Datasheet, TriadDatasheet
 from .equations import equation_of
 
 __all__ = [
-    "CURRENT", "CURRENT_TIME", "SHORTEST", "Error", "bias_of", "error_of_fault", "errors_of", "errors_of_triad",
-    "processes_of_bias",
+    "CURRENT", "CURRENT_TIME", "SHORTEST", "Error", "bias_of", "bias_of_triad", "error_of_fault", "errors_of",
+    "errors_of_triad", "processes_of_bias", "processes_of_triad_bias",
 ]  # fmt: skip
 
 #: Sigma and correlation time of each component of the current, for a speed log [m/s], [s].
@@ -86,11 +86,6 @@ class Error:
         return _sum((2.0 * np.square(p.sigma) * p.correlation_time for p in self.fast), self.size)
 
 
-def _error(name: str, *processes: StateBlock, shortest: float = 0.0) -> Error:
-    """An error with those of the processes that are not zero."""
-    return Error(name, processes[0].size, tuple(p for p in processes if p.varies), shortest)
-
-
 def _in_run(units: tuple[str, ...], sigma: tuple[float, ...], correlation_time: float) -> StateBlock:
     """The in-run bias; with an infinite correlation time ``sigma`` is the density of a random walk."""
     if correlation_time == inf:
@@ -98,54 +93,64 @@ def _in_run(units: tuple[str, ...], sigma: tuple[float, ...], correlation_time: 
     return StateBlock.stationary("in_run", len(sigma), units, sigma, correlation_time)
 
 
+def _constant(name: str, units: str, *sigma: float) -> Error:
+    """An error of one constant process for each sigma; of no process, if all are zero."""
+    return Error(name, len(sigma), (StateBlock(name, len(sigma), units, sigma),) if any(sigma) else ())
+
+
 def processes_of_bias(sheet: Datasheet) -> tuple[StateBlock, ...]:
     """What the bias of an aid consists of."""
     units = tuple(component.error_unit for component in KINDS[sheet.kind].components)
-    return (
-        StateBlock("turn_on", len(units), units, tuple(sheet.bias.tolist())),
-        _in_run(units, tuple(sheet.bias_instability.tolist()), sheet.correlation_time),
-    )
+    found = []
+    if any(turn_on := tuple(sheet.bias.tolist())):
+        found.append(StateBlock("turn_on", len(units), units, turn_on))
+    if any(in_run := tuple(sheet.bias_instability.tolist())):
+        found.append(_in_run(units, in_run, sheet.correlation_time))
+    return tuple(found)
 
 
 def bias_of(sheet: Datasheet) -> Error:
     """The bias of an aid. A part that changes from sample to sample is white noise."""
-    return _error("bias", *processes_of_bias(sheet), shortest=0.5 / sheet.rate)
+    return Error("bias", len(sheet.sigma), processes_of_bias(sheet), 0.5 / sheet.rate)
 
 
 def errors_of(sheet: Datasheet) -> dict[str, Error]:
     """The errors that an aid may have, by name. One that is zero in the datasheet has no processes."""
     equation, found = equation_of(sheet), [bias_of(sheet)]
     if equation.through_water:
-        found.append(_error("current", StateBlock.stationary("current", 2, "m_s", CURRENT, CURRENT_TIME)))
+        current = StateBlock.stationary("current", 2, "m_s", CURRENT, CURRENT_TIME)
+        found.append(Error("current", 2, (current,)))
     if equation.has_scale:
-        found.append(_error("scale", StateBlock("scale", 1, "", sheet.scale)))
+        found.append(_constant("scale", "", sheet.scale))
     if equation.in_body:
-        found.append(_error("misalignment", StateBlock("misalignment", 3, "deg", tuple(sheet.misalignment.tolist()))))
+        found.append(_constant("misalignment", "deg", *sheet.misalignment.tolist()))
     if "deviation" in sheet.details:
-        found.append(_error("deviation", StateBlock("deviation", 2, "deg", float(sheet.details["deviation"]))))
+        found.append(_constant("deviation", "deg", *[float(sheet.details["deviation"])] * 2))
     return {error.name: error for error in found}
 
 
-def errors_of_triad(triad: TriadDatasheet, unit: str) -> dict[str, Error]:
-    """The errors of three gyroscopes or accelerometers, by name, as of `errors_of`.
+def processes_of_triad_bias(triad: TriadDatasheet, unit: str) -> tuple[StateBlock, ...]:
+    """What the bias of three gyroscopes or accelerometers consists of."""
+    found, units = [], (unit,) * 3
+    if triad.bias:
+        found.append(StateBlock("turn_on", 3, units, triad.bias))
+    if triad.bias_instability:
+        found.append(_in_run(units, (triad.bias_instability,) * 3, triad.correlation_time))
+    if triad.rate_random_walk:
+        found.append(StateBlock("walk", 3, units, 0.0, "random_walk", triad.rate_random_walk))
+    return tuple(found)
 
-    Parameters
-    ----------
-    triad : TriadDatasheet
-        Their datasheet.
-    unit : str
-        Unit of the output, a key of `simnav.spec.UNITS`.
-    """
-    bias = _error(
-        "bias",
-        StateBlock("turn_on", 3, unit, triad.bias),
-        _in_run((unit,) * 3, (triad.bias_instability,) * 3, triad.correlation_time),
-        StateBlock("walk", 3, unit, 0.0, "random_walk", triad.rate_random_walk),
-        shortest=SHORTEST,
-    )
-    scale = _error("scale", StateBlock("scale", 3, "", triad.scale))
-    misalignment = _error("misalignment", StateBlock("misalignment", 6, "deg", triad.misalignment))
-    return {error.name: error for error in (bias, scale, misalignment)}
+
+def bias_of_triad(triad: TriadDatasheet, unit: str) -> Error:
+    """The bias of three gyroscopes or accelerometers, whose output has a unit of `simnav.spec.UNITS`."""
+    return Error("bias", 3, processes_of_triad_bias(triad, unit), SHORTEST)
+
+
+def errors_of_triad(triad: TriadDatasheet, unit: str) -> dict[str, Error]:
+    """The errors of three gyroscopes or accelerometers, by name, as of `errors_of`."""
+    scale = _constant("scale", "", *[triad.scale] * 3)
+    misalignment = _constant("misalignment", "deg", *[triad.misalignment] * 6)
+    return {error.name: error for error in (bias_of_triad(triad, unit), scale, misalignment)}
 
 
 def error_of_fault(kind: str, size: Array, correlation_time: float = inf) -> StateBlock:

@@ -37,6 +37,7 @@ from .base import Linearised
 from .chain import Chain, Columns, chain_of
 from .declared_errors import bias_of
 from .equations import EQUATIONS, equation_of
+from .moving_chain import MovingChain, MovingModel
 from .own_observation import OwnObservation
 from .points import PointModel
 from .state_blocks import StateBlocks
@@ -48,7 +49,7 @@ __all__ = ["GeneralChain", "GeneralModel"]
 PART, SMALLEST = 1e-3, 1e-6
 
 
-class GeneralModel(PointModel):
+class GeneralModel(PointModel, MovingModel):
     """The model of the module; a subclass defines its abstract methods.
 
     Attributes
@@ -261,6 +262,25 @@ class GeneralModel(PointModel):
                 differences[k] = kind.difference(there, reading)
         return np.asarray(differences)
 
+    def move_all(self, states: tuple[Array, ...], elapsed: Array, jacobian: Array | None = None) -> None:
+        """As `MovingModel.move_all`."""
+        for k, (x, extra, time) in enumerate(zip(*states, elapsed.tolist(), strict=True)):
+            moved = self.move(x, time)
+            if jacobian is not None:
+                jacobian[k] = self.transition(x, moved, time)
+            x[:], extra[:] = moved, self.moved_extra(extra, time)
+
+    def difference_all(self, states: tuple[Array, ...], others: tuple[Array, ...]) -> Array:
+        """As `MovingModel.difference_all`."""
+        own = [self.difference(x, other) for x, other in zip(states[0], others[0], strict=True)]
+        return np.hstack([np.reshape(own, (len(own), self.n_own)), states[1] - others[1]])
+
+    def retract_all(self, states: tuple[Array, ...], steps: Array) -> None:
+        """As `MovingModel.retract_all`."""
+        for x, step in zip(states[0], steps, strict=True):
+            x[:] = self.retract(x, step[: self.n_own])
+        states[1][...] += steps[:, self.n_own :]
+
     def estimate(self, covariance: Array) -> Estimate:
         """The state as an estimate."""
         m = self.n_own
@@ -269,8 +289,8 @@ class GeneralModel(PointModel):
         return replace(estimate, states={**estimate.states, **states})
 
 
-class GeneralChain(Chain):
-    """The chain of a general model: a motion factor is the motion itself, from the present state of the older node.
+class GeneralChain(MovingChain):
+    """The chain of a general model.
 
     Parameters
     ----------
@@ -279,23 +299,6 @@ class GeneralChain(Chain):
     """
 
     front: GeneralModel
-
-    def _moved(self, k: int, elapsed: float) -> tuple[Array, Array, Array]:
-        """Where a node leads in a time: its two arrays, and the derivative."""
-        front, x, extra = self.front, self.nodes["x"][k], self.nodes["extra"][k]
-        moved = front.move(x, elapsed)
-        return moved, front.moved_extra(extra, elapsed), front.transition(x, moved, elapsed)
-
-    def _difference(self, x: Array, extra: Array, other: Array, other_extra: Array) -> Array:
-        return np.concatenate([self.front.difference(x, other), extra - other_extra])
-
-    def linearise_motion(self, first: int = 0) -> None:
-        """As `Chain.linearise_motion`."""
-        nodes, motions = self.nodes, self.motions
-        for k in range(first, len(motions)):
-            x, extra, F = self._moved(k, float(nodes["time"][k + 1] - nodes["time"][k]))
-            motions["residual"][k] = self._difference(nodes["x"][k + 1], nodes["extra"][k + 1], x, extra)
-            motions["jacobian"][k] = F
 
     def observe(self, first: int, row: NDArray[np.int64], states: Columns, prefix: str, jacobian: Array) -> None:
         """As `Chain.observe`."""
@@ -308,35 +311,6 @@ class GeneralChain(Chain):
             found = self.front.linearise(name, aids["time"][i], aids["value"][i, :d], x[row[i]], extra[row[i]], side)
             if found is not None:
                 aids["residual"][i, :d], jacobian[i, :d], aids["components"][i] = *found, d
-
-    def move_folds(self, first: int) -> None:
-        """As `Chain.move_folds`."""
-        nodes, folds = self.nodes, self.folds
-        for i in range(first, len(folds)):
-            k = int(folds["node"][i]) - self.base
-            elapsed = float(folds["time"][i] - nodes["time"][k])
-            folds["now_x"][i], folds["now_extra"][i], folds["jacobian"][i] = self._moved(k, elapsed)
-
-    def retract(self, step: Array) -> None:
-        """As `Chain.retract`; the motion factors need no shifts."""
-        front, nodes, m = self.front, self.nodes, self.front.n_own
-        for k, each in enumerate(step):
-            nodes["x"][k] = front.retract(nodes["x"][k], each[:m])
-        nodes["extra"][...] += step[:, m:]
-        self.prior_shift = self.relative_shift(self.prior_shift, step[0])
-
-    def along_motion(self, step: Array) -> Array:
-        """As `Chain.along_motion`."""
-        front, nodes, motions, m = self.front, self.nodes, self.motions, self.front.n_own
-        along = np.empty_like(step)
-        along[0] = step[0]
-        for k in range(len(motions)):
-            error = motions["residual"][k] + step[k + 1] - motions["jacobian"][k] @ step[k]
-            elapsed = float(nodes["time"][k + 1] - nodes["time"][k])
-            x = front.move(front.retract(nodes["x"][k], along[k, :m]), elapsed)
-            extra = front.moved_extra(nodes["extra"][k] + along[k, m:], elapsed)
-            along[k + 1] = error + self._difference(x, extra, nodes["x"][k + 1], nodes["extra"][k + 1])
-        return along
 
 
 @chain_of.register

@@ -57,7 +57,7 @@ from simnav.types import (
 )
 
 from .base import ErrorModel, Linearised, Observation
-from .declared_errors import CURRENT, bias_of, errors_of_triad
+from .declared_errors import CURRENT, bias_of, bias_of_triad
 from .equations import EQUATIONS, equation_of
 from .inertial_update import absorb_inertial, assimilate_inertial, innovate_inertial
 from .measurements import (
@@ -212,10 +212,10 @@ class InertialModel(ErrorModel):
         g, a = imu.gyroscope, imu.accelerometer
         # A level vehicle: gravity on the vertical axis, and on the others through their misalignment.
         level, vertical = (
-            errors_of_triad(replace(a, bias=float(np.hypot(a.bias, share * _GRAVITY))), "m_s2")["bias"]
+            bias_of_triad(replace(a, bias=float(np.hypot(a.bias, share * _GRAVITY))), "m_s2")
             for share in (a.misalignment, a.scale)
         )
-        gyro, acceleration = errors_of_triad(g, "deg_s")["bias"], [*merged(level)[:2], merged(vertical)[2]]
+        gyro, acceleration = bias_of_triad(g, "deg_s"), [*merged(level)[:2], merged(vertical)[2]]
         turning = merged(gyro)
         self.blocks.add(imu.name, "gyroscope_bias", turning)
         self.blocks.add(imu.name, "accelerometer_bias", acceleration)

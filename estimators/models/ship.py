@@ -35,6 +35,7 @@ from .base import ErrorModel, Linearised
 from .declared_errors import bias_of
 from .equations import equation_of
 from .measurements import wrap
+from .moving_chain import MovingModel
 from .ship_kernels import (
     BODY_VELOCITY,
     HEADING,
@@ -47,8 +48,11 @@ from .ship_kernels import (
     U,
     advance_ship,
     correct_ship,
+    correct_ships,
     describe_ship,
+    differ_ships,
     observe_ship,
+    sail_ships,
 )
 from .ship_observation import HEEL, VERTICAL_SPEED, ShipObservation
 from .state_blocks import StateBlocks
@@ -62,7 +66,7 @@ VELOCITIES = (kinds.VELOCITY, kinds.BODY_VELOCITY, kinds.WATER_SPEED)
 OBSERVED = (*POSITIONS, *VELOCITIES, kinds.HEADING)
 
 
-class ShipModel(ErrorModel):
+class ShipModel(MovingModel):
     """The model of the module.
 
     Parameters
@@ -250,6 +254,24 @@ class ShipModel(ErrorModel):
     def correct(self, dx: Array) -> None:
         """Add a correction to the state."""
         correct_ship(self.position, self.x, dx)
+
+    def move_all(self, states: tuple[Array, ...], elapsed: Array, jacobian: Array | None = None) -> None:
+        """As `MovingModel.move_all`."""
+        if jacobian is None:
+            jacobian = np.empty((len(elapsed), self.size, self.size))
+        position, x = states
+        sail_ships(position, x, elapsed, self.decay, self.turn_time, jacobian)
+
+    def difference_all(self, states: tuple[Array, ...], others: tuple[Array, ...]) -> Array:
+        """As `MovingModel.difference_all`."""
+        (position, x), (other, other_x), difference = states, others, np.empty_like(states[1])
+        differ_ships(position, x, other, other_x, difference)
+        return difference
+
+    def retract_all(self, states: tuple[Array, ...], steps: Array) -> None:
+        """As `MovingModel.retract_all`."""
+        position, x = states
+        correct_ships(position, x, steps)
 
     def estimate(self, covariance: Array) -> Estimate:
         """Horizontal position and velocity, and heading."""

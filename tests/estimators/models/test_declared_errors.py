@@ -185,8 +185,7 @@ def test_one_more_process_of_an_error_is_declared_in_one_place(monkeypatch, plug
     declared = declared_errors.processes_of_bias
 
     def with_one_more(sheet: Datasheet) -> tuple[StateBlock, ...]:
-        bias = declared(sheet)
-        return (*bias, StateBlock.stationary("warm_up", bias[0].size, bias[0].units, 3.0, 90.0))
+        return (*declared(sheet), StateBlock.stationary("warm_up", len(sheet.sigma), "", 3.0, 90.0))
 
     monkeypatch.setattr(declared_errors, "processes_of_bias", with_one_more)
     after = initial_variances(plugins)

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from simnav.estimators.models.chains import chain_of
 from simnav.estimators.models.inertial import InertialModel
 from simnav.estimators.models.ship import ShipModel
 from simnav.recording import Recording
@@ -135,3 +136,23 @@ def test_the_ship_s_readings_and_jacobians_are_those_of_differences(ship):
         np.testing.assert_allclose(found.jacobian, of_general.jacobian, atol=3e-5)
         if sheet.kind != "terrain_fix":  # its lever arm heels
             np.testing.assert_allclose(found.noise, of_general.noise, rtol=1e-14)
+
+
+def test_the_ship_s_chain_is_that_of_the_general_form(ship, recording):
+    """Residuals and derivatives of motion factors away from where the front went, and a step along the motion."""
+    chains = [chain_of(type(model)()) for model in ship[:2]]
+    rng = np.random.default_rng(2)
+    found = []
+    for chain in chains:
+        chain.begin(recording.start, Instruments([*ship[0].instruments.values()]))
+        for time in (0.6, 1.5):
+            chain.propagate(time)
+            chain.extend()
+    step = rng.standard_normal((3, chains[0].size)) * np.where(np.arange(chains[0].size) < 2, 3.0, 0.01)
+    for chain in chains:
+        chain.retract(step)
+        chain.linearise_motion()
+        motions = chain.motions
+        found.append((motions["residual"].copy(), motions["jacobian"].copy(), chain.along_motion(0.1 * step)))
+    for compiled, general in zip(*found, strict=True):
+        np.testing.assert_allclose(general, compiled, atol=2e-4)
