@@ -30,6 +30,7 @@ from simnav.spec import UNITS
 __all__ = ["NAVIGATION", "Process", "Rates", "StateBlock", "blocks_of"]
 
 Process = Literal["constant", "random_walk", "gauss_markov", "clock"]
+_PROCESSES: tuple[str, ...] = get_args(Process)
 #: In a Jacobian by block, the name of position, velocity and attitude.
 NAVIGATION = "navigation"
 
@@ -101,8 +102,8 @@ class StateBlock:
                 raise ValueError(f"{field} = {text!r} of a block of states should be in snake_case, like 'iron'")
         if isinstance(self.size, bool) or not isinstance(self.size, int) or self.size < 1:
             raise ValueError(f"block {self.name!r}: size = {self.size!r} should be an integer of 1 or more")
-        if self.process not in get_args(Process):
-            valid = ", ".join(get_args(Process))
+        if self.process not in _PROCESSES:
+            valid = ", ".join(_PROCESSES)
             raise ValueError(f"block {self.name!r}: process = {self.process!r} should be one of: {valid}")
         units = (self.units,) * self.size if isinstance(self.units, str) else tuple(self.units)
         if len(units) != self.size or any(unit and unit not in UNITS for unit in units):
@@ -125,6 +126,8 @@ class StateBlock:
         given = getattr(self, field)
         if type(given) is float:
             figures = [given] * self.size
+        elif type(given) is tuple and len(given) == self.size and all(type(x) is float for x in given):
+            figures = [*given]
         else:
             try:
                 figures = np.broadcast_to(np.asarray(given, dtype=np.float64), (self.size,)).tolist()

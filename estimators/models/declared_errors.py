@@ -29,7 +29,7 @@ from simnav.types import KINDS, Array, Datasheet, TriadDatasheet
 from .equations import equation_of
 
 __all__ = [
-    "CURRENT", "CURRENT_TIME", "SHORTEST", "Error", "bias_of", "bias_of_triad", "error_of_fault", "errors_of",
+    "CURRENT", "CURRENT_TIME", "SHORTEST", "DeclaredError", "bias_of", "bias_of_triad", "error_of_fault", "errors_of",
     "errors_of_triad", "processes_of_bias", "processes_of_triad_bias",
 ]  # fmt: skip
 
@@ -44,7 +44,7 @@ def _sum(parts: Iterable[Array], size: int) -> Array:
 
 
 @dataclass(frozen=True)
-class Error:
+class DeclaredError:
     """One error of an instrument, the sum of processes.
 
     Attributes
@@ -93,9 +93,9 @@ def _in_run(units: tuple[str, ...], sigma: tuple[float, ...], correlation_time: 
     return StateBlock.stationary("in_run", len(sigma), units, sigma, correlation_time)
 
 
-def _constant(name: str, units: str, *sigma: float) -> Error:
+def _constant(name: str, units: str, *sigma: float) -> DeclaredError:
     """An error of one constant process for each sigma; of no process, if all are zero."""
-    return Error(name, len(sigma), (StateBlock(name, len(sigma), units, sigma),) if any(sigma) else ())
+    return DeclaredError(name, len(sigma), (StateBlock(name, len(sigma), units, sigma),) if any(sigma) else ())
 
 
 def processes_of_bias(sheet: Datasheet) -> tuple[StateBlock, ...]:
@@ -109,17 +109,17 @@ def processes_of_bias(sheet: Datasheet) -> tuple[StateBlock, ...]:
     return tuple(found)
 
 
-def bias_of(sheet: Datasheet) -> Error:
+def bias_of(sheet: Datasheet) -> DeclaredError:
     """The bias of an aid. A part that changes from sample to sample is white noise."""
-    return Error("bias", len(sheet.sigma), processes_of_bias(sheet), 0.5 / sheet.rate)
+    return DeclaredError("bias", len(sheet.sigma), processes_of_bias(sheet), 0.5 / sheet.rate)
 
 
-def errors_of(sheet: Datasheet) -> dict[str, Error]:
+def errors_of(sheet: Datasheet) -> dict[str, DeclaredError]:
     """The errors that an aid may have, by name. One that is zero in the datasheet has no processes."""
     equation, found = equation_of(sheet), [bias_of(sheet)]
     if equation.through_water:
         current = StateBlock.stationary("current", 2, "m_s", CURRENT, CURRENT_TIME)
-        found.append(Error("current", 2, (current,)))
+        found.append(DeclaredError("current", 2, (current,)))
     if equation.has_scale:
         found.append(_constant("scale", "", sheet.scale))
     if equation.in_body:
@@ -141,12 +141,12 @@ def processes_of_triad_bias(triad: TriadDatasheet, unit: str) -> tuple[StateBloc
     return tuple(found)
 
 
-def bias_of_triad(triad: TriadDatasheet, unit: str) -> Error:
+def bias_of_triad(triad: TriadDatasheet, unit: str) -> DeclaredError:
     """The bias of three gyroscopes or accelerometers, whose output has a unit of `simnav.spec.UNITS`."""
-    return Error("bias", 3, processes_of_triad_bias(triad, unit), SHORTEST)
+    return DeclaredError("bias", 3, processes_of_triad_bias(triad, unit), SHORTEST)
 
 
-def errors_of_triad(triad: TriadDatasheet, unit: str) -> dict[str, Error]:
+def errors_of_triad(triad: TriadDatasheet, unit: str) -> dict[str, DeclaredError]:
     """The errors of three gyroscopes or accelerometers, by name, as of `errors_of`."""
     scale = _constant("scale", "", *[triad.scale] * 3)
     misalignment = _constant("misalignment", "deg", *[triad.misalignment] * 6)

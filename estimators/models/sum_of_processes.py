@@ -15,13 +15,13 @@ import numpy as np
 from simnav.blocks import Rates, StateBlock
 from simnav.types import Array, Datasheet
 
-from .declared_errors import Error, errors_of
+from .declared_errors import DeclaredError, errors_of
 from .equations import equation_of
 
 __all__ = ["apart", "merged", "merged_states", "with_variance"]
 
 
-def merged(error: Error) -> list[Rates]:
+def merged(error: DeclaredError) -> list[Rates]:
     """One Gauss-Markov state for each component of an error, in place of all its slow processes.
 
     With the sigma b of the turn-on bias and the sigma s and correlation time tau of the in-run bias, their sum has the
@@ -32,7 +32,7 @@ def merged(error: Error) -> list[Rates]:
 
     Parameters
     ----------
-    error : Error
+    error : DeclaredError
         An error whose processes are constants, random walks and Gauss-Markov processes.
 
     Returns
@@ -77,7 +77,7 @@ def merged_states(sheet: Datasheet) -> dict[str, list[Rates]]:
     return found
 
 
-def apart(error: Error) -> list[tuple[StateBlock, int, Rates]]:
+def apart(error: DeclaredError) -> list[tuple[StateBlock, int, Rates]]:
     """A state for each component of each slow process that is not zero: process, component and rates."""
     return [
         (process, k, rates)

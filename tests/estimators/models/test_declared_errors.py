@@ -12,7 +12,7 @@ from simnav.estimator import make
 from simnav.estimators.models import declared_errors
 from simnav.estimators.models.about_truth import AboutTruthModel
 from simnav.estimators.models.chain import chain_of
-from simnav.estimators.models.declared_errors import Error, error_of_fault, errors_of, errors_of_triad
+from simnav.estimators.models.declared_errors import DeclaredError, error_of_fault, errors_of, errors_of_triad
 from simnav.estimators.models.fault_states import FaultState, FaultStateModel
 from simnav.estimators.models.inertial import InertialModel
 from simnav.estimators.models.inertial_points import InertialPoints
@@ -27,7 +27,7 @@ from simnav.trial import run_trial
 from simnav.types import Datasheet, Instruments, TriadDatasheet
 
 
-def error(bias: float, instability: float, time: float, walk: float = 0.0) -> Error:
+def error(bias: float, instability: float, time: float, walk: float = 0.0) -> DeclaredError:
     """The bias of a triad, whose processes are all that there are."""
     triad = TriadDatasheet(bias, instability, time, rate_random_walk=walk)
     return errors_of_triad(triad, "deg_s")["bias"]
@@ -102,7 +102,7 @@ def test_two_biases_in_one_state():
 
 def test_several_gauss_markov_processes_have_the_value_and_slope_of_their_sum():
     parts = tuple(StateBlock.stationary(f"p{k}", 1, "m", s, t) for k, (s, t) in enumerate([(1.0, 50.0), (2.0, 300.0)]))
-    one = merged(Error("bias", 1, parts))[0]
+    one = merged(DeclaredError("bias", 1, parts))[0]
     assert one.variance == pytest.approx(5.0)
     assert one.variance * one.decay == pytest.approx(1.0 / 50.0 + 4.0 / 300.0)
     assert one.noise == pytest.approx(2.0 * one.variance * one.decay)
