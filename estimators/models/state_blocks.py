@@ -69,7 +69,8 @@ class StateBlocks:
         self._names: dict[str, tuple[str, ...]] = {}
         self.clocks: list[int] = []
         self._clocks: list[tuple[int, StateBlock]] = []
-        self._rates: tuple[Array, Array, Array] | None = None
+        self._columns: Array | None = None
+        self._step: tuple[float, Array, Array] | None = None
 
     def __len__(self) -> int:
         return len(self.at)
@@ -114,24 +115,27 @@ class StateBlocks:
     def _append(self, label: str, rates: Sequence[Rates]) -> slice:
         at = self.at[label] = slice(self.size, self.size + len(rates))
         self.states += rates
-        self._rates = None
+        self._columns = self._step = None
         return at
 
     def step(self, elapsed: float) -> tuple[Array, Array]:
         """What a time [s] does to the components: factors by which they decay, and variances that are added to them.
 
-        What belongs to clocks beyond that is done by `carry` and `add_noise`.
+        What belongs to clocks beyond that is done by `carry` and `add_noise`. Both arrays are kept until another time
+        is asked for; they are not to be changed.
         """
-        if self._rates is None:
-            self._rates = self.columns(self.first)
-        _, rate, density = self._rates
-        decay, noise, moving = np.exp(-rate * elapsed), density * elapsed, rate > 0.0
-        noise[moving] = density[moving] * (1.0 - decay[moving] ** 2) / (2.0 * rate[moving])
-        return decay, noise
+        if self._step is None or self._step[0] != elapsed:
+            _, rate, density = self.columns(self.first)
+            decay, noise, moving = np.exp(-rate * elapsed), density * elapsed, rate > 0.0
+            noise[moving] = density[moving] * (1.0 - decay[moving] ** 2) / (2.0 * rate[moving])
+            self._step = elapsed, decay, noise
+        return self._step[1:]
 
     def columns(self, first: int) -> tuple[Array, Array, Array]:
         """Initial variance, decay and noise density of the components from an index of the error state on."""
-        variance, decay, noise = np.array(self.states[first - self.first :]).reshape(-1, 3).T.copy()
+        if self._columns is None:
+            self._columns = np.array(self.states, dtype=np.float64).reshape(-1, 3).T.copy()
+        variance, decay, noise = self._columns[:, first - self.first :]
         return variance, decay, noise
 
     def places(self, name: str, offset: int) -> dict[str, int]:
