@@ -94,7 +94,7 @@ def _in_run(units: tuple[str, ...], sigma: tuple[float, ...], correlation_time: 
 
 
 def _constant(name: str, units: str, *sigma: float) -> DeclaredError:
-    """An error of one constant process for each sigma; of no process, if all are zero."""
+    """A constant error with a sigma for each component; without a process if all are zero."""
     return DeclaredError(name, len(sigma), (StateBlock(name, len(sigma), units, sigma),) if any(sigma) else ())
 
 

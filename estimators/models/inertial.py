@@ -245,8 +245,9 @@ class InertialModel(ErrorModel):
             white = bias.white_variance()
             if self.calibrate:
                 at = {name: self.blocks.add(sheet.name, name, rates) for name, rates in states.items()}
-                self.bias_at |= {sheet.name: at["bias"]} if "bias" in at else {}
-                self.scale_at |= {sheet.name: at["scale"]} if "scale" in at else {}
+                for places, name in ((self.bias_at, "bias"), (self.scale_at, "scale")):
+                    if name in at:
+                        places[sheet.name] = at[name]
             else:
                 along_keel = CURRENT**2 if equation.through_water else 0.0
                 white = white + [rates.variance + along_keel for rates in merged(bias)]

@@ -72,9 +72,6 @@ class StateBlocks:
         self._columns: Array | None = None
         self._step: tuple[float, Array, Array] | None = None
 
-    def __len__(self) -> int:
-        return len(self.at)
-
     @property
     def size(self) -> int:
         """Number of components of the error state up to the last block."""
