@@ -17,6 +17,7 @@ from simnav.sensors.depth import Depth
 from simnav.sensors.dvl import Dvl
 from simnav.sensors.faults import AnyFault, FaultLayer, FaultSpec, build_layers, fault_specs, labels, register_fault
 from simnav.sensors.gnss import GnssPosition, GnssVelocity
+from simnav.sensors.gnss_raw import GnssRaw
 from simnav.sensors.imu import Imu, ImuSpec
 from simnav.sensors.instrument import AidSpec, Instrument, register_instrument
 from simnav.sensors.speed_log import SpeedLog
@@ -33,6 +34,7 @@ __all__ = [
     "FaultLayer",
     "FaultSpec",
     "GnssPosition",
+    "GnssRaw",
     "GnssVelocity",
     "Gyrocompass",
     "Imu",
