@@ -41,13 +41,13 @@ from simnav.sensors.instrument import ZERO, AidSpec, Instrument, register_instru
 from simnav.spec import NonNegative, Positive, SpecError, Vector, closest, quantity
 from simnav.types import NO_SIDE, Array, TapStates
 
-__all__ = ["SYSTEMS", "GnssRaw", "RawReceiver"]
+__all__ = ["SHIPPED", "SHIPPED_EPOCH", "SYSTEMS", "GnssRaw", "RawReceiver"]
 
 #: Letters of the systems in names of satellites, as RINEX has them.
 SYSTEMS: Mapping[str, str] = {"gps": "G", "galileo": "E", "beidou": "C"}
 #: The ephemerides that come with simnav, and a time at which they are valid.
-_SHIPPED = Path(__file__).parent.parent / "satellites" / "data" / "2023-03-12-noon.rnx"
-_SHIPPED_EPOCH = "2023-03-12T12:00:00"
+SHIPPED = Path(__file__).parent.parent / "satellites" / "data" / "2023-03-12-noon.rnx"
+SHIPPED_EPOCH = "2023-03-12T12:00:00"
 #: How often the sky is looked at when the satellites of a place are chosen [s].
 _GLANCE = 60.0
 
@@ -157,7 +157,7 @@ class GnssRaw(AidSpec):
 
     kind: Literal["gnss_raw"] = "gnss_raw"
     navigation: str = ""
-    epoch: str = _SHIPPED_EPOCH
+    epoch: str = SHIPPED_EPOCH
     satellites: _Texts = ()
     systems: tuple[Literal["gps", "galileo", "beidou"], ...] = ("gps", "galileo")
     latitude: float | None = quantity("deg", None)
@@ -186,18 +186,11 @@ class GnssRaw(AidSpec):
         try:
             gps_time(_epoch(text))
         except ValueError:
-            raise ValueError(f"epoch = {text!r} should be a GPS time from 1980 on, like '{_SHIPPED_EPOCH}'") from None
+            raise ValueError(f"epoch = {text!r} should be a GPS time from 1980 on, like '{SHIPPED_EPOCH}'") from None
         return text
 
     @model_validator(mode="after")
     def _chosen(self) -> Self:
-        if not self.satellites and (self.latitude is None or self.longitude is None):
-            raise ValueError(
-                "latitude_deg and longitude_deg of the waters are missing, by which satellites are chosen; "
-                "alternatively satellites = ['G05', ...] names them"
-            )
-        if not self.satellites and not self.systems:
-            raise ValueError(f"systems is empty; it should name some of: {', '.join(SYSTEMS)}")
         for satellite in self.satellites:
             valid = self.ephemerides().satellites()
             if satellite not in valid:
@@ -209,7 +202,7 @@ class GnssRaw(AidSpec):
 
     def ephemerides(self) -> Ephemerides:
         """The broadcast ephemerides."""
-        path = Path(self.navigation).expanduser() if self.navigation else _SHIPPED
+        path = Path(self.navigation).expanduser() if self.navigation else SHIPPED
         try:
             state = path.stat()
         except OSError as error:
@@ -220,8 +213,13 @@ class GnssRaw(AidSpec):
         """The satellites."""
         if self.satellites:
             return self.satellites
-        assert self.latitude is not None
-        assert self.longitude is not None
+        if self.latitude is None or self.longitude is None:
+            raise ValueError(
+                "latitude_deg and longitude_deg of the waters are missing, by which satellites are chosen; "
+                "alternatively satellites = ['G05', ...] names them"
+            )
+        if not self.systems:
+            raise ValueError(f"systems is empty; it should name some of: {', '.join(SYSTEMS)}")
         letters = "".join(SYSTEMS[name] for name in self.systems)
         return _risen(self.ephemerides(), self.epoch, letters, self.latitude, self.longitude, self.span, self.mask)
 
