@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -59,3 +59,22 @@ def delays(
     hydrostatic = rtk.tropmodel(time, place, zenith, 0.0)
     vapour = rtk.tropmodel(time, place, zenith, 0.5) - hydrostatic
     return rtk.ionmodel(time, array(klobuchar), place, towards), hydrostatic * dry + vapour * wet[0], wet[0]
+
+
+def point(path: str, week: int, second: float, satellites: Sequence[str], raw: np.ndarray) -> np.ndarray:
+    """RTKLIB's position [m] of pseudoranges on L1 at a time of the receiver's clock, with Klobuchar's ionosphere."""
+    observations = rtk.Arr1Dobsd_t(len(satellites))
+    for j, name in enumerate(satellites):
+        one = observations[j]
+        one.time, one.rcv, one.sat = rtk.gpst2time(week, second), 1, rtk.satid2no(name)
+        one.P[0], one.code[0], one.SNR[0] = raw[j], rtk.CODE_L1C, 45000
+    options = rtk.prcopt_default
+    options.mode, options.navsys, options.elmin = rtk.PMODE_SINGLE, rtk.SYS_GPS | rtk.SYS_GAL, 0.0
+    options.ionoopt, options.tropopt = rtk.IONOOPT_BRDC, rtk.TROPOPT_OFF
+    solution, message, states = rtk.sol_t(), rtk.Arr1Dchar(256), rtk.Arr1Dssat_t(rtk.MAXSAT)
+    directions = array(np.zeros(2 * len(satellites)))
+    table = navigation(path)
+    assert rtk.pntpos(
+        observations.ptr, len(satellites), table, options, solution, directions, states.ptr, message
+    )  # fmt: skip
+    return np.array([solution.rr[k] for k in range(3)])
