@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.stats import chi2
@@ -12,6 +14,7 @@ from simnav.recording import Recording
 from simnav.scenario import Scenario
 from simnav.source import record
 from simnav.trial import Trial, run_trial
+from simnav.types import Instruments
 from tests.cases.raw_gnss import raw_gnss
 
 
@@ -74,11 +77,45 @@ def test_a_satellite_with_an_error_is_flagged_alone():
     assert np.linalg.norm(error(trial, recording)[-1, :2]) < 3.0
 
 
-@pytest.mark.parametrize("satellites", [3, 2])
-def test_few_satellites_hold_the_estimate(satellites):
-    """For half a minute most satellites are gone; the velocity is held by the rest."""
-    gone = ["G11", "G12", "G28", "E27", "E36", "G25"][: 8 - satellites]
-    outage = f'[[fault]]\nkind = "outage"\ninstruments = "gnss"\nchannels = {gone}\nstart_s = 20.0\nend_s = 50.0\n'
-    free = outage.replace(str(gone), '["G11", "G12", "G25", "G28", "G29", "E27", "E30", "E36"]')
-    held, alone = (np.linalg.norm(error(*run("ekf", raw_gnss(50.0, tables), 4))[-1, :2]) for tables in (outage, free))
-    assert held < alone
+RECEIVER = """
+[instruments.fix]
+kind = "gnss_receiver"
+observations = "gnss"
+sigma_m = [0.5, 0.5, 1.0]
+bias_instability_m = [1.0, 1.0, 3.0]
+correlation_time_s = 600.0
+lever_arm_m = [-3.0, 0.0, -12.0]
+[instruments.doppler]
+kind = "gnss_receiver_velocity"
+observations = "gnss"
+sigma_m_s = [0.04, 0.04, 0.08]
+lever_arm_m = [-3.0, 0.0, -12.0]
+[[fault]]
+kind = "outage"
+instruments = "gnss"
+channels = {0}
+start_s = 120.0
+end_s = 181.0
+"""
+
+
+def of_instruments(recording: Recording, *names: str) -> Recording:
+    """The recording with some of its instruments only."""
+    given = recording.instruments
+    sheets = [sheet for sheet in given.values() if sheet.name in names]
+    data = replace(recording.data, aids={name: recording.data.aids[name] for name in names})
+    return replace(recording, instruments=Instruments(sheets, given.imu, given.step), data=data)
+
+
+@pytest.mark.parametrize(("left", "share"), [(("G11", "G12", "E27"), 0.5), (("G12", "E27"), 1.0)])
+def test_tight_coupling_uses_what_is_left(left, share):
+    """With three satellites for a minute the error is at most half of that with the receiver, which is silent then."""
+    gone = [s for s in raw_gnss().aids["gnss"].channels() if s not in left]
+    errors = {"raw": [], "receiver": []}
+    for seed in range(3):
+        recording = record(raw_gnss(180.0, RECEIVER.format(gone)), seed)
+        for form, names in (("raw", ("gnss",)), ("receiver", ("fix", "doppler"))):
+            part = of_instruments(recording, *names)
+            errors[form].append(np.linalg.norm(error(run_trial(make("ekf"), part), part)[-1, :2]))
+    raw, receiver = (np.sqrt(np.mean(np.square(errors[form]))) for form in ("raw", "receiver"))
+    assert raw <= share * receiver
