@@ -11,6 +11,10 @@ errors of orbit, clock and multipath of the satellite: x_j is a Gauss-Markov pro
 sigma at the elevation (`simnav.satellites.signal_errors`). b and d, f, z and all x_j are blocks of states, so every
 estimator with an inertial model knows of them. The receiver has already corrected the pseudorange for the broadcast
 error of the satellite's clock, and says where the satellite is. With two frequencies there is no I_j.
+
+If the surroundings have ``obstacles`` (`simnav.world.obstacles`), a signal whose direct way is blocked arrives by a
+reflection or not at all, and a signal with a reflection has the error of `simnav.satellites.multipath`. The vessel's
+own structures block, too (`shadows`). Estimators are not told of either.
 """
 
 from __future__ import annotations
@@ -24,12 +28,13 @@ from typing import Annotated, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import StringConstraints, field_validator, model_validator
+from pydantic import Field, StringConstraints, field_validator, model_validator
 
 from simnav.blocks import StateBlock
 from simnav.geometry.earth import displace
 from simnav.kinds import Component, Kind
 from simnav.satellites.ephemeris import Ephemerides
+from simnav.satellites.multipath import multipath_error, strength_change
 from simnav.satellites.receiver_clock import Grade, clock_block
 from simnav.satellites.rinex_navigation import read_navigation
 from simnav.satellites.signal_errors import amplification, density_ratio, noise_factor, range_error
@@ -37,9 +42,10 @@ from simnav.satellites.sky import Sight, Sky
 from simnav.satellites.time_scales import gps_time
 from simnav.sensors.channels import ChannelInstrument
 from simnav.sensors.gnss_observation import DENSITY_RATIO, SIDE, observe, reading_sigma
-from simnav.sensors.instrument import ZERO, AidSpec, Instrument, register_instrument, turn_to_ned
+from simnav.sensors.instrument import ZERO, AidSpec, Instrument, register_instrument, turn_to_body, turn_to_ned
 from simnav.spec import NonNegative, Positive, SpecError, Vector, closest, quantity
 from simnav.types import NO_SIDE, Array, TapStates
+from simnav.world.obstacles import Paths
 
 __all__ = ["SHIPPED", "SHIPPED_EPOCH", "SYSTEMS", "GnssRaw", "RawReceiver"]
 
@@ -81,6 +87,7 @@ def _risen(
     return found
 
 
+_Shadows = tuple[tuple[float, float, float], ...]
 _Texts = tuple[Annotated[str, StringConstraints(min_length=1)], ...]
 
 
@@ -123,6 +130,13 @@ class GnssRaw(AidSpec):
         Least elevation [rad], and least C/N0 [dB-Hz], at which a signal is tracked.
     frequencies : int
         1, or 2: the combination without ionosphere.
+    shadows : tuple of (float, float, float)
+        Sectors that the vessel's own structures block: from one azimuth clockwise to another, relative to the bow, and
+        up to an elevation above the deck [rad].
+    reflection : float
+        Amplitude of a signal reflected by an obstacle, in units of the direct one.
+    spacing : float
+        Of early and late correlator [chips].
     signal_error : float
         One sigma of the error of orbit and clock of a satellite, along the line of sight [m].
     multipath : float
@@ -168,6 +182,9 @@ class GnssRaw(AidSpec):
     frequencies: Literal[1, 2] = 1
     sigma_pseudorange: NonNegative = quantity("m")
     sigma_range_rate: NonNegative = quantity("m_s")
+    shadows: _Shadows = quantity("deg", ())
+    reflection: float = Field(0.5, ge=0.0, lt=1.0)
+    spacing: float = Field(0.1, gt=0.0, le=1.0)
     signal_error: NonNegative = quantity("m", 0.5)
     multipath: NonNegative = 1.0
     correlation_time: Positive = quantity("s", 600.0)
@@ -255,15 +272,56 @@ class RawReceiver(ChannelInstrument):
         super().__init__(spec, name, seed)
         self.spec = spec
         self.sky = Sky(spec.ephemerides(), self.channels, _epoch(spec.epoch))
-        self._last: tuple[TapStates, Sight] | None = None
+        self._last: tuple[TapStates, Sight, Paths | None] | None = None
 
-    def sight(self, tap: TapStates) -> Sight:
-        """What the satellites look like from the antenna, at n times."""
+    def _seen(self, tap: TapStates) -> tuple[Sight, Paths | None]:
+        """The satellites from the antenna at n times, and the ways of their signals; None: nothing is in the way."""
         if self._last is None or self._last[0] is not tap:
             position = displace(tap.position, self.lever_displacement(tap))
             velocity = tap.velocity + turn_to_ned(tap.attitude, self.lever_velocity(tap))
-            self._last = tap, self.sky.sight(tap.time, position, velocity)
-        return self._last[1]
+            seen, obstacles = self.sky.sight(tap.time, position, velocity), self.surroundings.get("obstacles")
+            paths = None
+            if obstacles is not None:
+                paths = obstacles.paths(position, velocity, seen.elevation, seen.azimuth)
+            self._last = tap, seen, paths
+        return self._last[1:]
+
+    def sight(self, tap: TapStates) -> Sight:
+        """What the satellites look like from the antenna, at n times."""
+        return self._seen(tap)[0]
+
+    def detour(self, tap: TapStates) -> tuple[Array, Array]:
+        """(n, c) errors of ranges [m] and rates [m/s] by obstacles; zero for signals that are blocked altogether."""
+        seen, paths = self._seen(tap)
+        if paths is None:
+            return np.zeros(seen.range.shape), np.zeros(seen.range.shape)
+        alone = paths.blocked & np.isfinite(paths.excess)
+        both = multipath_error(paths.excess, self.spec.reflection, self.spec.spacing)
+        error = np.where(alone, paths.excess, np.where(paths.blocked, 0.0, both))
+        return error, np.where(alone, paths.excess_rate, 0.0)
+
+    def ratio(self, tap: TapStates) -> Array:
+        """(n, c) C/N0 [dB-Hz]; minus infinity for signals that are blocked altogether."""
+        seen, paths = self._seen(tap)
+        ratio = density_ratio(seen.elevation)
+        if paths is not None:
+            weaker = 20.0 * np.log10(max(self.spec.reflection, 1e-9))
+            alone = np.where(np.isfinite(paths.excess), weaker, -np.inf)
+            ratio = ratio + np.where(paths.blocked, alone, strength_change(paths.excess, self.spec.reflection))
+        for first, last, highest in self.spec.shadows:
+            azimuth, elevation = self._from_deck(tap, seen)
+            within = (azimuth - first) % (2.0 * np.pi) <= (last - first) % (2.0 * np.pi)
+            ratio = np.where(within & (elevation <= highest), -np.inf, ratio)
+        return ratio
+
+    def _from_deck(self, tap: TapStates, seen: Sight) -> tuple[Array, Array]:
+        """(n, c) azimuths relative to the bow, and elevations above the deck [rad]."""
+        level = np.cos(seen.elevation)
+        ned = (level * np.cos(seen.azimuth), level * np.sin(seen.azimuth), -np.sin(seen.elevation))
+        body = np.empty((*seen.elevation.shape, 3))
+        for j in range(body.shape[1]):
+            body[:, j] = turn_to_body(tap.attitude, np.stack([part[:, j] for part in ned], axis=1))
+        return np.arctan2(body[..., 1], body[..., 0]), np.arcsin(np.clip(-body[..., 2], -1.0, 1.0))
 
     def lasting(self, tap: TapStates) -> Array:
         """(n, c) errors of the ranges that last for minutes: of orbit, clock, multipath and atmosphere [m]."""
@@ -281,13 +339,14 @@ class RawReceiver(ChannelInstrument):
         pseudorange = seen.range + clock[:, :1] + seen.troposphere + self.lasting(tap)
         if self.spec.frequencies == 1:
             pseudorange += seen.ionosphere
-        return np.stack([pseudorange, seen.range_rate + clock[:, 1:]], axis=2)
+        further, faster = self.detour(tap)
+        return np.stack([pseudorange + further, seen.range_rate + clock[:, 1:] + faster], axis=2)
 
     def side_information(self, tap: TapStates) -> Array:
         """See `ChannelInstrument.side_information`."""
         seen = self.sight(tap)
         rest = (
-            seen.elevation, seen.azimuth, density_ratio(seen.elevation),
+            seen.elevation, seen.azimuth, self.ratio(tap),
             seen.ionosphere, seen.troposphere, seen.mapping,
         )  # fmt: skip
         return np.concatenate([seen.position, seen.velocity, np.stack(rest, axis=2)], axis=2)
@@ -302,5 +361,5 @@ class RawReceiver(ChannelInstrument):
         """See `ChannelInstrument.available`: where the satellite is above the mask, and its signal strong enough."""
         elevation = self.sight(tap).elevation
         with np.errstate(invalid="ignore"):
-            there: NDArray[np.bool_] = (elevation >= self.spec.mask) & (density_ratio(elevation) >= self.spec.lock)
+            there: NDArray[np.bool_] = (elevation >= self.spec.mask) & (self.ratio(tap) >= self.spec.lock)
         return there
