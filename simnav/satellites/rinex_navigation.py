@@ -48,6 +48,8 @@ _LIMITS = {
 }  # fmt: skip
 #: The reference times of orbit and clock are never this far apart [s].
 _APART = 86400.0
+#: Size of a file, decompressed: a day of all satellites of the world has 15 MiB.
+_MOST_BYTES = 200 * 2**20
 #: Bits of a Galileo message's sources: I/NAV of E1 and E5b.
 _INAV = 0b101
 
@@ -127,12 +129,17 @@ def read_navigation(path: str | Path) -> Ephemerides:
 
 def _lines(path: Path) -> list[_Line]:
     try:
-        content = path.read_bytes()
-        if path.suffix == ".gz":
-            content = gzip.decompress(content)
-    except (OSError, EOFError, zlib.error) as error:
+        if path.exists() and not path.is_file():
+            raise NavigationFileError(f"{path}: the navigation file cannot be read: it is no regular file")
+        with gzip.open(path) if path.suffix == ".gz" else path.open("rb") as file:
+            content = file.read(_MOST_BYTES + 1)
+    except (OSError, EOFError, zlib.error, ValueError) as error:
+        if isinstance(error, NavigationFileError):
+            raise
         reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
         raise NavigationFileError(f"{path}: the navigation file cannot be read: {reason}") from None
+    if len(content) > _MOST_BYTES:
+        raise NavigationFileError(f"{path}: the navigation file has more than {_MOST_BYTES // 2**20} MiB")
     return [_Line(path, k, text.rstrip("\r")) for k, text in enumerate(content.decode("latin-1").split("\n"), 1)]
 
 

@@ -19,16 +19,24 @@ own structures block, too (`shadows`). Estimators are not told of either.
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Mapping
 from datetime import datetime
 from functools import lru_cache
 from math import radians
 from pathlib import Path
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, StringConstraints, field_validator, model_validator
+from pydantic import (
+    Field,
+    SerializerFunctionWrapHandler,
+    StringConstraints,
+    field_validator,
+    model_serializer,
+    model_validator,
+)
 
 from simnav.blocks import StateBlock
 from simnav.geometry.earth import displace
@@ -216,6 +224,16 @@ class GnssRaw(AidSpec):
                     f"{closest(satellite, valid)}"
                 )
         return self
+
+    @model_serializer(mode="wrap")
+    def _with_content(self, serialize: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """The digest of a scenario changes with the content of its navigation file."""
+        table: dict[str, Any] = serialize(self)
+        if self.navigation:
+            ephemerides = self.ephemerides()
+            content = repr(ephemerides.satellite).encode() + ephemerides.numbers.tobytes()
+            table["ephemerides"] = hashlib.blake2b(content, digest_size=16).hexdigest()
+        return table
 
     def ephemerides(self) -> Ephemerides:
         """The broadcast ephemerides."""

@@ -122,6 +122,8 @@ def test_no_file_and_no_ephemeris(tmp_path, lines):
         read_navigation(tmp_path / "absent.rnx")
     with pytest.raises(NavigationFileError, match=r"nav.rnx: there is no ephemeris of GPS, Galileo or BeiDou in it"):
         read_navigation(written(tmp_path, "\n".join(lines[:10])))
+    with pytest.raises(NavigationFileError, match=r"the navigation file cannot be read: it is no regular file"):
+        read_navigation(tmp_path)
     (tmp_path / "broken.gz").write_bytes(gzip.compress(b"x" * 1000)[:-5])
     with pytest.raises(NavigationFileError, match=r"broken.gz: the navigation file cannot be read"):
         read_navigation(tmp_path / "broken.gz")

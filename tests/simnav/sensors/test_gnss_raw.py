@@ -12,10 +12,11 @@ from simnav.geometry.rotation import dcm_from_rotation_vector, dcm_from_rpy
 from simnav.kinds import NavigationPoint
 from simnav.satellites.receiver_clock import GRADES
 from simnav.satellites.signal_errors import density_ratio, noise_factor, range_error
-from simnav.sensors.gnss_raw import GnssRaw
+from simnav.sensors.gnss_raw import SHIPPED, GnssRaw
 from simnav.sensors.instrument import turn_to_ned
 from simnav.spec import SpecError
 from simnav.types import TapStates
+from tests.cases.raw_gnss import raw_gnss
 
 TABLE = {
     "satellites": ["G12", "G29", "E27", "E30", "C26"], "sigma_pseudorange_m": 0.3, "sigma_range_rate_m_s": 0.05,
@@ -184,6 +185,17 @@ def test_satellites_are_chosen_by_the_waters():
     assert set(GnssRaw.from_toml(waters | {"systems": ["beidou"]}).channels()).isdisjoint(both)
     high = GnssRaw.from_toml(waters | {"mask_deg": 30.0, "span_s": 0.0}).channels()
     assert set(high) < set(both)
+
+
+def test_the_digest_of_a_scenario_depends_on_its_navigation_file(tmp_path):
+    path = tmp_path / "nav.rnx"
+    digests = []
+    for text in (SHIPPED.read_text(), SHIPPED.read_text().replace("2.035847865045e-04", "2.035847865046e-04")):
+        path.write_text(text)
+        scenario = raw_gnss()
+        other = GnssRaw.from_toml(TABLE | {"navigation": str(path)})
+        digests.append(scenario.model_copy(update={"instruments": {"gnss": other}}).content_hash())
+    assert digests[0] != digests[1]
 
 
 @pytest.mark.parametrize(
