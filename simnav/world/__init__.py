@@ -18,6 +18,7 @@ from simnav.world.manoeuvres import (
     Waypoints,
     ZigZag,
 )
+from simnav.world.obstacles import Obstacle, Obstacles
 from simnav.world.sea import Sea
 from simnav.world.start import Start
 from simnav.world.surroundings import (
@@ -49,6 +50,8 @@ __all__ = [
     "KinematicVessel",
     "LawnMower",
     "Manoeuvre",
+    "Obstacle",
+    "Obstacles",
     "SampledTrajectory",
     "Sea",
     "Ship",
