@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 from simnav.estimator import Estimator, describe, find, make, names, register
-from simnav.estimator.lookup import former_names_of
 from simnav.estimator.looking_back import LAGS
+from simnav.estimator.lookup import former_names_of
 from simnav.estimator.parameters import former_names, under_present_names
 from simnav.leaderboard.results.admission import label_fault, lookalikes
 from simnav.leaderboard.results.errors import RequestError, mistakes
