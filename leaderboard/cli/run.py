@@ -13,6 +13,7 @@ from simnav.leaderboard.ranking import tables
 from simnav.leaderboard.results.errors import RequestError
 from simnav.leaderboard.running import run
 from simnav.scoring.consistency import ending
+from simnav.scoring.lagged import seconds_of
 
 from .commands import RunCommand
 from .console import FAILED, USER, Output
@@ -49,6 +50,8 @@ def show(out: Output, request: RunCommand) -> None:
         document |= {"stanford": integrity, "stanford_plot": None if shown is None else str(shown)}
     out.document(document)
     out.print(_table(report))
+    if any("_lag_" in name for e in report.estimators for name in e.scores):
+        out.print(_late(report))
     for e in report.estimators:
         if e.status != "ok":
             out.remark(f"{e.estimator}: {e.status}: {e.reason}")
@@ -64,6 +67,16 @@ def show(out: Output, request: RunCommand) -> None:
         out.code = FAILED
     elif all(e.status == "unsuitable" for e in report.estimators):
         out.code = USER
+
+
+def _late(report: RunReport) -> tables.Fitted:
+    """Horizontal RMSE against the delay of the output: a row an estimator, a column a lag."""
+    base = "horizontal_rmse"
+    names = {n for e in report.estimators for n in e.scores if n.startswith(f"{base}_lag_")}
+    lags = sorted(names, key=lambda name: seconds_of(name.rpartition("_")[2]))
+    columns = ["estimator", "newest", *(f"{seconds_of(n.rpartition('_')[2]):g} s late" for n in lags)]
+    cells = [[e.estimator, *(tables.number(e.scores.get(s)) for s in (base, *lags))] for e in report.estimators]
+    return tables.Fitted("Horizontal RMSE [m] of an output that is late", columns, cells, columns, numeric=columns[1:])
 
 
 def _table(report: RunReport) -> tables.Fitted:

@@ -14,6 +14,7 @@ the end of the step, and all its scores, are as without ``lags``.
 from __future__ import annotations
 
 import math
+import re
 from collections import deque
 from collections.abc import Sequence
 from typing import Any
@@ -43,7 +44,7 @@ def lags_of(given: Any) -> tuple[float, ...]:
     Parameters
     ----------
     given : str, float or sequence of float
-        A text has them with a slash between.
+        A text has them with a slash or a comma between.
 
     Raises
     ------
@@ -55,7 +56,7 @@ def lags_of(given: Any) -> tuple[float, ...]:
     >>> lags_of("10/5/29.5"), lags_of(10)
     ((5.0, 10.0, 29.5), (10.0,))
     """
-    parts = given.split("/") if isinstance(given, str) else [given] if isinstance(given, (int, float)) else given
+    parts = re.split("[/,]", given) if isinstance(given, str) else [given] if isinstance(given, (int, float)) else given
     try:
         found = sorted({float(part) for part in parts})
     except (TypeError, ValueError):

@@ -26,7 +26,7 @@ from simnav.scoring.registry import Score, ScoringInput, register_family
 from simnav.trial import Trial
 from simnav.types import Array, NavigationStates
 
-__all__ = ["lagged_errors", "lags_in"]
+__all__ = ["lagged_errors", "lags_in", "seconds_of"]
 
 _PREFIX = "lagged."
 _BETWEEN = "_lag_"
