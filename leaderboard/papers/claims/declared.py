@@ -96,7 +96,12 @@ def _mao_road(name: str, axis: str, gain: float) -> Claim:
 def _both_told(setting: Setting, value: Choice) -> Setting:
     """Both methods are told the datasheet of ours, and the true noise is larger."""
     keys = {"instruments.gnss.times_datasheet": {"sigma": value}}
-    return setting.on(with_keys(setting.scenario, "both-told", value, keys))
+    return setting if value == 1.0 else setting.on(with_keys(setting.scenario, "both-told", value, keys))
+
+
+def _learned(setting: Setting, value: Choice) -> Setting:
+    """As `_both_told`, with inputs of the network that are relative to the noise of the last innovations."""
+    return _both_told(setting.with_parameters("row", level="learned"), value)
 
 
 def _than_told(setting: Setting, value: Choice) -> Setting:
@@ -124,6 +129,8 @@ def _jiang(name: str, motion: str, scenario: str) -> Claim:
                  why=_NETWORK),
             Dial("both-told", "the true GNSS noise, as a multiple of what both are told (4 m),", "", told, _both_told,
                  1.0, "for comparison: the network is told the wrong noise as well"),
+            Dial("both-told-learned", "the same, with a network that learns the level of the noise", "", told, _learned,
+                 why="for comparison: anfis-fgo with level=learned"),
             scenario_dial("noise", "the GNSS noise for 200 s of the run, as a multiple of the datasheet's,", "",
                           (1.0, 3.0, 5.0, 10.0), _noise_step, ours=1.0,
                           why="the text does not say that the noise of its GNSS changes"),
