@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 from simnav.leaderboard.claiming import claim
 from simnav.leaderboard.figures.style import save_as
@@ -17,9 +16,6 @@ from simnav.leaderboard.results.errors import mistakes
 from .commands import ClaimCommand
 from .console import Output
 from .options import absolute, campaign_progress, require_figure
-
-if TYPE_CHECKING:
-    from simnav.leaderboard.papers.claims.answer import Answer
 
 __all__ = ["show"]
 
@@ -39,8 +35,7 @@ def show(out: Output, request: ClaimCommand) -> None:
             written = save_as(answer.plot(), absolute(request.plot))
     out.document({**answer.to_dict(), "figure": None if written is None else str(written)})
     out.print(f"claim: {answer.sentence}", f"       {answer.row} against {answer.than} on {answer.scenario}")
-    if any(d.points for d in answer.dials):
-        out.print(_table(answer))
+    out.print(*answer.shown())
     for dial in answer.dials:
         if dial.why:
             out.print(f"{dial.name}: {dial.why}")
@@ -54,23 +49,6 @@ def show(out: Output, request: ClaimCommand) -> None:
                   f"again: simnav claim {answer.claim} --holds-if all")  # fmt: skip
     if written is not None:
         out.print(f"figure:  {written}")
-
-
-def _table(answer: Answer) -> tables.Fitted:
-    """A row for each value of each dial."""
-    rows = []
-    for dial in answer.dials:
-        title = dial.title.rstrip(",")
-        for point in dial.points:
-            judged = dial.judged is not None and dial.judged.value == point.value
-            other = gain_text(dial.judged) if judged and dial.judged is not None else ""
-            ours = "ours" if point.value == dial.ours else ""
-            verdict = dial.judged.standing(answer.limit) if judged and dial.judged is not None else ""
-            rows.append([title, dial.text(point.value), ours, gain_text(point), other, verdict])
-            title = ""
-    columns = ["varied", "value", "", "gain (search)", "gain (judgement)", "verdict"]
-    return tables.Fitted(f"{answer.claim}: claimed gain {100.0 * answer.gain:.1f} %", columns, rows,
-                         ["value", "gain (search)", "verdict", "gain (judgement)", "varied", ""], always=2)  # fmt: skip
 
 
 def _list(out: Output, paper: str) -> None:

@@ -12,6 +12,7 @@ from simnav.leaderboard.ranking.stored_costs import NOT_MEASURED, CostMultiple, 
 
 from .charts import accuracy_and_cost, columns, detection, spread, spread_data
 from .columns import Column, column_dicts
+from .heatmap import heatmap
 from .rounding import short
 
 if TYPE_CHECKING:
@@ -172,13 +173,15 @@ def board_row(
         notes.append("provisional")
     if row.learned:
         notes.append("learned")
+    if row.superseded:
+        notes.append("older version")
     if same:
         notes.append(f"same result: {', '.join(same)}")
     return {
         "name": {"text": row.estimator, "page": entry.page, "note": ", ".join(notes)},
         "ranks": {"text": row.ranks.replace("-", "–") or None, "sort": row.rank_low},
         "best": row.may_be_best,
-        "score": {"value": short(row.score), "help": row.why or row.learned or None},
+        "score": {"value": short(row.score), "help": row.why or row.superseded or row.learned or None},
         "bar": {"value": short(row.score), "low": short(row.low), "high": short(row.high)},
         "interval": _ends(row.low, row.high),
         "over_scenarios": _ends(row.scenarios_low, row.scenarios_high),
@@ -294,6 +297,7 @@ def _track(
             "columns": board_columns(title, explanation, bar_scale(scored), more),
             "rows": rows,
         },
+        "map": None if (drawn := heatmap(track, scored, scenarios)) is None else drawn.to_dict(),
         "charts": [c.to_dict() for c in _charts(track, scored, title, estimators, runs)],
         "scenarios": [
             {"id": s, "name": scenarios[s].name, "title": scenarios[s].title, "page": scenarios[s].page}

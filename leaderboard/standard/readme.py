@@ -59,6 +59,9 @@ def tables(ranking: Ranking, results: Sequence[Result], of: int | None = None) -
         "the same run; the oracle knows the true noise and every fault. Recorded voyages have no oracle: there the "
         "plain filter on the same run is the divisor. Smaller is better."
     ]
+    older = sorted({f"`{r.estimator}` ({r.superseded})" for t in tracks for r in t.rows if r.superseded})
+    if older:
+        parts.append(f"Results of an older version, until the next edition: {', '.join(older)}.")
     if tracks:
         parts.append("\n".join([
             "| track | scenarios | seeds | complete rows | may be the best (95 %) | error beside the plain row's "
@@ -75,10 +78,10 @@ def tables(ranking: Ranking, results: Sequence[Result], of: int | None = None) -
             f"of {len(ranked)} complete rows. Rows that share ranks cannot be told apart."
         )
         parts.append("\n".join([
-            f"| rank | estimator | method | × oracle, 95 % interval | × `{main.plain}`, 95 % interval | scenarios won "
-            "| failed runs |",
+            f"| rank | estimator | description | × oracle, 95 % interval | × `{main.plain}`, 95 % interval "
+            "| scenarios won | failed runs |",
             "|---|---|---|---|---|---|---|",
-            *(f"| {r.ranks or MISSING} | `{r.estimator}` | {_method(r)} | {ratio(r.score)}{_interval(r)} "
+            *(f"| {r.ranks or MISSING} | `{r.estimator}` | {_description(r)} | {ratio(r.score)}{_interval(r)} "
               f"| {gain_cell(r)} | {_won(r)} | {r.failed} of {r.runs} |" for r in ranked[:_ROWS]),
         ]))  # fmt: skip
     return "\n\n".join(parts)
@@ -105,7 +108,7 @@ def draw(ranking: Ranking, path: Path) -> Path | None:
     return save(ranking_figure(main, most=_DRAWN), path, formats=("png",))[0]
 
 
-def _method(row: TrackRow) -> str:
+def _description(row: TrackRow) -> str:
     """What a row is, in a few words; empty for one that is not registered by this name."""
     try:
         summary = describe(registered(row.estimator).name).summary

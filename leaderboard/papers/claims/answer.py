@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
 from simnav.leaderboard.papers.comparison import FEWEST, GAIN, as_gain
+from simnav.leaderboard.ranking import tables
 from simnav.leaderboard.ranking.statistics import Interval, mean_ratio
+from simnav.leaderboard.results.frame import frame
+from simnav.leaderboard.results.shown import Shown
 
 from .claim import Choice
 
@@ -120,8 +124,8 @@ class DialAnswer:
         return f"{self.title} is from {self.text(low)} to {self.text(high)}"
 
 
-@dataclass(frozen=True)
-class Answer:
+@dataclass(frozen=True, repr=False)
+class Answer(Shown):
     """When a claim holds.
 
     Attributes
@@ -190,6 +194,26 @@ class Answer:
             return "undecided: an interval lies across the limit, and more seeds may decide it"
         return f"does not hold; tried: {tried}" if tried else "does not hold with our settings"
 
+    def headline(self) -> str:
+        """The claim and the verdict."""
+        return f"{self.sentence}: {self.sentence_of_verdict}"
+
+    def shown(self) -> Sequence[tables.Fitted]:
+        """A row for each value of each dial; nothing without dials."""
+        rows = []
+        for dial in self.dials:
+            title = dial.title.rstrip(",")
+            for point in dial.points:
+                judged = dial.judged if dial.judged is not None and dial.judged.value == point.value else None
+                other, verdict = ("", "") if judged is None else (gain_text(judged), judged.standing(self.limit))
+                ours = "ours" if point.value == dial.ours else ""
+                rows.append([title, dial.text(point.value), ours, gain_text(point), other, verdict])
+                title = ""
+        columns = ["varied", "value", "", "gain (search)", "gain (judgement)", "verdict"]
+        order = ["value", "gain (search)", "verdict", "gain (judgement)", "varied", ""]
+        title = f"{self.claim}: claimed gain {100.0 * self.gain:.1f} %"
+        return [tables.Fitted(title, columns, rows, order, always=2)] if rows else []
+
     def to_dict(self) -> dict[str, Any]:
         """What ``simnav claim --json`` prints, and what is stored."""
         return {
@@ -220,8 +244,6 @@ class Answer:
 
     def to_frame(self) -> Any:
         """One line for each value of each dial; see `simnav.leaderboard.results.frame.frame`."""
-        from simnav.leaderboard.results.frame import frame
-
         rows = [(d.name, "search", p) for d in self.dials for p in d.points]
         rows += [(d.name, "judgement", d.judged) for d in self.dials if d.judged is not None]
         rows.append(("", "judgement", self.ours))

@@ -182,6 +182,22 @@ def test_costs_are_multiples_of_the_plain_row_and_what_is_not_measured_is_named(
     assert "Processor time (× ekf)" in json.dumps(chart["spec"], ensure_ascii=False)
 
 
+def test_the_map_has_the_error_of_each_row_beside_the_plain_row_s_on_each_scenario(folder):
+    one, track = tracks_of(folder)
+    assert one["map"] is None  # of a single scenario
+    cells = track["map"]["data"]["cells"]
+    found = {(r, s): x for r, s, x in zip(cells["row"], cells["scenario"], cells["ratio"], strict=True)}
+    rows = {r["name"]["text"]: r for r in track["table"]["rows"]}
+    names = {s["id"]: s["name"] for s in track["scenarios"]}
+    for row in {row for row, _ in found}:
+        for identity, name in names.items():
+            mine, plain = (rows[r][f"s:{identity}"]["value"] for r in (row, "ekf"))
+            assert found[row, name] == pytest.approx(mine / plain, rel=0.02)
+    assert {found["ekf", name] for name in names.values()} == {1.0}
+    assert cells["row"][0] == min({row for row, _ in found}, key=lambda r: rows[r]["score"]["value"])
+    assert track["map"]["data"]["scenarios"]["page"] == [s["page"] for s in track["scenarios"]]
+
+
 def test_one_row_far_behind_does_not_decide_the_scale_of_the_bars():
     rows = [TrackRow(estimator=str(k), standing="ranked", score=1.0 + 0.1 * k) for k in range(19)]
     assert bar_scale(rows) == (1.0, 2.8)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -36,9 +37,13 @@ def ranking(results: list[Result]) -> Ranking:
     return rank(results)
 
 
-def test_its_versions_are_those_of_today() -> None:
+def test_its_versions_are_those_of_today_or_the_readme_says_which_are_older() -> None:
+    """A row may be better than its results until the next edition; a scenario or the simulator may not."""
     found = outdated(standard.RESULTS)
-    assert not found, "\n".join([*found.sentences(), "'simnav standard run' does it, then 'simnav standard publish'"])
+    rest = replace(found, rows=())
+    assert not rest, "\n".join([*rest.sentences(), "'simnav standard run' does it, then 'simnav standard publish'"])
+    text = readme.marked(ROOT / "README.md")
+    assert [row for row in found.rows if f"`{row}` (version " not in text] == []
 
 
 def test_the_readme_and_the_history_are_made_from_it(results: list[Result], ranking: Ranking) -> None:
