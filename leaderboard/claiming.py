@@ -125,7 +125,7 @@ def _dials(claim: Claim, asked: Sequence[str]) -> list[Dial]:
     """The dials of a claim that were asked for, with the values that were given."""
     if not claim.paper:
         return list(claim.dials)
-    found = []
+    found: list[Dial] = []
     for text in _texts(asked):
         name, values = _typed(text)
         if name == "all":

@@ -125,9 +125,10 @@ class LookingBack(Estimator):
 
     def update(self, measurements: Measurements) -> Estimate:
         """Process one step; the estimates of earlier times are diagnostics."""
-        estimate = self.inner.update(measurements)
-        if not isinstance(estimate, Estimate):
-            return estimate
+        given: Any = self.inner.update(measurements)
+        if not isinstance(given, Estimate):
+            return given  # type: ignore[no-any-return]  # whoever reads the answer refuses it
+        estimate = given
         vectors = (estimate.position, estimate.velocity, estimate.attitude)
         self._given.append(np.concatenate([np.full(3, np.nan) if v is None else v for v in vectors]))
         found = self.inner.earlier(self.lags)

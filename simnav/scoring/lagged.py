@@ -122,7 +122,7 @@ def _component(column: int, error: Array) -> Array:
 
 
 def _position(error: Array) -> Array:
-    return np.sqrt((error[:, :3] ** 2).sum(axis=1))
+    return np.asarray(np.sqrt((error[:, :3] ** 2).sum(axis=1)))
 
 
 #: Score of the newest state -> title of the score with a lag, unit, and function of (lag, input).

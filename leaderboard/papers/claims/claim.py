@@ -44,12 +44,13 @@ class Setting:
 
     def with_parameters(self, whose: str, **values: object) -> Setting:
         """With parameters of ``row``, ``than`` or ``both`` set; those that are set already get the new value."""
-        made = self
-        for name in ("row", "than") if whose == "both" else (whose,):
-            request: EstimatorRequest = getattr(made, name)
-            parameters = {**request.parameters, **values}
-            made = replace(made, **{name: replace(request, parameters=parameters, label="")})
-        return made
+
+        def changed(request: EstimatorRequest) -> EstimatorRequest:
+            return replace(request, parameters={**request.parameters, **values}, label="")
+
+        row = changed(self.row) if whose in ("row", "both") else self.row
+        than = changed(self.than) if whose in ("than", "both") else self.than
+        return replace(self, row=row, than=than)
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -18,7 +19,9 @@ from .dials import lags_given
 
 if TYPE_CHECKING:
     from simnav.leaderboard.campaign.campaign import Progress
+    from simnav.leaderboard.campaign.request import EstimatorRequest
     from simnav.leaderboard.results.result import Result
+    from simnav.scenario import Scenario
 
 __all__ = ["JUDGED_FROM", "SEARCHED_FROM", "search"]
 
@@ -112,12 +115,12 @@ def _run(
     what: str,
 ) -> dict[tuple[str, str, int], Result]:
     """Run all methods of some comparisons; results by scenario, estimator and seed."""
-    wanted: dict[str, tuple[object, dict[str, object]]] = {}
+    wanted: dict[str, tuple[Scenario, dict[str, EstimatorRequest]]] = {}
     for s in settings:
         for scenario, request in ((s.scenario, s.row), (s.than_scenario, s.than)):
             wanted.setdefault(scenario.id, (scenario, {}))[1][request.label] = request
     for scenario, requests in wanted.values():
-        named = None if progress is None else lambda p, name=scenario.id: progress(f"{what}: {name}", p)  # type: ignore[attr-defined]
+        named = None if progress is None else partial(progress, f"{what}: {scenario.id}")
         run_campaign([scenario], list(requests.values()), seeds, folder, workers=workers, progress=named)
     if not len(seeds):
         return {}
