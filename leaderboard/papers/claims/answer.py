@@ -109,7 +109,7 @@ class DialAnswer:
         held = self.holding(limit)
         values = [p.value for p in self.points]
         if isinstance(self.judged, Point) and isinstance(self.judged.value, str):
-            return f"{self.title}: {' or '.join(str(v) for v in values if v in held) or self.judged.value}"
+            return f"{self.title}: {self.judged.value}"
         if not held:
             return self.title
         low, high = held[0], held[-1]
@@ -186,7 +186,7 @@ class Answer(Shown):
         conditions = "; or if ".join(f"{d.condition(self.limit)} ({gain_text(d.judged)})" for d in self.conditions
                                      if d.judged is not None)  # fmt: skip
         if self.verdict == "holds":
-            return "holds with our settings" + (f"; also if {conditions}" if conditions else "")
+            return "holds with our settings"
         if self.verdict == "holds if":
             return f"holds if {conditions}"
         tried = ", ".join(d.title for d in self.dials)

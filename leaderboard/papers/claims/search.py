@@ -42,8 +42,9 @@ def search(
     """Find out under which conditions a claim holds.
 
     Each dial is varied by itself, with all other settings as ours. At each value the gain is computed on the seeds of
-    the search. Then two values of each dial are judged on other seeds: the one nearest to ours at which the search
-    found that the claim holds, or if there is none that with the largest gain; and our own settings.
+    the search. Then one value of each dial and our own settings are judged on other seeds. The value is the one nearest
+    to ours at which the claim holds in the search with its whole interval; if there is none, the nearest one at which
+    the mean gain reaches the claim; and if there is none, that with the largest gain.
 
     Parameters
     ----------
@@ -99,7 +100,9 @@ def _nearest(claim: Claim, dial: Dial, points: dict[tuple[str, Choice], Point]) 
     if not values:
         return None
     place = dial.values.index(dial.ours) if dial.ours in dial.values else 0
-    holding = [v for v in values if points[dial.name, v].ratio.value <= claim.limit and not points[dial.name, v].failed]
+    holding = [v for v in values if points[dial.name, v].standing(claim.limit) == "holds"] or [
+        v for v in values if points[dial.name, v].ratio.value <= claim.limit and not points[dial.name, v].failed
+    ]
     if holding:
         return min(holding, key=lambda v: abs(dial.values.index(v) - place))
     known = [v for v in values if math.isfinite(points[dial.name, v].ratio.value)]

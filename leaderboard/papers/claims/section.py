@@ -42,7 +42,7 @@ def claim_sheets(answers: Sequence[Answer]) -> list[Sheet]:
     rows = []
     for a in answers:
         printed = f"{'~ ' if a.derived else ''}{100.0 * a.gain:.1f} %"
-        words = a.sentence_of_verdict.removeprefix("holds if ").removeprefix("holds with our settings").lstrip("; ")
+        words = "with our settings" if a.verdict == "holds" else a.sentence_of_verdict.removeprefix("holds if ")
         rows.append(
             SheetRow([f"{a.sentence[0].upper()}{a.sentence[1:]}", printed, gain_text(a.ours), a.verdict, words],
                      _VERDICTS[a.verdict][2])
