@@ -189,7 +189,7 @@ class Answer(Shown):
             return "holds with our settings"
         if self.verdict == "holds if":
             return f"holds if {conditions}"
-        tried = ", ".join(d.title for d in self.dials)
+        tried = "; ".join(d.title.rstrip(",") for d in self.dials)
         if self.verdict == "undecided":
             return "undecided: an interval lies across the limit, and more seeds may decide it"
         return f"does not hold; tried: {tried}" if tried else "does not hold with our settings"

@@ -164,7 +164,8 @@ def test_an_answer_is_read_as_it_was_saved(tmp_path):
     assert again.sentence_of_verdict == made.sentence_of_verdict
     assert again.ours.gain.high == pytest.approx(made.ours.gain.high, abs=1e-5)
     kept = (tmp_path / "c.json").read_bytes()
-    assert json.loads(stored.save(again, tmp_path).read_bytes())["ours"]["ratios"] == json.loads(kept)["ours"]["ratios"]
+    again_kept = stored.save(again, tmp_path).read_bytes()
+    assert json.loads(again_kept)["ours"]["ratios"] == json.loads(kept)["ours"]["ratios"]
     (tmp_path / "c.json").write_text("{")
     with pytest.raises(ValueError, match="is damaged"):
         stored.read("c", tmp_path)
