@@ -378,6 +378,8 @@ class CiteRequest:
     results: PathLike | None = option(
         default=None, help=f"{FOLDER} Default: simnav itself.", argument=True, metavar="RESULTS"
     )
+    _: KW_ONLY
+    author: str = option("--author", default="", help="Who made the results. Default: the authors of simnav.")
 
 
 @request

@@ -34,12 +34,13 @@ if TYPE_CHECKING:
     from simnav.estimator import Estimator
     from simnav.leaderboard.campaign.campaign import Summary
     from simnav.leaderboard.ranking.reports import CampaignReport, EvaluationReport
-    from simnav.leaderboard.single_run import RunReport
     from simnav.leaderboard.sweep.report import Sweep
     from simnav.leaderboard.tuning.tuning import Tuning
     from simnav.recording import Recording
     from simnav.scenario import Scenario
     from simnav.testing.contract_check import Report
+
+    from .single_run import RunReport
 
 __all__ = ["campaign", "check", "evaluate", "make", "record", "run", "sweep", "tune"]
 
@@ -120,7 +121,7 @@ def run(request: RunRequest) -> RunReport:
     RunReport
         The recording, all trials and their scores.
     """
-    from simnav.leaderboard.single_run import run_once
+    from .single_run import run_once
 
     chosen, seed = scenario_of(request.scenario), whole_number("seed", request.seed)
     asked = baselines_or(request.estimators, [chosen], request.parameters)

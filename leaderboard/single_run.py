@@ -14,7 +14,6 @@ from simnav.kinds import EQUATIONS, KINDS
 from simnav.leaderboard.campaign.recorder import record_here
 from simnav.leaderboard.campaign.request import EstimatorRequest
 from simnav.leaderboard.figures.run_figure import run_figure
-from simnav.leaderboard.ranking import tables
 from simnav.leaderboard.ranking.ranking_table import consistency
 from simnav.leaderboard.ranking.rows import Consistency
 from simnav.leaderboard.results.errors import RequestError, mistakes, printable
@@ -23,6 +22,8 @@ from simnav.leaderboard.results.shown import Shown
 from simnav.scoring import SCORES, protection_levels, score, stanford
 from simnav.scoring.consistency import badge
 from simnav.scoring.lagged import seconds_of
+
+from .ranking import tables
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -34,6 +34,7 @@ if TYPE_CHECKING:
         publish_standard,
         run_standard,
         site,
+        standard,
         submit,
         verify_bundle,
     )
@@ -117,6 +118,7 @@ __all__ = [
     "score",
     "seal",
     "site",
+    "standard",
     "submit",
     "sweep",
     "tune",
@@ -163,6 +165,7 @@ _HOMES = {
         "publish_standard",
         "run_standard",
         "site",
+        "standard",
         "submit",
         "verify_bundle",
     ),

@@ -17,9 +17,9 @@ that the datasheet predicts is larger than half of them by `SIGMAS` standard dev
 from __future__ import annotations
 
 from collections import deque
+from functools import cache
 
 import numpy as np
-from scipy.special import chdtri
 
 from .base import Innovation
 
@@ -50,7 +50,7 @@ class Level:
         information = np.linalg.inv(innovation.noise)
         square = float(innovation.residual @ information @ innovation.residual) / m
         self._seen.append((square, float(np.trace(information @ innovation.predicted)) / m))
-        n, middle = len(self._seen), float(chdtri(m, 0.5)) / m
+        n, middle = len(self._seen), _median(m) / m
         if n < self.FEWEST:
             return
         squares, predicted = np.array(self._seen).T
@@ -59,3 +59,11 @@ class Level:
             self.value = 1.0
             return
         self.value = max(1.0, float(np.median(squares)) / middle - float(np.median(predicted)))
+
+
+@cache
+def _median(dof: int) -> float:
+    """Median of a chi-square variable."""
+    from scipy.special import chdtri
+
+    return float(chdtri(dof, 0.5))

@@ -26,7 +26,6 @@ app = typer.Typer(
     name="simnav",
     help="The open benchmark for marine integrated navigation: simulate, estimate, score, rank.",
     no_args_is_help=True,
-    add_completion=False,
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     from simnav.leaderboard.campaign.campaign import Summary
 
-__all__ = ["CampaignReport", "EvaluationReport"]
+__all__ = ["CampaignReport", "EvaluationReport", "StandardReport"]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -59,6 +59,11 @@ class _Report(Shown):
     def plot(self) -> Figure:
         """The ranking of the first track with its intervals."""
         return self.ranking.plot()
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class StandardReport(_Report):
+    """The result that comes with simnav."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
+
+from simnav.leaderboard.figures.ratio_map import ENDS
+from simnav.leaderboard.ranking.beside_plain import beside_plain
 
 from .charts import Chart, columns
 from .rounding import short
@@ -15,8 +17,6 @@ if TYPE_CHECKING:
     from .content import ScenarioEntry
 
 __all__ = ["heatmap"]
-
-_ENDS = 4.0  # ratio at which a colour is full
 
 
 def heatmap(track: TrackRanking, rows: Sequence[TrackRow], scenarios: Mapping[str, ScenarioEntry]) -> Chart | None:
@@ -31,16 +31,11 @@ def heatmap(track: TrackRanking, rows: Sequence[TrackRow], scenarios: Mapping[st
     scenarios : mapping
         Scenarios by versioned id.
     """
-    plain = next((r for r in track.rows if r.estimator == track.plain), None)
-    if plain is None or len(track.scenarios) < 2 or len(rows) < 2:
-        return None
     ordered = sorted(rows, key=lambda r: r.score)
-    cells = [
-        (row.estimator, scenarios[s].name, short(row.ratios[s] / plain.ratios[s]))
-        for row in ordered
-        for s in track.scenarios
-        if s in row.ratios and plain.ratios.get(s, 0.0) > 0.0 and math.isfinite(row.ratios[s])
-    ]
+    found = beside_plain(track, ordered)
+    if not found or len(track.scenarios) < 2 or len(rows) < 2:
+        return None
+    cells = [(row, scenarios[s].name, short(ratio)) for row, s, ratio in found]
     names = [scenarios[s].name for s in track.scenarios]
     data = {
         "cells": columns(("row", "scenario", "ratio"), cells),
@@ -57,7 +52,7 @@ def heatmap(track: TrackRanking, rows: Sequence[TrackRow], scenarios: Mapping[st
                 "lookup": "scenario",
                 "from": {"data": {"name": "scenarios"}, "key": "name", "fields": ["title", "page"]},
             },
-            {"calculate": f"clamp(datum.ratio, {1.0 / _ENDS}, {_ENDS})", "as": "shown"},
+            {"calculate": f"clamp(datum.ratio, {1.0 / ENDS}, {ENDS})", "as": "shown"},
         ],
         "mark": {"type": "rect", "cursor": "pointer"},
         "encoding": {
@@ -81,10 +76,10 @@ def heatmap(track: TrackRanking, rows: Sequence[TrackRow], scenarios: Mapping[st
                 "scale": {
                     "type": "log",
                     "interpolate": "rgb",
-                    "domain": [1.0 / _ENDS, 1.0, _ENDS],
+                    "domain": [1.0 / ENDS, 1.0, ENDS],
                     "range": ["$strong", "$grid", "$second"],
                 },
-                "legend": {"title": f"Error {ratio}", "values": [1.0 / _ENDS, 0.5, 1.0, 2.0, _ENDS], "format": "~g"},
+                "legend": {"title": f"Error {ratio}", "values": [1.0 / ENDS, 0.5, 1.0, 2.0, ENDS], "format": "~g"},
             },
             "href": {"field": "page", "type": "nominal"},
             "tooltip": [

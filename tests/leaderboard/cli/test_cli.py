@@ -188,9 +188,9 @@ def test_run_scores_and_plots(here):
         assert 0.1 < e["scores"]["horizontal_rmse"] < 50.0
     assert found["scores"]["horizontal_rmse"]["unit"] == "m"
     drawn = Path(found["plot"]).read_text()
-    assert "<!-- North error [m] -->" in drawn
-    assert "<!-- gnss_position fixes -->" in drawn
-    assert "<!-- no gnss_position -->" in drawn  # the outage
+    assert ">North error [m]</text>" in drawn
+    assert ">gnss_position fixes</text>" in drawn
+    assert ">no gnss_position</text>" in drawn  # the outage
 
 
 def test_run_is_the_same_again_but_for_the_times(here):

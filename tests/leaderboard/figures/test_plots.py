@@ -11,6 +11,7 @@ import pytest
 
 from simnav.leaderboard.figures import plots as figures
 from simnav.leaderboard.figures.plots import Band, Curve, Dot, Track
+from simnav.leaderboard.figures.ratio_map import ratio_map
 from simnav.leaderboard.figures.style import PALETTE, Style, save
 
 TIME = np.linspace(1.0, 1200.0, 240)
@@ -183,6 +184,15 @@ def test_run_chart_shows_errors_bounds_and_diagnostics(style, truth):
     assert any(np.allclose(line.get_ydata(), -3.0) for line in error.lines if len(line.get_ydata()) == len(TIME))
     assert error.get_ylim()[1] < 10.0  # the diverged one does not flatten the other
     assert fig.axes[2].get_ylabel() == "weight"
+
+
+def test_a_map_has_a_cell_for_each_ratio():
+    cells = {("ekf", "calm"): 1.0, ("ekf", "rough"): 1.0, ("iae", "calm"): 0.25, ("iae", "rough"): 8.0}
+    axes = ratio_map(cells, "Error × ekf", "A track").axes[0]
+    (drawn,) = axes.collections
+    np.testing.assert_array_equal(drawn.get_array().reshape(2, 2), [[1.0, 1.0], [0.25, 8.0]])
+    assert [t.get_text() for t in axes.get_yticklabels()] == ["ekf", "iae"]
+    assert [t.get_text() for t in axes.get_xticklabels()] == ["calm", "rough"]
 
 
 def test_saved_svg_is_valid_has_its_labels_and_follows_the_theme(style, tmp_path):

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+import simnav
 from simnav.leaderboard import standard
 from simnav.leaderboard.profiles import read_profile
 from simnav.leaderboard.ranking.board import Ranking
@@ -58,6 +59,10 @@ def test_the_readme_and_the_history_are_made_from_it(results: list[Result], rank
     assert [(x.track, x.row, x.ranks) for x in lines] == [
         (x.track, x.row, x.ranks) for x in history.lines_of(ranking, results, last)
     ]
+
+
+def test_it_is_one_call_away(results: list[Result]) -> None:
+    assert len(simnav.standard().results) == len(results)
 
 
 def test_no_track_of_its_overview_is_too_large(results: list[Result], ranking: Ranking) -> None:
