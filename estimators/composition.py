@@ -22,14 +22,14 @@ import inspect
 import re
 import typing
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from typing import Any, ClassVar
 
 from simnav.estimator import Estimator, Needs
 from simnav.estimator.parameters import former_names, under_present_names
-from simnav.types import Estimate, InitialState, Instruments, Measurements, NavigationStates
+from simnav.types import Array, Estimate, InitialState, Instruments, Measurements, NavigationStates
 
 if typing.TYPE_CHECKING:
     from simnav.recording import Recording
@@ -235,6 +235,10 @@ class Row(Estimator):
     def smooth(self) -> NavigationStates | None:
         """The trajectory of a solver that smooths; else None."""
         return self.solver.smooth()
+
+    def earlier(self, lags: Sequence[float]) -> Array | None:
+        """The states of earlier times of a solver that looks back; else None."""
+        return self.solver.earlier(lags)
 
     def reveal(self, recording: Recording) -> None:
         """Pass the truth to a solver that is a reference."""

@@ -15,6 +15,7 @@ from __future__ import annotations
 from simnav.leaderboard.campaign.request import EstimatorLike, Estimators
 from simnav.leaderboard.results.errors import RequestError
 
+from .claiming import claim
 from .costing import bench, costs
 from .given import results_of, scenario_of, scenarios_of
 from .inspection import bound, cite, merge, rank, reproduce, rescore, seal, verify
@@ -32,6 +33,7 @@ __all__ = [
     "campaign",
     "check",
     "cite",
+    "claim",
     "costs",
     "evaluate",
     "make",

@@ -79,6 +79,14 @@ class RunRequest:
     _: KW_ONLY
     seed: int = option(default=0, help="Seed of the run.", least=0)
     parameters: Parameters = option("--set", default=None, help=PARAMETERS, more=_EACH_GETS, metavar="NAME=VALUE")
+    lags: str | Sequence[float] | None = option(
+        "--lags",
+        default=None,
+        cli=str | None,
+        metavar="SECONDS",
+        help="Also estimate the times so many seconds before, like 1/5/10/30: the accuracy of an output that is late.",
+        more="The parameter ``lags`` of all estimators (`simnav.estimator.looking_back`).",
+    )
     progress: Bar = option(default=None, help=PROGRESS, hidden=True)
 
 

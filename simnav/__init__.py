@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from simnav.environment import EstimatorAgent, NavigationEnv, NavigationVectorEnv
     from simnav.estimator import Estimator, UnsuitableScenario, names, register
     from simnav.kinds import Component, Kind
+    from simnav.leaderboard.claiming import claim
     from simnav.leaderboard.costing import bench, costs
     from simnav.leaderboard.inspection import bound, cite, merge, rank, reproduce, rescore, seal, verify
     from simnav.leaderboard.publishing import (
@@ -93,6 +94,7 @@ __all__ = [
     "check",
     "check_standard",
     "cite",
+    "claim",
     "costs",
     "evaluate",
     "load",
@@ -152,6 +154,7 @@ _HOMES = {
         "NavigationStates",
         "TriadDatasheet",
     ),
+    "leaderboard.claiming": ("claim",),
     "leaderboard.costing": ("bench", "costs"),
     "leaderboard.inspection": ("bound", "cite", "merge", "rank", "reproduce", "rescore", "seal", "verify"),
     "leaderboard.results.errors": ("RequestError",),

@@ -17,7 +17,7 @@ Source: P. D. Groves 2013, sections 3.2 and 3.4.3.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from math import hypot
 from typing import ClassVar
 
@@ -142,6 +142,10 @@ class KalmanEstimator(Solver):
     def smooth(self) -> NavigationStates | None:
         """The smoother's trajectory at the ends of all steps; None before the first, and without a smoother."""
         return None if self.smoother is None else self.smoother.smooth(self.model, self.covariance)
+
+    def earlier(self, lags: Sequence[float]) -> Array | None:
+        """The fixed-lag smoothed states of earlier times; None without a smoother."""
+        return None if self.smoother is None else self.smoother.earlier(self.model, lags)
 
     @property
     def smoothed_covariance(self) -> Array:

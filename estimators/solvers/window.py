@@ -62,6 +62,7 @@ from simnav.types import Array, Estimate, InitialState, Instruments, Measurement
 
 from .admission import Admission
 from .cost_consistency import CostTest
+from .looking_back import LooksBack
 
 __all__ = ["WindowEstimator"]
 
@@ -73,7 +74,7 @@ FIRST_DAMPING, DAMPING_FACTOR = 1e-2, 10.0
 FAULTY_WEIGHT = 0.5
 
 
-class WindowEstimator(Solver):
+class WindowEstimator(LooksBack, Solver):
     """The solver of the module.
 
     Parameters

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from simnav.leaderboard.calls import option, request
+from simnav.leaderboard.claim_requests import ClaimRequest
 from simnav.leaderboard.publishing_requests import (
     AuditRequest,
     BundleOptions,
@@ -147,6 +148,14 @@ class SweepCommand(SweepRequest):
 
 
 @request
+class ClaimCommand(ClaimRequest):
+    """Under which conditions does a claim hold: one method is better than another by so much?"""
+
+    _: KW_ONLY
+    plot: Path | None = option(default=None, help=_FIGURE)
+
+
+@request
 class WarmupCommand:
     """Compile every kernel, once; later starts are quick."""
 
@@ -234,6 +243,7 @@ COMMANDS: Mapping[str, tuple[type[Any], str]] = {
     "warmup": (WarmupCommand, "warmup"),
     "bound": (BoundCommand, "bound"),
     "reproduce": (ReproduceRequest, "reproduce"),
+    "claim": (ClaimCommand, "claim"),
     "reference": (ReferenceCommand, "reference"),
     "rescore": (RescoreRequest, "rescore"),
     "seal": (SealRequest, "seal"),
@@ -248,8 +258,8 @@ COMMANDS: Mapping[str, tuple[type[Any], str]] = {
 HEADINGS: Mapping[str, Sequence[str]] = {
     "Every day": ("list", "show", "run", "evaluate", "check", "new-estimator", "simulate", "sweep", "campaign",
                   "leaderboard"),
-    "Study and publish": ("tune", "train", "bench", "bound", "reproduce", "rescore", "merge", "submit", "verify",
-                          "seal", "cite"),
+    "Study and publish": ("tune", "train", "bench", "bound", "reproduce", "claim", "rescore", "merge", "submit",
+                          "verify", "seal", "cite"),
     "Maintain": ("standard", "reference", "warmup"),
 }  # fmt: skip
 
