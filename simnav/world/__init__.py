@@ -6,6 +6,8 @@ from typing import Annotated
 
 from simnav.spec import OneOf
 from simnav.world.current import Current
+from simnav.world.given_track import GivenTrack, Limits, Poses
+from simnav.world.given_waypoints import GivenVessel, GivenWaypoints
 from simnav.world.hulls import Ship, Uuv
 from simnav.world.manoeuvres import (
     Accelerate,
@@ -45,10 +47,15 @@ __all__ = [
     "Current",
     "Dive",
     "FlatBottom",
+    "GivenTrack",
+    "GivenVessel",
+    "GivenWaypoints",
     "Hold",
     "KinematicVessel",
     "LawnMower",
+    "Limits",
     "Manoeuvre",
+    "Poses",
     "SampledTrajectory",
     "Sea",
     "Ship",
