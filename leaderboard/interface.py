@@ -17,7 +17,7 @@ from simnav.leaderboard.results.errors import RequestError
 
 from .costing import bench, costs
 from .given import results_of, scenario_of, scenarios_of
-from .inspection import bound, cite, merge, rank, reproduce, rescore, seal, verify
+from .inspection import allan, bound, cite, merge, rank, reproduce, rescore, seal, verify
 from .requests import ScenarioLike, Scenarios
 from .running import campaign, check, evaluate, make, record, run, sweep, tune
 
@@ -27,6 +27,7 @@ __all__ = [
     "RequestError",
     "ScenarioLike",
     "Scenarios",
+    "allan",
     "bench",
     "bound",
     "campaign",

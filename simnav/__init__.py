@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from simnav.estimator import Estimator, UnsuitableScenario, names, register
     from simnav.kinds import Component, Kind
     from simnav.leaderboard.costing import bench, costs
-    from simnav.leaderboard.inspection import bound, cite, merge, rank, reproduce, rescore, seal, verify
+    from simnav.leaderboard.inspection import allan, bound, cite, merge, rank, reproduce, rescore, seal, verify
     from simnav.leaderboard.publishing import (
         audit_standard,
         check_standard,
@@ -85,6 +85,7 @@ __all__ = [
     "TriadDatasheet",
     "Trial",
     "UnsuitableScenario",
+    "allan",
     "audit_standard",
     "bench",
     "bound",
@@ -151,7 +152,7 @@ _HOMES = {
         "TriadDatasheet",
     ),
     "leaderboard.costing": ("bench", "costs"),
-    "leaderboard.inspection": ("bound", "cite", "merge", "rank", "reproduce", "rescore", "seal", "verify"),
+    "leaderboard.inspection": ("allan", "bound", "cite", "merge", "rank", "reproduce", "rescore", "seal", "verify"),
     "leaderboard.results.errors": ("RequestError",),
     "leaderboard.running": ("campaign", "check", "evaluate", "make", "record", "run", "sweep", "tune"),
     "leaderboard.publishing": (
