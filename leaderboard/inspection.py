@@ -30,7 +30,7 @@ from .requests import (
 from .results import requested
 
 if TYPE_CHECKING:
-    from simnav.leaderboard.allan import AllanReport
+    from .allan import AllanReport
     from simnav.leaderboard.campaign.rescoring import Rescored
     from simnav.leaderboard.campaign.seal import Seal
     from simnav.leaderboard.campaign.verification import Verification
@@ -194,7 +194,7 @@ def allan(request: AllanRequest) -> AllanReport:
     RequestError
         If there is no IMU, or there are too few samples.
     """
-    from simnav.leaderboard.allan import allan_of_file, allan_of_scenario
+    from .allan import allan_of_file, allan_of_scenario
 
     seed, start = whole_number("seed", request.seed, 0), finite_number("start", request.start)
     end = None if request.end is None else finite_number("end", request.end)

@@ -271,7 +271,8 @@ class Spec(BaseModel):
         for name, info in cls.model_fields.items():
             extra = info.json_schema_extra
             also = extra.get("also", ()) if isinstance(extra, dict) else ()
-            found |= {f"{name}_{unit}": (name, info, str(unit)) for unit in also if isinstance(also, list)}
+            if isinstance(also, list):
+                found |= {f"{name}_{unit}": (name, info, str(unit)) for unit in also}
         return found
 
     @classmethod

@@ -178,7 +178,7 @@ class ImuSpec(Spec):
         if not isinstance(data, dict) or (data.get("model") is None and data.get("grade") is None):
             return data
         figures = _named(data.get("model"), data.get("grade")).to_toml()
-        made = {
+        made: dict[str, Spec] = {
             "gyroscope": GyroscopeSpec.from_toml(figures["gyroscope"]),
             "accelerometer": AccelerometerSpec.from_toml(figures["accelerometer"]),
         }

@@ -131,8 +131,8 @@ CALLS: dict[str, tuple[list[str], Callable[[], Any]]] = {
         lambda: {**simnav.bound("open-sea", runs=1).to_dict(), "csv": None},
     ),
     "allan": (
-        ["allan", "pond.toml", "--duration", "100", "--seed", "2"],
-        lambda: {**simnav.allan("pond.toml", duration=100.0, seed=2).to_dict(), "plot": None, "csv": None},
+        ["allan", "open-sea", "--duration", "100", "--seed", "2"],
+        lambda: {**simnav.allan("open-sea", duration=100.0, seed=2).to_dict(), "plot": None, "csv": None},
     ),
     "cite": (["cite"], lambda: simnav.cite().to_dict()),
     "sweep": (

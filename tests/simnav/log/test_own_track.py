@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import pickle
+import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -232,3 +234,17 @@ def test_the_archive_of_the_danish_maritime_authority(tmp_path):
     (tmp_path / "dma.csv").write_text("a,b\n1,2\n")
     with pytest.raises(SpecError, match="no column holds the time of AIS reports; one of these names is wanted"):
         own('kind = "ais_track"\nfile = "dma.csv"', tmp_path).vessel.poses()
+
+
+def test_the_page_of_the_documentation_works_as_written(tmp_path):
+    page = (Path(__file__).parents[3] / "docs" / "how-to" / "use-your-own-trajectory.md").read_text(encoding="utf-8")
+    table = re.search(r"^```\n(time_s.*?)^```", page, re.DOTALL | re.MULTILINE)
+    whole, waypoints, *_ = re.findall(r"^```toml\n(.*?)^```", page, re.DOTALL | re.MULTILINE)
+    (tmp_path / "survey.csv").write_text(table[1])
+    scenario = parse(whole, folder=tmp_path)
+    run = record(scenario, 1)
+    given = scenario.vessel.poses()
+    at = np.searchsorted(run.data.truth.time, given.time[1:] - 1e-6)
+    np.testing.assert_allclose(relative_position(run.data.truth.position[at], given.position[1:]), 0.0, atol=1e-3)
+    other = parse(whole.partition("[vessel]")[0] + waypoints + "[instruments.imu]\nrate_hz = 50.0", folder=tmp_path)
+    assert len(record(other, 1).data.truth) == 80
