@@ -30,7 +30,6 @@ from .requests import (
 from .results import requested
 
 if TYPE_CHECKING:
-    from .allan import AllanReport
     from simnav.leaderboard.campaign.rescoring import Rescored
     from simnav.leaderboard.campaign.seal import Seal
     from simnav.leaderboard.campaign.verification import Verification
@@ -39,6 +38,8 @@ if TYPE_CHECKING:
     from simnav.leaderboard.ranking.bounds import BoundReport
     from simnav.leaderboard.results.citation import Citation
     from simnav.leaderboard.results.result import Result
+
+    from .allan import AllanReport
 
 __all__ = ["allan", "bound", "cite", "merge", "rank", "reproduce", "rescore", "seal", "verify"]
 
