@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from simnav.kinds import Component, Kind
     from simnav.leaderboard.claiming import claim
     from simnav.leaderboard.costing import bench, costs
-    from simnav.leaderboard.inspection import bound, cite, merge, rank, reproduce, rescore, seal, verify
+    from simnav.leaderboard.inspection import allan, bound, cite, merge, rank, reproduce, rescore, seal, verify
     from simnav.leaderboard.publishing import (
         audit_standard,
         check_standard,
@@ -87,6 +87,7 @@ __all__ = [
     "TriadDatasheet",
     "Trial",
     "UnsuitableScenario",
+    "allan",
     "audit_standard",
     "bench",
     "bound",
@@ -156,7 +157,7 @@ _HOMES = {
     ),
     "leaderboard.claiming": ("claim",),
     "leaderboard.costing": ("bench", "costs"),
-    "leaderboard.inspection": ("bound", "cite", "merge", "rank", "reproduce", "rescore", "seal", "verify"),
+    "leaderboard.inspection": ("allan", "bound", "cite", "merge", "rank", "reproduce", "rescore", "seal", "verify"),
     "leaderboard.results.errors": ("RequestError",),
     "leaderboard.running": ("campaign", "check", "evaluate", "make", "record", "run", "sweep", "tune"),
     "leaderboard.publishing": (

@@ -20,6 +20,7 @@ from simnav.leaderboard.publishing_requests import (
     SubmitRequest,
 )
 from simnav.leaderboard.requests import (
+    AllanRequest,
     BenchRequest,
     BoundRequest,
     CampaignRequest,
@@ -53,6 +54,7 @@ class Topic(StrEnum):
     ESTIMATORS = "estimators"
     INSTRUMENTS = "instruments"
     FAULTS = "faults"
+    IMUS = "imus"
 
 
 class Features(StrEnum):
@@ -65,7 +67,7 @@ class Features(StrEnum):
 
 @request
 class ListCommand:
-    """List scenarios, estimators, kinds of instruments or kinds of faults."""
+    """List scenarios, estimators, kinds of instruments, kinds of faults, or IMUs by name."""
 
     topic: Topic | None = option(
         default=None,
@@ -169,6 +171,15 @@ class BoundCommand(BoundRequest):
 
 
 @request
+class AllanCommand(AllanRequest):
+    """Show the Allan deviation of an IMU and its noise coefficients, beside its datasheet."""
+
+    _: KW_ONLY
+    plot: Path | None = option(default=None, help=_FIGURE)
+    csv: Path | None = option("--csv", default=None, help="Write every averaging time to this file.")
+
+
+@request
 class ReferenceCommand:
     """Run the oracles over many seeds, and store the figures that errors are divided by."""
 
@@ -242,6 +253,7 @@ COMMANDS: Mapping[str, tuple[type[Any], str]] = {
     "leaderboard": (SiteRequest, "leaderboard"),
     "warmup": (WarmupCommand, "warmup"),
     "bound": (BoundCommand, "bound"),
+    "allan": (AllanCommand, "allan"),
     "reproduce": (ReproduceRequest, "reproduce"),
     "claim": (ClaimCommand, "claim"),
     "reference": (ReferenceCommand, "reference"),
