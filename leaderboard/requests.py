@@ -56,7 +56,7 @@ _EACH_GETS = "Each estimator gets the parameters that it has."
 PROGRESS = "Called with the number of finished parts, the number of all parts, and the next part as ``note=``."
 CAMPAIGN_PROGRESS = "Called with a `simnav.leaderboard.campaign.campaign.Progress` from time to time."
 FOLDER = "Folder that a campaign wrote."
-_PROFILE = "What is run: smoke, quick, standard, full, or a TOML file of your own."
+_PROFILE = "What is run: smoke, quick, standard, full, robustness, or a TOML file of your own."
 _OWN_SCENARIOS = "TOML files of scenarios outside the catalogue."
 _FIRST_SEED = "Seed of the first run; the others count up."
 
