@@ -29,6 +29,7 @@ from simnav.leaderboard.requests import (
     RecordRequest,
     ReproduceRequest,
     RescoreRequest,
+    RobustnessRequest,
     RunRequest,
     Scenarios,
     SealRequest,
@@ -140,6 +141,14 @@ class SweepCommand(SweepRequest):
 
 
 @request
+class RobustnessCommand(RobustnessRequest):
+    """Compare estimators with the plain row when a datasheet is wrong: robustness profiles."""
+
+    _: KW_ONLY
+    plot: Path | None = option(default=None, help=_FIGURE)
+
+
+@request
 class WarmupCommand:
     """Compile every kernel, once; later starts are quick."""
 
@@ -222,6 +231,7 @@ COMMANDS: Mapping[str, tuple[type[Any], str]] = {
     "evaluate": (EvaluateRequest, "evaluate"),
     "campaign": (CampaignRequest, "campaign"),
     "sweep": (SweepCommand, "sweep"),
+    "robustness": (RobustnessCommand, "robustness"),
     "leaderboard": (SiteRequest, "leaderboard"),
     "warmup": (WarmupCommand, "warmup"),
     "bound": (BoundCommand, "bound"),
