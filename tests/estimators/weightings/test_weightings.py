@@ -582,7 +582,9 @@ def test_nobody_is_asked_where_there_is_no_log():
         assert f.weight.max() == 1e-3
 
 
-def lone(epochs: int, norms: dict[float, float], fix_until: float = 1.0, fold: float = 0.0) -> list[tuple[Factors, bool]]:
+def lone(
+    epochs: int, norms: dict[float, float], fix_until: float = 1.0, fold: float = 0.0
+) -> list[tuple[Factors, bool]]:
     """What is asked, epoch by epoch, if the DVL fails from second 1 on, and fixes pass until a time.
 
     ``norms`` are the norms of the DVL's readings by their times where the motion is loosened; ``fold`` is how long
