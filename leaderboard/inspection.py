@@ -161,7 +161,8 @@ def cite(request: CiteRequest) -> Citation:
     """
     from simnav.leaderboard.results.citation import citation
 
-    return citation(None if request.results is None else [r.provenance for r in results_of(request.results)])
+    found = None if request.results is None else [r.provenance for r in results_of(request.results)]
+    return citation(found, request.author)
 
 
 @call(BoundRequest)

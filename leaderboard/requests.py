@@ -52,6 +52,7 @@ _SCENARIO = "Name, versioned id, or path of a TOML file."
 _SCENARIO_MORE = "Or the `simnav.scenario.Scenario` itself."
 _SCENARIOS = "Names, tracks or TOML files, separated by commas. Default: all."
 _ESTIMATORS = "Names or files, separated by commas; 'sw-fgo:window=10' sets a parameter."
+_FIVE = "'all': every registered one. Default: five baselines that suit the scenario."
 PARAMETERS = "Value of a parameter of the estimators."
 _EACH_GETS = "Each estimator gets the parameters that it has."
 PROGRESS = "Called with the number of finished parts, the number of all parts, and the next part as ``note=``."
@@ -75,7 +76,7 @@ class RunRequest:
     """Run estimators once over one scenario, in this process, and score them."""
 
     scenario: ScenarioLike = option(help=_SCENARIO, more=_SCENARIO_MORE, argument=True, metavar="SCENARIO")
-    estimators: Estimators = option("--estimator", "-e", default=None, help=f"{_ESTIMATORS} Default: all.")
+    estimators: Estimators = option("--estimator", "-e", default=None, help=f"{_ESTIMATORS} {_FIVE}")
     _: KW_ONLY
     seed: int = option(default=0, help="Seed of the run.", least=0)
     parameters: Parameters = option("--set", default=None, help=PARAMETERS, more=_EACH_GETS, metavar="NAME=VALUE")
@@ -96,9 +97,7 @@ class EvaluateRequest(RunOptions):
     _: KW_ONLY
     runs: int = option("--runs", "-n", default=20, help="Seeds of each scenario.", least=2)
     seed: int = option("--seed", default=0, help=_FIRST_SEED, least=0)
-    against: Estimators = option(
-        default=None, help="Baselines, separated by commas. Default: all that suit the scenario."
-    )
+    against: Estimators = option(default=None, help=f"Rows to compare with, separated by commas. {_FIVE}")
     parameters: Parameters = option(
         "--set", default=None, help=PARAMETERS, more="Of the estimators under test.", metavar="NAME=VALUE"
     )
@@ -411,6 +410,8 @@ class CiteRequest:
     results: PathLike | None = option(
         default=None, help=f"{FOLDER} Default: simnav itself.", argument=True, metavar="RESULTS"
     )
+    _: KW_ONLY
+    author: str = option("--author", default="", help="Who made the results. Default: the authors of simnav.")
 
 
 @request

@@ -16,6 +16,7 @@ from simnav.leaderboard.campaign.request import request as one_request
 from simnav.leaderboard.results.errors import RequestError, StoreError, mistakes
 from simnav.leaderboard.results.scratch import scratch
 
+from .baselines import baselines_or
 from .calls import call, whole_number
 from .given import absolute, results_of, scenario_of, scenarios_of, seeds_of
 from .requests import (
@@ -32,7 +33,6 @@ from .requests import (
 if TYPE_CHECKING:
     from simnav.estimator import Estimator
     from simnav.leaderboard.campaign.campaign import Summary
-    from simnav.leaderboard.campaign.single_run import RunReport
     from simnav.leaderboard.ranking.reports import CampaignReport, EvaluationReport
     from simnav.leaderboard.sweep.datasheets import Robustness
     from simnav.leaderboard.sweep.report import Sweep
@@ -40,6 +40,8 @@ if TYPE_CHECKING:
     from simnav.recording import Recording
     from simnav.scenario import Scenario
     from simnav.testing.contract_check import Report
+
+    from .single_run import RunReport
 
 __all__ = ["campaign", "check", "evaluate", "make", "record", "robustness", "run", "sweep", "tune"]
 
@@ -120,10 +122,10 @@ def run(request: RunRequest) -> RunReport:
     RunReport
         The recording, all trials and their scores.
     """
-    from simnav.leaderboard.campaign.single_run import run_once
+    from .single_run import run_once
 
     chosen, seed = scenario_of(request.scenario), whole_number("seed", request.seed)
-    return run_once(chosen, requests(request.estimators, request.parameters), seed, request.progress)
+    return run_once(chosen, baselines_or(request.estimators, [chosen], request.parameters), seed, request.progress)
 
 
 @call(EvaluateRequest)
@@ -143,8 +145,8 @@ def evaluate(request: EvaluateRequest) -> EvaluationReport:
     if not request.estimators:
         raise RequestError("no estimator was asked for; name those that should be evaluated")
     mine = requests(request.estimators, request.parameters)
-    everyone = together([*mine, *requests(request.against)])
     chosen, seeds = scenarios_of(request.scenarios), seeds_of(request.seed, request.runs)
+    everyone = together([*mine, *baselines_or(request.against, chosen)])
     with _folder(request.results) as folder:
         _run(request, chosen, everyone, seeds, folder)
         found = results_of(folder)

@@ -33,6 +33,7 @@ if TYPE_CHECKING:
         publish_standard,
         run_standard,
         site,
+        standard,
         submit,
         verify_bundle,
     )
@@ -116,6 +117,7 @@ __all__ = [
     "score",
     "seal",
     "site",
+    "standard",
     "submit",
     "sweep",
     "tune",
@@ -161,6 +163,7 @@ _HOMES = {
         "publish_standard",
         "run_standard",
         "site",
+        "standard",
         "submit",
         "verify_bundle",
     ),

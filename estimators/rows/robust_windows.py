@@ -125,6 +125,9 @@ class MaxMixtureFgo(_Robust, weighting=MaxMixture):
 class GaFgo(_Window, weighting=piece(GradientAdaptive, fewest=5)):
     """Gradient-adaptive factor graph, its residuals whitened and its scales consistent.
 
+    Motion keeps three tenths of its information however wrong it is, so a disturbed IMU is not rejected. On
+    ``lone-dvl`` its error is 2.7 times that of ``gnc-fgo``, and 0.85 times that of ``ekf``.
+
     Source: M. Guo, B. Wang, L. Wei et al., *Robust INS/GNSS/DVL integrated navigation for MASS based on
     gradient-adaptive factor graph optimization*, 2026.
     """

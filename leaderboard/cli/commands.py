@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import KW_ONLY
 from enum import StrEnum
 from pathlib import Path
@@ -41,7 +41,7 @@ from simnav.leaderboard.requests import (
 if TYPE_CHECKING:
     from simnav.leaderboard.campaign.request import Estimators
 
-__all__ = ["COMMANDS", "GROUPS", "Features", "Topic"]
+__all__ = ["COMMANDS", "GROUPS", "HEADINGS", "Features", "Topic"]
 
 _FIGURE = "Write a figure: .png, .svg or .pdf."
 
@@ -73,6 +73,13 @@ class ListCommand:
         help="What to list; without it, scenarios and estimators.",
         argument=True,
     )
+
+
+@request
+class ShowCommand:
+    """Show all about a scenario, an estimator, a kind of instrument or a kind of fault."""
+
+    name: str = option(help="Its name, as 'simnav list' has it.", argument=True, metavar="NAME")
 
 
 @request
@@ -223,6 +230,7 @@ class TrainAnfisCommand:
 #: Name of a command -> its request, and the module of this package that runs it.
 COMMANDS: Mapping[str, tuple[type[Any], str]] = {
     "list": (ListCommand, "list_"),
+    "show": (ShowCommand, "show"),
     "run": (RunCommand, "run"),
     "simulate": (SimulateCommand, "simulate"),
     "check": (CheckCommand, "check"),
@@ -245,6 +253,15 @@ COMMANDS: Mapping[str, tuple[type[Any], str]] = {
     "submit": (SubmitRequest, "submit"),
     "tune": (TuneCommand, "tune"),
 }
+
+#: Heading of the help -> the commands below it.
+HEADINGS: Mapping[str, Sequence[str]] = {
+    "Every day": ("list", "show", "run", "evaluate", "check", "new-estimator", "simulate", "sweep", "campaign",
+                  "leaderboard"),
+    "Study and publish": ("tune", "train", "bench", "robustness", "bound", "reproduce", "rescore", "merge", "submit", "verify",
+                          "seal", "cite"),
+    "Maintain": ("standard", "reference", "warmup"),
+}  # fmt: skip
 
 #: Name of a group -> its help, and its commands.
 GROUPS: Mapping[str, tuple[str, Mapping[str, tuple[type[Any], str]]]] = {

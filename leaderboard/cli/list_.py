@@ -15,8 +15,6 @@ from .commands import ListCommand, Topic
 from .console import Output
 
 if TYPE_CHECKING:
-    from rich.table import Table
-
     from simnav.scenario.catalogue import Header
     from simnav.spec import Spec
 
@@ -28,13 +26,13 @@ def show(out: Output, request: ListCommand) -> None:
     found: dict[str, Any] = {}
     if request.topic in (None, Topic.SCENARIOS):
         found["scenarios"] = scenarios()
-        out.print(_scenario_table(found["scenarios"]))
+        out.print(_scenario_lines(found["scenarios"]))
     if request.topic in (None, Topic.ESTIMATORS):
         found["estimators"] = estimators(places=out.json)
-        out.print(_estimator_table(found["estimators"]))
+        out.print(_estimator_lines(found["estimators"]))
     if request.topic in (Topic.INSTRUMENTS, Topic.FAULTS):
         found[request.topic] = instruments() if request.topic is Topic.INSTRUMENTS else faults()
-        out.print(_kind_table(request.topic.value.capitalize(), found[request.topic]))
+        out.print(_kind_lines(request.topic.value.capitalize(), found[request.topic]))
     out.document(found)
 
 
@@ -124,7 +122,7 @@ def _kind(spec: type[Spec], fallback: str) -> KindItem:
         for key, (name, info) in spec.toml_keys().items()
         if name != "kind"
     }
-    return KindItem(kind, (spec.__doc__ or fallback).strip().splitlines()[0], keys)
+    return KindItem(kind, (spec.__doc__ or fallback).strip().splitlines()[0].rstrip(":"), keys)
 
 
 #: Tracks and groups as they are listed; those of others follow, by name.
@@ -145,26 +143,20 @@ def _place(header: Header) -> tuple[int, str, int, str, str, int]:
     return rank(track, _TRACKS), track, rank(group, _GROUPS), group, header.name, header.version
 
 
-def _scenario_table(found: list[ScenarioItem]) -> Table:
-    """A row a scenario; a track and a group are named where they begin."""
-    rows, before = [], ("", "")
-    for e in found:
-        track = e.track if e.track != before[0] else ""
-        group = e.group if track or e.group != before[1] else ""
-        version = f"v{e.id.rpartition('-v')[2]}"
-        rows.append([track, group, e.name, version, tables.duration(e.duration), e.title, ", ".join(e.tags)])
-        before = e.track, e.group
-    columns = ["track", "group", "name", "version", "duration", "title", "tags"]
-    return tables.table("Scenarios", columns, rows, numeric=["duration"])
+_MORE = "'simnav show NAME' has the rest."
 
 
-def _estimator_table(found: list[EstimatorItem]) -> Table:
-    rows = [[e.name + (" *" if e.reference else ""), e.summary, tables.parameters(e.parameters)] for e in found]
+def _scenario_lines(found: list[ScenarioItem]) -> tables.Lines:
+    rows = [[e.name, e.track, tables.duration(e.duration), e.title] for e in found]
+    return tables.Lines("Scenarios", ["name", "track", "duration", "title"], rows, numeric=["duration"], caption=_MORE)
+
+
+def _estimator_lines(found: list[EstimatorItem]) -> tables.Lines:
+    rows = [[e.name + (" *" if e.reference else ""), e.summary] for e in found]
     dim = [i for i, e in enumerate(found) if e.reference]
-    caption = "* reference: it is told the truth, and is not ranked" if dim else None
-    return tables.table("Estimators", ["name", "what it is", "parameters"], rows, dim=dim, caption=caption)
+    caption = f"{_MORE} * reference: it is told the truth, and is not ranked." if dim else _MORE
+    return tables.Lines("Estimators", ["name", "what it is"], rows, dim=dim, caption=caption)
 
 
-def _kind_table(title: str, found: list[KindItem]) -> Table:
-    rows = [[e.kind, e.summary, ", ".join(k + ("!" if v.required else "") for k, v in e.keys.items())] for e in found]
-    return tables.table(title, ["kind", "what it is", "keys in TOML (! required)"], rows)
+def _kind_lines(title: str, found: list[KindItem]) -> tables.Lines:
+    return tables.Lines(title, ["kind", "what it is"], [[e.kind, e.summary] for e in found], caption=_MORE)

@@ -140,7 +140,7 @@ CALLS: dict[str, tuple[list[str], Callable[[], Any]]] = {
 
 #: Commands whose calls are compared where their own tests are: they take minutes, or need what another one makes.
 ELSEWHERE = {"merge", "reference", "reproduce", "rescore", "seal", "submit", "tune", "verify"}
-ELSEWHERE |= {"standard run", "standard check", "standard audit", "standard publish", "train anfis"}
+ELSEWHERE |= {"show", "standard run", "standard check", "standard audit", "standard publish", "train anfis"}
 
 
 def commands() -> dict[str, Callable[..., Any]]:
@@ -183,10 +183,11 @@ def test_every_command_is_compared() -> None:
     assert set(commands()) == set(CALLS) | ELSEWHERE
 
 
-#: The call of a command, where its name is another one; None where the maintainers of simnav alone need it.
+#: The call of a command, where its name is another one; None where the maintainers of simnav alone need it, or where
+#: Python has the objects themselves (``show``).
 OTHER_NAMES: dict[str, Callable[..., Any] | None] = {
     "list": simnav.names, "simulate": simnav.record, "leaderboard": simnav.site, "new-estimator": write_estimator,
-    "warmup": warmup, "reference": None, "train anfis": None, "standard run": simnav.run_standard,
+    "warmup": warmup, "reference": None, "show": None, "train anfis": None, "standard run": simnav.run_standard,
     "standard check": simnav.check_standard, "standard audit": simnav.audit_standard,
     "standard publish": simnav.publish_standard,
 }  # fmt: skip
