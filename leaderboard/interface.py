@@ -20,7 +20,7 @@ from .costing import bench, costs
 from .given import results_of, scenario_of, scenarios_of
 from .inspection import allan, bound, cite, merge, rank, reproduce, rescore, seal, verify
 from .requests import ScenarioLike, Scenarios
-from .running import campaign, check, evaluate, make, record, run, sweep, tune
+from .running import campaign, check, evaluate, make, record, robustness, run, sweep, tune
 
 __all__ = [
     "EstimatorLike",
@@ -44,6 +44,7 @@ __all__ = [
     "reproduce",
     "rescore",
     "results_of",
+    "robustness",
     "run",
     "scenario_of",
     "scenarios_of",

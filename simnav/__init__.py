@@ -39,7 +39,7 @@ if TYPE_CHECKING:
         verify_bundle,
     )
     from simnav.leaderboard.results.errors import RequestError
-    from simnav.leaderboard.running import campaign, check, evaluate, make, record, run, sweep, tune
+    from simnav.leaderboard.running import campaign, check, evaluate, make, record, robustness, run, sweep, tune
     from simnav.plugins import load_plugin
     from simnav.recording import Recording
     from simnav.scenario import Scenario, load
@@ -113,6 +113,7 @@ __all__ = [
     "register_score",
     "reproduce",
     "rescore",
+    "robustness",
     "run",
     "run_standard",
     "run_trial",
@@ -159,7 +160,7 @@ _HOMES = {
     "leaderboard.costing": ("bench", "costs"),
     "leaderboard.inspection": ("allan", "bound", "cite", "merge", "rank", "reproduce", "rescore", "seal", "verify"),
     "leaderboard.results.errors": ("RequestError",),
-    "leaderboard.running": ("campaign", "check", "evaluate", "make", "record", "run", "sweep", "tune"),
+    "leaderboard.running": ("campaign", "check", "evaluate", "make", "record", "robustness", "run", "sweep", "tune"),
     "leaderboard.publishing": (
         "audit_standard",
         "check_standard",

@@ -31,6 +31,7 @@ from simnav.leaderboard.requests import (
     RecordRequest,
     ReproduceRequest,
     RescoreRequest,
+    RobustnessRequest,
     RunRequest,
     Scenarios,
     SealRequest,
@@ -158,6 +159,14 @@ class ClaimCommand(ClaimRequest):
 
 
 @request
+class RobustnessCommand(RobustnessRequest):
+    """Compare estimators with the plain row when a datasheet is wrong: robustness profiles."""
+
+    _: KW_ONLY
+    plot: Path | None = option(default=None, help=_FIGURE)
+
+
+@request
 class WarmupCommand:
     """Compile every kernel, once; later starts are quick."""
 
@@ -250,6 +259,7 @@ COMMANDS: Mapping[str, tuple[type[Any], str]] = {
     "evaluate": (EvaluateRequest, "evaluate"),
     "campaign": (CampaignRequest, "campaign"),
     "sweep": (SweepCommand, "sweep"),
+    "robustness": (RobustnessCommand, "robustness"),
     "leaderboard": (SiteRequest, "leaderboard"),
     "warmup": (WarmupCommand, "warmup"),
     "bound": (BoundCommand, "bound"),
@@ -270,8 +280,8 @@ COMMANDS: Mapping[str, tuple[type[Any], str]] = {
 HEADINGS: Mapping[str, Sequence[str]] = {
     "Every day": ("list", "show", "run", "evaluate", "check", "new-estimator", "simulate", "sweep", "campaign",
                   "leaderboard"),
-    "Study and publish": ("tune", "train", "bench", "bound", "reproduce", "claim", "rescore", "merge", "submit",
-                          "verify", "seal", "cite"),
+    "Study and publish": ("tune", "train", "bench", "robustness", "bound", "reproduce", "claim", "rescore", "merge",
+                          "submit", "verify", "seal", "cite"),
     "Maintain": ("standard", "reference", "warmup"),
 }  # fmt: skip
 

@@ -156,7 +156,10 @@ def _kind(spec: type[Spec], fallback: str) -> KindItem:
 
 
 #: Tracks and groups as they are listed; those of others follow, by name.
-_TRACKS = ("aided-ins", "no-imu", "underwater", "long", "generalisation", "generalisation-no-imu", "recorded", "papers")
+_TRACKS = (
+    "aided-ins", "no-imu", "underwater", "long", "generalisation", "generalisation-no-imu", "robustness", "recorded",
+    "papers",
+)  # fmt: skip
 _GROUPS = ("clean", "degraded GNSS", "outages", "gross errors", "wrong datasheet", "wrong start", "extremes")
 
 

@@ -21,7 +21,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from math import inf, sqrt
-from typing import Any, Literal, Self, TypeAlias
+from typing import Any, ClassVar, Literal, Self, TypeAlias
 
 import numpy as np
 from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
@@ -51,6 +51,9 @@ class TriadSpec(Spec):
     not receive them.
     """
 
+    #: The figures that may differ from the datasheet (``times_datasheet``).
+    errors: ClassVar[tuple[str, ...]] = _ERRORS
+
     bias: float
     bias_instability: float
     correlation_time: Positive = quantity("s", inf)
@@ -68,7 +71,7 @@ class TriadSpec(Spec):
 
     @model_validator(mode="after")
     def _known_figures(self) -> Self:
-        valid = figures_of(type(self), _ERRORS)
+        valid = figures_of(type(self), self.errors)
         for name in self.times_datasheet:
             if name not in valid:
                 raise ValueError(f"times_datasheet.{name}: there is no such figure{closest(name, valid)}")
