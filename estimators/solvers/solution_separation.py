@@ -111,6 +111,7 @@ from .hypotheses import (
 from .iterated import Iteration
 from .kalman import KalmanEstimator
 from .separation import KNOWN_HEADING, SeparationTest
+from .state_difference import difference
 
 __all__ = ["SolutionSeparation"]
 
@@ -232,6 +233,7 @@ class SolutionSeparation(Solver):
             for sub, begin in zip(pair, (start.time, start.time - 0.5 * self._horizon), strict=True):
                 self._begin(sub, begin, None)
         self._coasting: float | None = None
+        self._apart: dict[str, float] = {}
         self._settled = start.time
         self._last_delivery = dict.fromkeys(self._names, start.time)
         self._silence = {name: max(_SILENCE, 3.0 / instruments[name].rate) for name in self._names}
@@ -244,8 +246,7 @@ class SolutionSeparation(Solver):
         if self._inertial and sigma[8] <= KNOWN_HEADING:
             self._wrong_start = Hypothesis(_START, self._filter(start=uncertain_start(start)), start.time)
         self._disturbed = False
-        witnesses = self._inertial and len(set(self._group.values())) > 1
-        self._imu = self._other_opinion_of_the_imu() if witnesses else None
+        self._imu = self._other_opinion_of_the_imu() if self._inertial and self._group else None
         self._trial = -np.inf
         self._searching = self._inertial and self._wrong_start is None
         if self._searching:  # a filter that finds its heading may think too early that it has
@@ -415,7 +416,7 @@ class SolutionSeparation(Solver):
             return _IMU  # one fault explains what would be two
         contradicting = self._exclusion.contradicting(self._time) & ratios.keys()
         instruments = {*suspects, *probation, *contradicting} - {_IMU}
-        spared = [name for name in instruments if self._can_spare(name)]
+        spared = [name for name in instruments if self._can_spare(name) and not self._only_against_the_imu(name)]
         apart = {name: self._disagreement(self._older_filter(name).filter, {name, *out}) for name in spared}
         if self._imu is not None and _IMU in suspects:
             apart[_IMU] = self._disagreement(self._imu.filter, self._imu.exclusion.excluded)
@@ -437,6 +438,13 @@ class SolutionSeparation(Solver):
         """Whether what is left without an instrument gives a position."""
         out = {name} if self._mistaken(name) else {name, *self._exclusion.excluded}
         return self._rules.can_spare([n for n in self._delivering(self._names) if n not in out])
+
+    def _only_against_the_imu(self, name: str) -> bool:
+        """Whether an instrument is the last fix or log, and a disturbed IMU would explain why it disagrees."""
+        if self._imu is None or self._disturbed or name not in self._group:
+            return False
+        left = set(self._delivering(self._group)) - {name, *self._exclusion.excluded}
+        return not left and self._disagreement(self._imu.filter, self._imu.exclusion.excluded) <= _AGREEMENT
 
     def _delivering(self, names: Iterable[str]) -> list[str]:
         """Those of the instruments that are not silent."""
@@ -474,6 +482,7 @@ class SolutionSeparation(Solver):
         if excluded or chosen is before:
             self._alternatives = {}
         assert chosen.estimate is not None
+        self._apart[name] = _horizontal(difference(chosen.estimate, self._main.model.estimate(self._main.covariance)))
         self._count[name] += 1
         self._exclusion.agrees_since.pop(name, None)
         excluded.add(name)
@@ -531,7 +540,7 @@ class SolutionSeparation(Solver):
         needed, first, longest = self._rules.lost_without(fixes, logs)
         coasting = bool(needed) and set(needed) <= excluded
         self._coasting = (time if self._coasting is None else self._coasting) if coasting else None
-        if self._coasting is not None and time - self._coasting >= longest:
+        if self._coasting is not None and (time - self._coasting >= longest or self._worse_than_excluded(first)):
             again += [n for n in first if n not in again]
             self._settled = time + _RECENT  # the filters go to them; until then they differ for that alone
         if again:
@@ -544,6 +553,15 @@ class SolutionSeparation(Solver):
                 one.mean_nis.pop(name, None)
             for k, sub in enumerate(self._pairs[name]):
                 self._begin(sub, time - 0.5 * self._horizon * k, None)
+
+    def _worse_than_excluded(self, names: list[str]) -> bool:
+        """Whether the position has become more uncertain than it was wrong, by the tests, with these instruments."""
+        if not self._inertial:
+            return False
+        covariance = self._main.model.estimate(self._main.covariance).covariance
+        assert covariance is not None
+        sigma = sqrt(float(covariance[0, 0] + covariance[1, 1]))
+        return sigma > max((self._apart.get(name, 0.0) for name in names), default=np.inf)
 
     def _renew(self, time: float) -> None:
         """Begin sub-filters anew that have come of age."""
@@ -573,3 +591,7 @@ class SolutionSeparation(Solver):
                 level = max(level, self._test.factor * sqrt(float(apart[q])) + self._missed * sqrt(float(own[q])))
             levels.append(level)
         return hypot(*levels)
+
+
+def _horizontal(error: Array) -> float:
+    return hypot(float(error[0]), float(error[1]))
