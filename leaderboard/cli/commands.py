@@ -258,8 +258,8 @@ COMMANDS: Mapping[str, tuple[type[Any], str]] = {
 HEADINGS: Mapping[str, Sequence[str]] = {
     "Every day": ("list", "show", "run", "evaluate", "check", "new-estimator", "simulate", "sweep", "campaign",
                   "leaderboard"),
-    "Study and publish": ("tune", "train", "bench", "robustness", "bound", "reproduce", "rescore", "merge", "submit", "verify",
-                          "seal", "cite"),
+    "Study and publish": ("tune", "train", "bench", "robustness", "bound", "reproduce", "rescore", "merge", "submit",
+                          "verify", "seal", "cite"),
     "Maintain": ("standard", "reference", "warmup"),
 }  # fmt: skip
 
