@@ -15,9 +15,10 @@ from __future__ import annotations
 from simnav.leaderboard.campaign.request import EstimatorLike, Estimators
 from simnav.leaderboard.results.errors import RequestError
 
+from .claiming import claim
 from .costing import bench, costs
 from .given import results_of, scenario_of, scenarios_of
-from .inspection import bound, cite, merge, rank, reproduce, rescore, seal, verify
+from .inspection import allan, bound, cite, merge, rank, reproduce, rescore, seal, verify
 from .requests import ScenarioLike, Scenarios
 from .running import campaign, check, evaluate, make, record, robustness, run, sweep, tune
 
@@ -27,11 +28,13 @@ __all__ = [
     "RequestError",
     "ScenarioLike",
     "Scenarios",
+    "allan",
     "bench",
     "bound",
     "campaign",
     "check",
     "cite",
+    "claim",
     "costs",
     "evaluate",
     "make",

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from simnav.scenario import Scenario
 
 __all__ = [
+    "AllanRequest",
     "BenchRequest",
     "BoundRequest",
     "CampaignRequest",
@@ -80,6 +81,14 @@ class RunRequest:
     _: KW_ONLY
     seed: int = option(default=0, help="Seed of the run.", least=0)
     parameters: Parameters = option("--set", default=None, help=PARAMETERS, more=_EACH_GETS, metavar="NAME=VALUE")
+    lags: str | Sequence[float] | None = option(
+        "--lags",
+        default=None,
+        cli=str | None,
+        metavar="SECONDS",
+        help="Also estimate the times so many seconds before, like 1/5/10/30: the accuracy of an output that is late.",
+        more="The parameter ``lags`` of all estimators (`simnav.estimator.looking_back`).",
+    )
     progress: Bar = option(default=None, help=PROGRESS, hidden=True)
 
 
@@ -428,6 +437,27 @@ class BoundRequest:
     runs: int = option("--runs", "-n", default=12, help="Seeds over which it is averaged.", least=1)
     smoothed: bool = option("--smoothed", default=False, help="Bound of smoothed output, not of real-time output.")
     progress: Bar = option(default=None, help=PROGRESS, hidden=True)
+
+
+@request
+class AllanRequest:
+    """The Allan deviation of an IMU and its noise coefficients, beside its datasheet.
+
+    Of a simulated scenario it is that of the errors at rest; of a log, that of the recorded samples, with all motion
+    that is in them.
+    """
+
+    scenario: ScenarioLike = option(
+        help="A scenario, simulated or recorded, or a recording (.npz).",
+        more=_SCENARIO_MORE,
+        argument=True,
+        metavar="SCENARIO_OR_LOG",
+    )
+    _: KW_ONLY
+    seed: int = option(default=0, help="Seed of the simulated errors; of a log, the number of the recording.", least=0)
+    duration: float = option(default=21600.0, least=1.0, help="Seconds that are simulated.")
+    start: float = option(default=0.0, least=0.0, help="Of a log: begin here, in seconds.")
+    end: float | None = option(default=None, least=0.0, help="Of a log: end here, in seconds. Default: at its end.")
 
 
 @request

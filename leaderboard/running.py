@@ -10,6 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from simnav.estimator.looking_back import LAGS, lags_of
 from simnav.leaderboard.campaign.options import RunOptions, shared
 from simnav.leaderboard.campaign.request import EstimatorLike, EstimatorRequest, Estimators, requests, together
 from simnav.leaderboard.campaign.request import request as one_request
@@ -125,7 +126,12 @@ def run(request: RunRequest) -> RunReport:
     from .single_run import run_once
 
     chosen, seed = scenario_of(request.scenario), whole_number("seed", request.seed)
-    return run_once(chosen, baselines_or(request.estimators, [chosen], request.parameters), seed, request.progress)
+    asked = baselines_or(request.estimators, [chosen], request.parameters)
+    if request.lags is not None:
+        with mistakes():
+            lags = "/".join(f"{lag:g}" for lag in lags_of(request.lags))
+        asked = requests([one_request(r, {LAGS: lags}) for r in asked])
+    return run_once(chosen, asked, seed, request.progress)
 
 
 @call(EvaluateRequest)

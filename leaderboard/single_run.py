@@ -21,6 +21,7 @@ from simnav.leaderboard.results.frame import frame
 from simnav.leaderboard.results.shown import Shown
 from simnav.scoring import SCORES, protection_levels, score, stanford
 from simnav.scoring.consistency import badge
+from simnav.scoring.lagged import seconds_of
 
 from .ranking import tables
 
@@ -98,9 +99,11 @@ class RunReport(Shown):
         labels = ", ".join(e.estimator for e in self.estimators)
         return f"{self.recording.scenario}, seed {self.recording.seed}: {labels}"
 
-    def shown(self) -> tuple[tables.Fitted]:
-        """The table of the scores."""
-        return (run_table(self.recording, self.estimators),)
+    def shown(self) -> Sequence[tables.Fitted]:
+        """The table of the scores; with lags, that of outputs that are late, too."""
+        found = run_table(self.recording, self.estimators)
+        late = any("_lag_" in name for e in self.estimators for name in e.scores)
+        return [found, lag_table(self.estimators)] if late else [found]
 
     def unseen(self, run: EstimatorRun) -> dict[str, str]:
         """Name and kind of the instruments of which an estimator shows no innovation and no residual.
@@ -194,6 +197,16 @@ def _covariance(scores: Mapping[str, float]) -> str:
     """What the truth of this run says of the covariance: the verdict, and the NEES that it is from."""
     nees = scores.get("nees_horizontal", math.nan)
     return consistency(Consistency(badge(np.array([nees])), nees))
+
+
+def lag_table(estimators: Sequence[EstimatorRun]) -> tables.Fitted:
+    """Horizontal RMSE against the delay of the output: a row an estimator, a column a lag."""
+    base = "horizontal_rmse"
+    names = {n for e in estimators for n in e.scores if n.startswith(f"{base}_lag_")}
+    lags = sorted(names, key=lambda name: seconds_of(name.rpartition("_")[2]))
+    columns = ["estimator", "newest", *(f"{seconds_of(n.rpartition('_')[2]):g} s late" for n in lags)]
+    cells = [[e.estimator, *(tables.number(e.scores.get(s)) for s in (base, *lags))] for e in estimators]
+    return tables.Fitted("Horizontal RMSE [m] of an output that is late", columns, cells, columns, numeric=columns[1:])
 
 
 def run_table(recording: Recording, estimators: Sequence[EstimatorRun]) -> tables.Fitted:

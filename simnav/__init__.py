@@ -25,8 +25,9 @@ if TYPE_CHECKING:
     from simnav.environment import EstimatorAgent, NavigationEnv, NavigationVectorEnv
     from simnav.estimator import Estimator, UnsuitableScenario, names, register
     from simnav.kinds import Component, Kind
+    from simnav.leaderboard.claiming import claim
     from simnav.leaderboard.costing import bench, costs
-    from simnav.leaderboard.inspection import bound, cite, merge, rank, reproduce, rescore, seal, verify
+    from simnav.leaderboard.inspection import allan, bound, cite, merge, rank, reproduce, rescore, seal, verify
     from simnav.leaderboard.publishing import (
         audit_standard,
         check_standard,
@@ -86,6 +87,7 @@ __all__ = [
     "TriadDatasheet",
     "Trial",
     "UnsuitableScenario",
+    "allan",
     "audit_standard",
     "bench",
     "bound",
@@ -93,6 +95,7 @@ __all__ = [
     "check",
     "check_standard",
     "cite",
+    "claim",
     "costs",
     "evaluate",
     "load",
@@ -153,8 +156,9 @@ _HOMES = {
         "NavigationStates",
         "TriadDatasheet",
     ),
+    "leaderboard.claiming": ("claim",),
     "leaderboard.costing": ("bench", "costs"),
-    "leaderboard.inspection": ("bound", "cite", "merge", "rank", "reproduce", "rescore", "seal", "verify"),
+    "leaderboard.inspection": ("allan", "bound", "cite", "merge", "rank", "reproduce", "rescore", "seal", "verify"),
     "leaderboard.results.errors": ("RequestError",),
     "leaderboard.running": ("campaign", "check", "evaluate", "make", "record", "robustness", "run", "sweep", "tune"),
     "leaderboard.publishing": (

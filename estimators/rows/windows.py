@@ -57,7 +57,15 @@ class IaeFgo(Row, solver=_WINDOW, model=Suitable, adaptation=piece(InnovationBas
 
     Source: G. Mao, K. Wang, T. Fu, *Robust GNSS/INS integrated navigation algorithm based on adaptive factor graph
     optimization*, 2025, eqs. 16-20.
+
+    Versions
+    --------
+    2
+        Windows, priors and forgetting are in seconds for an instrument of more than 1 Hz. Innovations that persist
+        while no other instrument contradicts them are taken as a wrong prediction, and not as noise (`PredictionTest`).
     """
+
+    version = 2
 
 
 @register("iae-fgo-fixed")
@@ -66,7 +74,15 @@ class IaeFgoFixed(Row, solver=_WINDOW, model=Suitable, adaptation=piece(FixedWin
 
     IAE-FGO-Fix of G. Mao, K. Wang, T. Fu, *Robust GNSS/INS integrated navigation algorithm based on adaptive factor
     graph optimization*, 2025.
+
+    Versions
+    --------
+    2
+        Windows, priors and forgetting are in seconds for an instrument of more than 1 Hz. Innovations that persist
+        while no other instrument contradicts them are taken as a wrong prediction, and not as noise (`PredictionTest`).
     """
+
+    version = 2
 
 
 @register("sw-fgo-paper")

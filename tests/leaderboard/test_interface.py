@@ -130,6 +130,10 @@ CALLS: dict[str, tuple[list[str], Callable[[], Any]]] = {
         ["bound", "open-sea", "-n", "1"],
         lambda: {**simnav.bound("open-sea", runs=1).to_dict(), "csv": None},
     ),
+    "allan": (
+        ["allan", "open-sea", "--duration", "100", "--seed", "2"],
+        lambda: {**simnav.allan("open-sea", duration=100.0, seed=2).to_dict(), "plot": None, "csv": None},
+    ),
     "cite": (["cite"], lambda: simnav.cite().to_dict()),
     "sweep": (
         ["sweep", "pond.toml", "--dial", RATE + "=1,2", "-e", "gnss-only", "-n", "1", "--workers", "1", "-o", "swept"],
@@ -201,6 +205,7 @@ OF_THE_RESULT = {
     "robustness": {"plot"},
     "bench": {"every", "output"},  # of all rows: simnav.costs
     "bound": {"csv"},
+    "allan": {"plot", "csv"},
     "verify": {"present", "tolerance"},  # of a bundle: simnav.verify_bundle
     "cite": {"text"},
     "tune": {"output", "plot", "parameters"},  # parameters that are held are a pair with the estimator

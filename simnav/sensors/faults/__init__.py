@@ -13,6 +13,7 @@ from simnav.recording import FaultLabel
 from simnav.sensors.faults.additive import AdditiveLayer, BiasStep, GrossError, Multipath, NoiseStep, Ramp
 from simnav.sensors.faults.fault import FAULTS, Effect, FaultError, FaultSpec, Names, effect_of, register_fault
 from simnav.sensors.faults.imu_disturbance import ImuDisturbance
+from simnav.sensors.faults.imu_faults import ImuBiasStep, ImuClipping, ImuDropout
 from simnav.sensors.faults.imu_gap import ImuGap
 from simnav.sensors.faults.layer import Activity, FaultLayer
 from simnav.sensors.faults.replacing import FalseZero, Frozen, Outage, ReplacingLayer
@@ -32,7 +33,10 @@ __all__ = [
     "FaultSpec",
     "Frozen",
     "GrossError",
+    "ImuBiasStep",
+    "ImuClipping",
     "ImuDisturbance",
+    "ImuDropout",
     "ImuGap",
     "Multipath",
     "Names",
