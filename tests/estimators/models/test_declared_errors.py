@@ -12,6 +12,7 @@ from simnav.estimator import make
 from simnav.estimators.models import declared_errors
 from simnav.estimators.models.about_truth import AboutTruthModel
 from simnav.estimators.models.chain import chain_of
+from simnav.estimators.models.channels import by_channel
 from simnav.estimators.models.declared_errors import DeclaredError, error_of_fault, errors_of, errors_of_triad
 from simnav.estimators.models.fault_states import FaultState, FaultStateModel
 from simnav.estimators.models.inertial import InertialModel
@@ -154,7 +155,7 @@ def variance_of(blocks: StateBlocks, source: str) -> float:
 def initial_variances(plugins) -> dict[str, tuple[float, int]]:
     """By model: initial variance of the states of a compass, and the number of all states."""
     recording = contract_recording(0)
-    given, start, found = recording.instruments, recording.start, {}
+    given, start, found = by_channel(recording.instruments), recording.start, {}
     compass = replace(given["gyrocompass"], bias=np.array([0.1]))
     aids = Instruments([compass, *(s for s in given.values() if s.name != compass.name)], given.imu, given.step)
     no_imu = Instruments([*aids.values()], None, given.step)
@@ -216,7 +217,7 @@ def test_the_states_of_faults_have_names():
     fault = FaultState("dvl", error_of_fault("dvl", np.array([0.3, 0.0, 0.2])), lambda time: 1.0)
     model = FaultStateModel(InertialModel(), [fault])
     model.reports_all = True
-    covariance = model.begin(recording.start, recording.instruments)
+    covariance = model.begin(recording.start, by_channel(recording.instruments))
     _, sigma = model.estimate(covariance).states["dvl.fault_0"]
     assert sigma == pytest.approx([0.3, 0.2])
 
