@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from simnav.scenario import Scenario, parse
 
-__all__ = ["raw_gnss"]
+__all__ = ["raw_gnss", "without_instruments"]
 
 _TEXT = """
 name = "raw-gnss"
@@ -63,3 +63,8 @@ lever_arm_m = [-3.0, 0.0, -12.0]
 def raw_gnss(duration: float = 60.0, tables: str = "") -> Scenario:
     """The scenario, with more tables."""
     return parse(_TEXT + tables).model_copy(update={"duration": duration})
+
+
+def without_instruments() -> str:
+    """The text of the scenario with an inertial unit only."""
+    return _TEXT.partition("[instruments.gnss]")[0]
