@@ -15,10 +15,11 @@ from simnav.leaderboard.cli import app
 from simnav.leaderboard.papers import PAPERS
 from simnav.leaderboard.papers.claims import search as searching
 from simnav.leaderboard.papers.claims import stored
-from simnav.leaderboard.papers.claims.answer import Answer, DialAnswer, Point
+from simnav.leaderboard.papers.claims.answer import Answer
 from simnav.leaderboard.papers.claims.claim import Claim, compared
 from simnav.leaderboard.papers.claims.declared import CLAIMS, claim_of
 from simnav.leaderboard.papers.claims.dials import choice_dial, lag_dial, lags_given, parameter_dial, scenario_dial
+from simnav.leaderboard.papers.claims.points import DialAnswer, Point
 from simnav.leaderboard.papers.claims.section import claim_count, claim_figures, claim_sheets
 from simnav.leaderboard.papers.measures import measure
 from simnav.leaderboard.results.result import Result
