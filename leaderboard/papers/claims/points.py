@@ -93,10 +93,11 @@ class DialAnswer:
         at = values.index(self.judged.value)
         if not good[at]:
             return []
+        place = values.index(self.ours) if self.ours in values else 0
         first = last = at
-        while first > 0 and good[first - 1]:
+        while at < place and first > 0 and good[first - 1]:
             first -= 1
-        while last + 1 < len(values) and good[last + 1]:
+        while at >= place and last + 1 < len(values) and good[last + 1]:
             last += 1
         return values[first : last + 1]
 
