@@ -8,8 +8,8 @@ from simnav.leaderboard.claiming import claim
 from simnav.leaderboard.figures.style import save_as
 from simnav.leaderboard.papers import ALIASES, PAPERS, key_of
 from simnav.leaderboard.papers.claims import stored
-from simnav.leaderboard.papers.claims.answer import gain_text
 from simnav.leaderboard.papers.claims.declared import CLAIMS
+from simnav.leaderboard.papers.claims.points import gain_text
 from simnav.leaderboard.ranking import tables
 from simnav.leaderboard.results.errors import mistakes
 

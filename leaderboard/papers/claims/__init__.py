@@ -7,7 +7,7 @@ question is not only whether a claim holds with the settings that we chose, but 
 - `dials`: dials of common kinds: the delay of an output, a parameter, another row, a value of a scenario.
 - `declared`: the claims of the five papers.
 - `search`: varies one dial at a time on seeds of a search, and judges what it found on other seeds.
-- `answer`: the gain at each value, with intervals, and the sentence that says when a claim holds.
+- `points`: the gain at each value, with intervals; `answer`: the sentence that says when a claim holds.
 - `stored`: the answers that come with simnav; `documentation` puts them on the pages of the papers.
 - `gain_figure`: gain against the value of a dial, with the claim as a line.
 """

@@ -8,44 +8,53 @@ from typing import TYPE_CHECKING
 from simnav.leaderboard.figures.style import GREY, INK, PALETTE, PAPER, SHADE, figure, styled
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from .answer import Answer, DialAnswer, Point
+    from .points import DialAnswer, Point
 
 __all__ = ["gain_figure"]
 
 _FLOOR = -1.0  # a gain below -100 % is drawn at the edge
 
 
-def gain_figure(answer: Answer) -> Figure:
-    """Draw an answer.
+def gain_figure(sentence: str, claimed: float, limit: float, ours: Point, dials: Sequence[DialAnswer]) -> Figure:
+    """Draw the answer to a claim.
 
     Parameters
     ----------
-    answer : Answer
-        With at least one dial, or with our settings only.
+    sentence : str
+        The claim.
+    claimed : float
+        Its gain, a fraction.
+    limit : float
+        Ratio of the scores up to which it holds.
+    ours : Point
+        The gain with our settings.
+    dials : sequence of DialAnswer
+        One panel each.
     """
-    dials = answer.dials
     with styled():
         fig = figure(1.0 + 3.6 * max(len(dials), 1), 3.5)
         axes = fig.subplots(1, max(len(dials), 1), sharey=True, squeeze=False)[0]
         for ax, dial in zip(axes, dials, strict=False):
-            _panel(ax, answer, dial)
+            _panel(ax, ours, dial)
         for ax in axes:
-            ax.axhline(100.0 * answer.gain, color=INK, lw=1.0)
-            ax.axhspan(100.0 * (1.0 - answer.limit), ax.get_ylim()[1], color=SHADE, zorder=0.1, lw=0)
+            ax.axhline(100.0 * claimed, color=INK, lw=1.0)
+            ax.axhspan(100.0 * (1.0 - limit), ax.get_ylim()[1], color=SHADE, zorder=0.1, lw=0)
             ax.axhline(0.0, color=GREY, lw=0.6)
         axes[0].set_ylabel("gain [%]")
-        axes[0].annotate("claim", (0.01, 100.0 * answer.gain), xycoords=("axes fraction", "data"), xytext=(0, 2),
+        axes[0].annotate("claim", (0.01, 100.0 * claimed), xycoords=("axes fraction", "data"), xytext=(0, 2),
                          textcoords="offset points", fontsize=7.5, color=INK)  # fmt: skip
-        fig.suptitle(f"{answer.sentence[0].upper()}{answer.sentence[1:]}", x=0.01, ha="left", fontsize=9.5,
+        fig.suptitle(f"{sentence[0].upper()}{sentence[1:]}", x=0.01, ha="left", fontsize=9.5,
                      fontweight="bold", wrap=True)  # fmt: skip
         _legend(fig)
     return fig
 
 
-def _panel(ax: Axes, answer: Answer, dial: DialAnswer) -> None:
+def _panel(ax: Axes, ours: Point, dial: DialAnswer) -> None:
     names = [p.value for p in dial.points]
     places = list(range(len(names)))
     colour = PALETTE[0][0]
@@ -54,7 +63,7 @@ def _panel(ax: Axes, answer: Answer, dial: DialAnswer) -> None:
     if dial.judged is not None:
         _bar(ax, names.index(dial.judged.value), dial.judged, PALETTE[1][0], "s", 0.14)
     if dial.ours in names:
-        _bar(ax, names.index(dial.ours), answer.ours, PALETTE[1][0], "s", 0.14)
+        _bar(ax, names.index(dial.ours), ours, PALETTE[1][0], "s", 0.14)
     texts = [v if isinstance(v, str) else f"{v:g}" for v in names]
     ax.set_xticks(places, [t.replace(", ", ",\n") for t in texts])
     ax.set_xlim(-0.5, len(names) - 0.5)

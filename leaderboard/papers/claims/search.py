@@ -13,9 +13,10 @@ from simnav.leaderboard.papers.measures import value_of
 from simnav.leaderboard.results.errors import RequestError
 from simnav.leaderboard.results.store import load
 
-from .answer import Answer, DialAnswer, Point
+from .answer import Answer
 from .claim import Choice, Claim, Dial, Setting
 from .dials import lags_given
+from .points import DialAnswer, Point
 
 if TYPE_CHECKING:
     from simnav.leaderboard.campaign.campaign import Progress

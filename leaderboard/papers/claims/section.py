@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from simnav.leaderboard.figures.style import save_as
 from simnav.leaderboard.papers.report import Column, Sheet, SheetRow
 
-from .answer import gain_text
+from .points import gain_text
 
 if TYPE_CHECKING:
     from .answer import Answer

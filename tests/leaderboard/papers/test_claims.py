@@ -15,10 +15,11 @@ from simnav.leaderboard.cli import app
 from simnav.leaderboard.papers import PAPERS
 from simnav.leaderboard.papers.claims import search as searching
 from simnav.leaderboard.papers.claims import stored
-from simnav.leaderboard.papers.claims.answer import Answer, DialAnswer, Point
+from simnav.leaderboard.papers.claims.answer import Answer
 from simnav.leaderboard.papers.claims.claim import Claim, compared
 from simnav.leaderboard.papers.claims.declared import CLAIMS, claim_of
 from simnav.leaderboard.papers.claims.dials import choice_dial, lag_dial, lags_given, parameter_dial, scenario_dial
+from simnav.leaderboard.papers.claims.points import DialAnswer, Point
 from simnav.leaderboard.papers.claims.section import claim_count, claim_figures, claim_sheets
 from simnav.leaderboard.papers.measures import measure
 from simnav.leaderboard.results.result import Result
@@ -67,12 +68,13 @@ def test_verdicts(ours, found, verdict, words):
 def test_the_range_of_a_condition_is_in_words():
     values = (1.0, 2.0, 3.0, 5.0)
 
-    def words(ratios, judged) -> str:
+    def words(ratios, judged, ours=None) -> str:
         points = [point(v, r) for v, r in zip(values, ratios, strict=True)]
-        return DialAnswer("x", "the factor", "", None, "", points, points[judged]).condition(0.86)
+        return DialAnswer("x", "the factor", "", ours, "", points, points[judged]).condition(0.86)
 
     assert words((1.0, 1.0, 0.8, 0.7), 2) == "the factor is 3 or more"
-    assert words((0.7, 0.8, 1.0, 1.0), 1) == "the factor is 2 or less"
+    assert words((0.7, 0.8, 1.0, 1.0), 1, 5.0) == "the factor is 2 or less"
+    assert words((1.0, 0.8, 0.8, 0.7), 2) == "the factor is 3 or more"  # 2 was not judged
     assert words((1.0, 0.8, 0.8, 1.0), 1) == "the factor is from 2 to 3"
     assert words((1.0, 0.8, 1.0, 0.8), 1) == "the factor is 2"
     assert words((0.8, 0.8, 0.8, 0.8), 0) == "the factor is from 1 to 5, all that was tried"
