@@ -143,7 +143,7 @@ CALLS: dict[str, tuple[list[str], Callable[[], Any]]] = {
 }  # fmt: skip
 
 #: Commands whose calls are compared where their own tests are: they take minutes, or need what another one makes.
-ELSEWHERE = {"merge", "reference", "reproduce", "rescore", "robustness", "seal", "submit", "tune", "verify"}
+ELSEWHERE = {"claim", "merge", "reference", "reproduce", "rescore", "robustness", "seal", "submit", "tune", "verify"}
 ELSEWHERE |= {"show", "standard run", "standard check", "standard audit", "standard publish", "train anfis"}
 
 
@@ -203,6 +203,7 @@ OF_THE_RESULT = {
     "simulate": {"output", "csv"},
     "sweep": {"plot"},
     "robustness": {"plot"},
+    "claim": {"plot"},
     "bench": {"every", "output"},  # of all rows: simnav.costs
     "bound": {"csv"},
     "allan": {"plot", "csv"},
