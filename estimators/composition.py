@@ -48,11 +48,15 @@ class Solver(Estimator):
         Pieces with which this solver cannot work, with the reason.
     row : str
         Name of the row that uses the solver, for messages. A solver that is registered itself has its own name.
+    reports_all : bool
+        If it is set to True before `reset`, Kalman filters and windows report all states of instruments by name, biases
+        and scale factors too (`simnav.types.Estimate.states`). For a row: ``row.solver.reports_all = True``.
     """
 
     pieces: ClassVar[tuple[str, ...]] = ()
     refuses: ClassVar[Mapping[str, str]] = {}
     row: str = ""
+    reports_all: bool = False
 
     @classmethod
     def misfit(cls, keyword: str, made: type) -> str:

@@ -24,6 +24,7 @@ from .requests import (
     CampaignRequest,
     EvaluateRequest,
     RecordRequest,
+    RobustnessRequest,
     RunRequest,
     Scenarios,
     SweepRequest,
@@ -34,6 +35,7 @@ if TYPE_CHECKING:
     from simnav.estimator import Estimator
     from simnav.leaderboard.campaign.campaign import Summary
     from simnav.leaderboard.ranking.reports import CampaignReport, EvaluationReport
+    from simnav.leaderboard.sweep.datasheets import Robustness
     from simnav.leaderboard.sweep.report import Sweep
     from simnav.leaderboard.tuning.tuning import Tuning
     from simnav.recording import Recording
@@ -42,7 +44,7 @@ if TYPE_CHECKING:
 
     from .single_run import RunReport
 
-__all__ = ["campaign", "check", "evaluate", "make", "record", "run", "sweep", "tune"]
+__all__ = ["campaign", "check", "evaluate", "make", "record", "robustness", "run", "sweep", "tune"]
 
 
 def make(estimator: EstimatorLike, **parameters: Any) -> Estimator:
@@ -250,6 +252,49 @@ def sweep(request: SweepRequest) -> Sweep:
                  request.limit, results, tuple(found), summary)  # fmt: skip
     write(made)
     return made
+
+
+@call(RobustnessRequest)
+def robustness(request: RobustnessRequest) -> Robustness:
+    """Compare with the plain row under wrong datasheets.
+
+    Returns
+    -------
+    Robustness
+        A profile of each estimator and plain row.
+
+    Raises
+    ------
+    RequestError
+        If an estimator is unknown, a factor makes no sense, or the file cannot be written.
+    """
+    from simnav.estimator import describe, find, names
+    from simnav.leaderboard.campaign.request import comes_with_simnav
+    from simnav.leaderboard.ranking.plain_row import plain_rows
+    from simnav.leaderboard.ranking.stored_robustness import save
+    from simnav.leaderboard.results.provenance import here
+    from simnav.leaderboard.sweep.datasheets import SCORE, Robustness, bases, checked_factors, profiles, settings
+
+    asked, output = request.estimators, request.output
+    if asked is None:
+        own = (describe(name) for name in names() if comes_with_simnav(find(name)))
+        asked = [d.name for d in own if not d.slow and not d.reference]
+    if output is not None and not absolute(output).parent.is_dir():
+        raise RequestError(f"output = {os.fspath(output)!r}: there is no folder {absolute(output).parent}")
+    factors, seeds = checked_factors(request.factors), seeds_of(request.seed, request.runs)
+    mine = requests(asked, request.parameters)
+    everyone = together([*mine, *requests(list(plain_rows(SCORE)))])
+    found = [s for table in bases() for s in settings(table, factors)]
+    measured, folder = here(), absolute(request.folder)  # before, for the code may be edited meanwhile
+    summary = _run(request, [s.scenario for s in found], everyone, seeds, folder)
+    ids, known = {s.scenario.id for s in found}, {r.label for r in everyone}
+    results = [r for r in results_of(folder) if r.scenario in ids and r.estimator in known and r.seed in seeds]
+    rows = profiles(found, results, [r.label for r in mine])
+    unsuitable = tuple(r.label for r in mine if r.label not in {row.estimator for row in rows})
+    if output is None:
+        return Robustness(tuple(rows), unsuitable, summary)
+    with mistakes(OSError):
+        return Robustness(tuple(rows), unsuitable, summary, str(save(rows, absolute(output), measured)))
 
 
 @call(TuneRequest)

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from simnav.kinds import Component, Kind
     from simnav.leaderboard.claiming import claim
     from simnav.leaderboard.costing import bench, costs
-    from simnav.leaderboard.inspection import bound, cite, merge, rank, reproduce, rescore, seal, verify
+    from simnav.leaderboard.inspection import allan, bound, cite, merge, rank, reproduce, rescore, seal, verify
     from simnav.leaderboard.publishing import (
         audit_standard,
         check_standard,
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
         verify_bundle,
     )
     from simnav.leaderboard.results.errors import RequestError
-    from simnav.leaderboard.running import campaign, check, evaluate, make, record, run, sweep, tune
+    from simnav.leaderboard.running import campaign, check, evaluate, make, record, robustness, run, sweep, tune
     from simnav.plugins import load_plugin
     from simnav.recording import Recording
     from simnav.scenario import Scenario, load
@@ -87,6 +87,7 @@ __all__ = [
     "TriadDatasheet",
     "Trial",
     "UnsuitableScenario",
+    "allan",
     "audit_standard",
     "bench",
     "bound",
@@ -112,6 +113,7 @@ __all__ = [
     "register_score",
     "reproduce",
     "rescore",
+    "robustness",
     "run",
     "run_standard",
     "run_trial",
@@ -156,9 +158,9 @@ _HOMES = {
     ),
     "leaderboard.claiming": ("claim",),
     "leaderboard.costing": ("bench", "costs"),
-    "leaderboard.inspection": ("bound", "cite", "merge", "rank", "reproduce", "rescore", "seal", "verify"),
+    "leaderboard.inspection": ("allan", "bound", "cite", "merge", "rank", "reproduce", "rescore", "seal", "verify"),
     "leaderboard.results.errors": ("RequestError",),
-    "leaderboard.running": ("campaign", "check", "evaluate", "make", "record", "run", "sweep", "tune"),
+    "leaderboard.running": ("campaign", "check", "evaluate", "make", "record", "robustness", "run", "sweep", "tune"),
     "leaderboard.publishing": (
         "audit_standard",
         "check_standard",

@@ -166,8 +166,8 @@ class Anfis(NoiseAdaptation):
         self.features, self.lowest, self.highest, self.level = features, lowest, highest, level
 
     def reset(self, instruments: Instruments) -> None:
-        """Begin a run."""
-        super().reset(instruments)
+        """Begin a run. The network was trained with a model that does not use the IMU."""
+        super().reset(Instruments(list(instruments.values()), None, instruments.step))
         self._inputs = Features(self.features, instruments)
         self._seen: list[float] | None = None
         self._levels: dict[str, Level] = {}

@@ -27,8 +27,6 @@ class ChiSquareGate(NoiseAdaptation):
         Time without a passed test after which the measurements of an instrument are used again [s].
     """
 
-    together = 0
-
     def __init__(self, probability: float = 0.999, patience: float = 10.0):
         if not 0.0 < probability < 1.0:
             raise ValueError(f"probability = {probability:g}: it must lie between 0 and 1")

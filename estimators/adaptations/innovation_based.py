@@ -122,12 +122,19 @@ def _contradiction(length: int, significance: float) -> tuple[float, float]:
 
 
 class _Window:
-    """Ring buffer of the last rows of one instrument, the number of all rows, and the last estimate, for eq. 18."""
+    """Ring buffer of the last rows of one instrument, the number of all rows, and the last estimate, for eq. 18.
 
-    __slots__ = ("count", "estimate", "rows")
+    Attributes
+    ----------
+    shortest, longest, forgetting
+        Parameters of `InnovationBased` at the rate of the instrument.
+    """
 
-    def __init__(self, length: int, m: int):
-        self.rows, self.count = np.zeros((length, m + 3 * m * m)), 0
+    __slots__ = ("count", "estimate", "forgetting", "longest", "rows", "shortest")
+
+    def __init__(self, shortest: int, longest: int, forgetting: float, m: int):
+        self.shortest, self.longest, self.forgetting = shortest, longest, forgetting
+        self.rows, self.count = np.zeros((longest, m + 3 * m * m)), 0
         self.estimate: Array | None = None
 
     def push(self, innovation: Array, residual: Array, sign: float, predicted: Array) -> None:
@@ -163,10 +170,11 @@ class InnovationBased(EstimatedNoise):
         Data of the estimate: innovations, or residuals after the update.
     shortest, longest : int
         Smallest and largest length of the window [innovations], M_min and M_max of eq. 20; equal for a fixed window.
+        An instrument of more than 1 Hz has so many for each hertz, so that the length is the same in seconds.
     low, high : float
         Bounds v_min and v_max of eq. 20, as multiples of the nominal trace.
     forgetting : float
-        Weight a of the new estimate in eq. 18, in (0, 1].
+        Weight a of the new estimate in eq. 18, in (0, 1]; over 1 s for an instrument of more than 1 Hz.
     newest : bool
         True: subtract the newest H P H' from all epochs, eq. 17 as printed.
     significance : float
@@ -212,7 +220,7 @@ class InnovationBased(EstimatedNoise):
         name, nominal = innovation.measurement.instrument, innovation.noise
         window = self._windows.get(name)
         if window is None:
-            window = self._windows[name] = _Window(self.longest, len(nominal))
+            window = self._windows[name] = self._begun(name, len(nominal))
         if self.source == "residual":
             noise = self._believed(self._mean(name, window, innovation), innovation)
             after = Posterior(innovation, noise)
@@ -220,6 +228,12 @@ class InnovationBased(EstimatedNoise):
             return noise
         window.push(innovation.residual, innovation.residual, 1.0, innovation.predicted)
         return self._believed(self._mean(name, window, innovation), innovation)
+
+    def _begun(self, name: str, m: int) -> _Window:
+        """The empty window of an instrument."""
+        longer = self.longer[name]
+        forgetting = 1.0 - (1.0 - self.forgetting) ** (1.0 / longer)
+        return _Window(round(self.shortest * longer), round(self.longest * longer), forgetting, m)
 
     def _believed(self, estimate: Array, innovation: Innovation) -> Array:
         """The bounded estimate, or the nominal noise if the innovations do not contradict it."""
@@ -235,13 +249,13 @@ class InnovationBased(EstimatedNoise):
 
     def _mean(self, name: str, window: _Window, innovation: Innovation) -> Array:
         """Eqs. 16-20."""
-        forgetting = self.forgetting
+        forgetting = window.forgetting
         if window.estimate is None:
             window.estimate, forgetting = np.zeros_like(innovation.noise), 1.0
+        bounds = window.shortest, window.longest, self.low, self.high
         length = _average(
-            window.rows, window.count, innovation.predicted, innovation.noise,
-            (self.shortest, self.longest, self.low, self.high), self.newest and self.source == "innovation", forgetting,
-            window.estimate,
+            window.rows, window.count, innovation.predicted, innovation.noise, bounds,
+            self.newest and self.source == "innovation", forgetting, window.estimate,
         )  # fmt: skip
         self._length = length
         self.report(f"window.{name}", length)
@@ -254,7 +268,7 @@ class FixedWindow(InnovationBased):
     Parameters
     ----------
     innovations : int
-        Number of innovations in the window, M of eq. 17.
+        Number of innovations in the window, M of eq. 17; of an instrument of more than 1 Hz, so many for each hertz.
     """
 
     def __init__(

@@ -174,7 +174,7 @@ class NoiseAdaptation(Adaptation):
             self._noisy[name] = innovation.noise
         if self._prediction.fails(innovation):
             noise: Array | None = innovation.noise
-            if self.inflates or self.inflates_motion:
+            if self._prediction.disturbed and (self.inflates or self.inflates_motion):
                 self.inflation = self._prediction.inflation(innovation)
         else:
             noise = self.choose(innovation)
@@ -221,6 +221,11 @@ class EstimatedNoise(NoiseAdaptation):
         if scope not in ("fixes", "all"):
             raise ValueError(f"scope = {scope!r}: it must be 'fixes' or 'all'")
         self.lowest, self.highest, self.full, self.scope = lowest, highest, full, scope
+
+    def reset(self, instruments: Instruments) -> None:
+        """Begin a run."""
+        super().reset(instruments)
+        self.longer = {name: max(sheet.rate, 1.0) for name, sheet in instruments.items()}
 
     @abstractmethod
     def estimate(self, innovation: Innovation) -> Array:

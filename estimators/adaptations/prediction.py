@@ -1,4 +1,4 @@
-"""Test of the prediction: if fixes and velocities disagree with it together, the prediction is wrong."""
+"""Tests of the prediction: whether a large innovation is the error of its instrument or that of the prediction."""
 
 from __future__ import annotations
 
@@ -7,11 +7,12 @@ from math import sqrt
 import numpy as np
 
 from simnav.compiled import kernel
-from simnav.estimators.algebra.chi_square import chi_square_limits
+from simnav.estimators.algebra.chi_square import chi_square_limits, normal_quantile
 from simnav.estimators.models.roles import fixes_and_logs
 from simnav.types import Array, Instruments
 
 from .base import Innovation
+from .persistence import Course
 
 __all__ = ["PredictionTest", "standardised"]
 
@@ -27,56 +28,107 @@ def standardised(residual: Array, predicted: Array, noise: Array) -> tuple[float
 
 
 class PredictionTest:
-    """Chi-square tests of fixes and logs, which fail together if the prediction is wrong.
+    """Tests of the innovations of fixes and logs: whether a large innovation comes from a wrong prediction.
 
-    An adaptation gives less weight to measurements that do not fit the prediction. If the prediction itself is wrong (a
-    disturbed IMU), no measurement fits, and the filter does not recover. Zhan et al. (2026) separate the two cases by
-    the chi-square tests of GNSS and DVL: if one of them fails, that instrument is wrong; if both fail, the prediction
-    is. Gross errors of both may coincide by chance, so both tests must fail ``together`` times in a row.
+    An adaptation gives less weight to measurements that do not fit the prediction. It assumes that H P H' is right, so
+    that a large innovation is the error of its instrument. If the IMU is worse than its datasheet or disturbed, the
+    prediction is wrong, and an adaptation that gives the aids less weight leaves the filter to this IMU. There are two
+    tests of the assumption, and the adaptation is not used where one of them fails:
+
+    *Joint failures.* Zhan et al. (2026) separate the two cases by the chi-square tests of GNSS and DVL: if one of them
+    fails, that instrument is wrong; if both fail, the prediction is. Gross errors of both may coincide by chance, so
+    both tests must fail ``together`` times in a row. The motion is then taken as disturbed (`disturbed`).
+
+    *Persistence.* The noise of an instrument is white, the error of a state is not (`Course`). The prediction is taken
+    as wrong if
+
+    - the recent innovations of the instrument are correlated from one to the next, and too large for R and H P H'; and
+    - no instrument of the other group (fixes, logs) is a witness against it: it was heard, and its own innovations are
+      not correlated. So a lasting error of the fixes is found if a log agrees with the prediction, and the other way
+      round; and
+    - an IMU that is noisier than its datasheet by a factor of `WORSE` would explain the innovation.
+
+    A lasting error of the only instrument that is heard cannot be told from a wrong prediction. The instrument is then
+    believed, as in the plain filter: its error is bounded, and the error of an IMU alone is not. Without an IMU this
+    test is not made.
 
     Parameters
     ----------
     instruments : Instruments
         Datasheets of the run's instruments.
     together : int
-        Number of times in a row that both tests must fail before the prediction is taken as wrong; 0: never.
+        Number of times in a row that both tests must fail before the prediction is taken as wrong; 0: neither test is
+        made.
     probability : float
-        Probability that a good measurement passes its test.
+        Probability that a good measurement passes its test, and that innovations which are not too large pass theirs.
+
+    Attributes
+    ----------
+    disturbed : bool
+        Whether the last innovation failed jointly with those of another instrument.
     """
 
-    RECENT = 5.0  # s; an older failure of another instrument does not count
+    RECENT = 5.0  # s; what another instrument did before, or before its last three periods, does not count
+    PERSISTENT = 0.99  # probability that the innovations of a white noise are not found correlated
+    WHITE = 0.95  # the same for a witness, which must be beyond doubt
+    WORSE = 20.0  # largest factor on the noise of an IMU
     LARGEST, TOTAL = 100.0, 1e8
 
     def __init__(self, instruments: Instruments, together: int = 3, probability: float = 0.999):
-        self.together = together
+        self.together, self.disturbed = together, False
         self._limits = chi_square_limits(probability)
-        self._group = fixes_and_logs(instruments)
-        if len(set(self._group.values())) < 2 or not together:
+        self._large = normal_quantile(probability)
+        self._persistent, self._white = normal_quantile(self.PERSISTENT), normal_quantile(self.WHITE)
+        self._group = fixes_and_logs(instruments) if together else {}
+        self._inertial = instruments.imu is not None
+        if not self._inertial and len(set(self._group.values())) < 2:
             self._group = {}
+        self._recent = {name: max(self.RECENT, 3.0 / instruments[name].rate) for name in self._group}
+        self._courses: dict[str, Course] = {}
         self._failures: dict[str, tuple[int, float]] = {}
         self._first: Array | None = None
         self._blamed = 0
 
     def fails(self, innovation: Innovation) -> bool:
+        """Whether the prediction of this innovation is taken as wrong, by one of the tests."""
+        self.disturbed = False
+        name, time = innovation.measurement.instrument, innovation.measurement.time
+        if name not in self._group:
+            return False
+        components = standardised(innovation.residual, innovation.predicted, innovation.noise)
+        self.disturbed = self._fails_jointly(name, time, components, len(innovation.residual))
+        return (self._inertial and self._persists(name, time, components, innovation)) or self.disturbed
+
+    def _fails_jointly(self, name: str, time: float, components: tuple[float, float, float], count: int) -> bool:
         """Whether this instrument and one of the other group have failed often enough in a row, this time included.
 
         The statistic is the sum of the squared standardised components of the innovation.
         """
-        name, time = innovation.measurement.instrument, innovation.measurement.time
-        group = self._group.get(name)
-        if group is None:
-            return False
-        u0, u1, u2 = standardised(innovation.residual, innovation.predicted, innovation.noise)
-        if u0 * u0 + u1 * u1 + u2 * u2 <= self._limits[len(innovation.residual)]:
+        if sum(u * u for u in components) <= self._limits[count]:
             self._failures[name] = 0, time
             self._blamed = 0
             return False
-        count = self._failures.get(name, (0, time))[0] + 1
-        self._failures[name] = count, time
-        return count >= self.together and any(
-            self._group[other] != group and n >= self.together and time - t <= self.RECENT
+        failed = self._failures.get(name, (0, time))[0] + 1
+        self._failures[name] = failed, time
+        return failed >= self.together and any(
+            self._group[other] != self._group[name] and n >= self.together and time - t <= self.RECENT
             for other, (n, t) in self._failures.items()
         )
+
+    def _persists(self, name: str, time: float, components: tuple[float, float, float], given: Innovation) -> bool:
+        """Whether the innovations of an instrument persist, no witness is against it, and an IMU would explain it."""
+        course = self._courses.get(name)
+        if course is None:
+            course = self._courses[name] = Course()
+        course.add(components, len(given.residual), time)
+        if not (course.correlated(self._persistent) and course.large(self._large)):
+            return False
+        for other, witness in self._courses.items():
+            heard = self._group[other] != self._group[name] and time - witness.time <= self._recent[other]
+            if heard and not witness.correlated(self._white):
+                return False
+        wide = standardised(given.residual, self.WORSE**2 * given.predicted, given.noise)
+        return sum(u * u for u in wide) <= self._limits[len(given.residual)]
 
     def inflation(self, innovation: Innovation) -> float:
         """Factor of P after a failure of the prediction: once for every ``together`` failures.

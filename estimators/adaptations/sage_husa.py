@@ -39,9 +39,10 @@ class SageHusa(EstimatedNoise):
     Parameters
     ----------
     fading : float
-        Forgetting factor b, in (0, 1]; 1: no fading.
+        Forgetting factor b, in (0, 1]; 1: no fading. For an instrument of more than 1 Hz it is the factor over 1 s.
     prior : int
-        Number of innovations to which the datasheet's noise is equivalent at the start; it fades like them.
+        Number of innovations to which the datasheet's noise is equivalent at the start; it fades like them. Of an
+        instrument of more than 1 Hz, so many for each hertz.
     """
 
     def __init__(
@@ -68,9 +69,10 @@ class SageHusa(EstimatedNoise):
     def estimate(self, innovation: Innovation) -> Array:
         """The bounded estimate, this innovation included."""
         name = innovation.measurement.instrument
-        k, estimate = self._estimates.get(name) or (self.prior, innovation.noise.copy())
+        longer = self.longer[name]
+        k, estimate = self._estimates.get(name) or (round(self.prior * longer), innovation.noise.copy())
         k += 1
-        b = self.fading
+        b = self.fading ** (1.0 / longer)
         d = 1.0 / (k + 1) if b == 1.0 else (1.0 - b) / (1.0 - b ** (k + 1))
         _fade(estimate, d, innovation.residual, innovation.predicted)
         self._estimates[name] = k, estimate

@@ -74,9 +74,11 @@ class VariationalBayes(EstimatedNoise):
     Parameters
     ----------
     forgetting : float
-        Forgetting factor rho, in (0, 1]; the memory is 1/(1 - rho) measurements.
+        Forgetting factor rho, in (0, 1]; the memory is 1/(1 - rho) measurements. For an instrument of more than 1 Hz it
+        is the factor over 1 s, so that the memory is the same in seconds.
     prior : float
-        Number of measurements to which the datasheet's noise is equivalent at the start.
+        Number of measurements to which the datasheet's noise is equivalent at the start; of an instrument of more than
+        1 Hz, so many for each hertz.
     iterations : int
         Number of alternating updates of state and noise for a measurement; at least 1.
     """
@@ -107,8 +109,10 @@ class VariationalBayes(EstimatedNoise):
     def estimate(self, innovation: Innovation) -> Array:
         """The noise of the last iteration, bounded."""
         name, nominal = innovation.measurement.instrument, innovation.noise
-        shape, scales = self._gammas.get(name) or (0.5 * self.prior, np.full(len(nominal), 0.5 * self.prior))
-        shape, scales = self.forgetting * shape + 0.5, self.forgetting * scales
+        longer = self.longer[name]
+        first, forgetting = 0.5 * self.prior * longer, self.forgetting ** (1.0 / longer)
+        shape, scales = self._gammas.get(name) or (first, np.full(len(nominal), first))
+        shape, scales = forgetting * shape + 0.5, forgetting * scales
         noise: Array = np.empty((len(nominal), len(nominal)))
         variational_noise(
             innovation.residual, innovation.predicted, nominal, shape, self.iterations, self.lowest**2, self.highest**2,

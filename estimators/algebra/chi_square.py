@@ -1,8 +1,8 @@
-"""Limits of the chi-square distribution."""
+"""Limits of the chi-square and the normal distribution."""
 
 from __future__ import annotations
 
-__all__ = ["chi_square_limits"]
+__all__ = ["chi_square_limits", "normal_quantile"]
 
 
 def chi_square_limits(probability: float) -> list[float]:
@@ -10,3 +10,10 @@ def chi_square_limits(probability: float) -> list[float]:
     from scipy.special import chdtri
 
     return [0.0, *(float(chdtri(m, 1.0 - probability)) for m in (1, 2, 3))]
+
+
+def normal_quantile(probability: float) -> float:
+    """The quantile of the standard normal distribution at a probability."""
+    from scipy.special import ndtri
+
+    return float(ndtri(probability))

@@ -36,7 +36,15 @@ class SageHusaKf(_Adaptive, adaptation=SageHusa):
 
     Source: A. P. Sage and G. W. Husa, *Adaptive filtering with unknown prior statistics*, Joint Automatic Control
     Conference, 1969.
+
+    Versions
+    --------
+    2
+        Windows, priors and forgetting are in seconds for an instrument of more than 1 Hz. Innovations that persist
+        while no other instrument contradicts them are taken as a wrong prediction, and not as noise (`PredictionTest`).
     """
+
+    version = 2
 
 
 @register("sage-husa-paper")
@@ -47,7 +55,15 @@ class SageHusaPaper(
 
     Source: G. Mao, K. Wang, T. Fu, *Robust GNSS/INS integrated navigation algorithm based on adaptive factor graph
     optimization*, 2025.
+
+    Versions
+    --------
+    2
+        Windows, priors and forgetting are in seconds for an instrument of more than 1 Hz. Innovations that persist
+        while no other instrument contradicts them are taken as a wrong prediction, and not as noise (`PredictionTest`).
     """
+
+    version = 2
 
 
 @register("iae")
@@ -56,7 +72,15 @@ class Iae(_Adaptive, adaptation=piece(InnovationBased, source="innovation")):
 
     Source: G. Mao, K. Wang, T. Fu, *Robust GNSS/INS integrated navigation algorithm based on adaptive factor graph
     optimization*, 2025, eqs. 16-20.
+
+    Versions
+    --------
+    2
+        Windows, priors and forgetting are in seconds for an instrument of more than 1 Hz. Innovations that persist
+        while no other instrument contradicts them are taken as a wrong prediction, and not as noise (`PredictionTest`).
     """
+
+    version = 2
 
 
 @register("iae-fixed")
@@ -64,8 +88,15 @@ class IaeFixed(_Adaptive, adaptation=piece(FixedWindow, source="innovation")):
     """Innovation-based adaptive estimation of the measurement noise over a fixed window.
 
     Source: A. H. Mohamed and K. P. Schwarz, *Adaptive Kalman filtering for INS/GPS*, J. Geodesy 73, 1999.
+
+    Versions
+    --------
+    2
+        Windows, priors and forgetting are in seconds for an instrument of more than 1 Hz. Innovations that persist
+        while no other instrument contradicts them are taken as a wrong prediction, and not as noise (`PredictionTest`).
     """
 
+    version = 2
     formerly = _FORMERLY
 
 
@@ -74,8 +105,15 @@ class Rae(_Adaptive, adaptation=piece(FixedWindow, source="residual", newest=Fal
     """Residual-based adaptive estimation of the measurement noise over a fixed window.
 
     Source: A. H. Mohamed and K. P. Schwarz, *Adaptive Kalman filtering for INS/GPS*, J. Geodesy 73, 1999.
+
+    Versions
+    --------
+    2
+        Windows, priors and forgetting are in seconds for an instrument of more than 1 Hz. Innovations that persist
+        while no other instrument contradicts them are taken as a wrong prediction, and not as noise (`PredictionTest`).
     """
 
+    version = 2
     formerly = _FORMERLY
 
 
@@ -85,7 +123,15 @@ class Adkf(_Adaptive, adaptation=AdaptiveFactor):
 
     Source: Z. Zhan, C. Liu, K. Jin et al., *GNSS/SINS/DVL integrated navigation algorithm based on adaptive
     differential Kalman filtering*, PLoS One 21(2), 2026.
+
+    Versions
+    --------
+    2
+        Innovations that persist while no other instrument contradicts them are taken as a wrong prediction, and not as
+        noise or gross errors of their instrument (`PredictionTest`).
     """
+
+    version = 2
 
 
 @register("adkf-paper")
@@ -103,7 +149,15 @@ class Igg3(_Adaptive, adaptation=Igg3Weights):
 
     Source: Y. Yang, L. Song and T. Xu, *Robust estimator for correlated observations based on bifactor equivalent
     weights*, J. Geodesy 76, 2002.
+
+    Versions
+    --------
+    2
+        Innovations that persist while no other instrument contradicts them are taken as a wrong prediction, and not as
+        noise or gross errors of their instrument (`PredictionTest`).
     """
+
+    version = 2
 
 
 @register("huber-kf")
@@ -111,7 +165,15 @@ class HuberKf(_Adaptive, adaptation=HuberWeights):
     """Huber's equivalent weights: an innovation beyond k sigma pulls no harder than one of k sigma.
 
     Source: P. J. Huber, *Robust estimation of a location parameter*, Annals of Mathematical Statistics 35(1), 1964.
+
+    Versions
+    --------
+    2
+        Innovations that persist while no other instrument contradicts them are taken as a wrong prediction, and not as
+        noise or gross errors of their instrument (`PredictionTest`).
     """
+
+    version = 2
 
 
 @register("gated-ekf")
@@ -120,7 +182,15 @@ class GatedEkf(_Adaptive, adaptation=ChiSquareGate):
 
     Source: Y. Bar-Shalom, X. R. Li and T. Kirubarajan, *Estimation with Applications to Tracking and Navigation*, 2001,
     section 5.4.
+
+    Versions
+    --------
+    2
+        Innovations that persist while no other instrument contradicts them are taken as a wrong prediction, and not as
+        noise or gross errors of their instrument (`PredictionTest`).
     """
+
+    version = 2
 
 
 @register("fading-ekf")
@@ -137,7 +207,15 @@ class VbAkf(_Adaptive, adaptation=VariationalBayes):
 
     Source: S. Särkkä and A. Nummenmaa, *Recursive noise adaptive Kalman filtering by variational Bayesian
     approximations*, IEEE TAC 54(3), 2009.
+
+    Versions
+    --------
+    2
+        Windows, priors and forgetting are in seconds for an instrument of more than 1 Hz. Innovations that persist
+        while no other instrument contradicts them are taken as a wrong prediction, and not as noise (`PredictionTest`).
     """
+
+    version = 2
 
 
 @register("mckf")
@@ -145,7 +223,15 @@ class Mckf(_Adaptive, adaptation=piece(MaximumCorrentropy, smallest=1e-3)):
     """Maximum correntropy Kalman filter: residuals weighted by a Gaussian kernel.
 
     Source: B. Chen, X. Liu, H. Zhao and J. C. Principe, *Maximum correntropy Kalman filter*, Automatica 76, 2017.
+
+    Versions
+    --------
+    2
+        Innovations that persist while no other instrument contradicts them are taken as a wrong prediction, and not as
+        noise or gross errors of their instrument (`PredictionTest`).
     """
+
+    version = 2
 
 
 @register("imm")
@@ -154,4 +240,12 @@ class Imm(Row, solver=ImmEstimator, model=Suitable):
 
     Source: H. A. P. Blom and Y. Bar-Shalom, *The interacting multiple model algorithm for systems with Markovian
     switching coefficients*, IEEE TAC 33(8), 1988.
+
+    Versions
+    --------
+    2
+        Innovations that persist while no other instrument contradicts them are taken as a wrong prediction, and not as
+        noise or gross errors of their instrument (`PredictionTest`).
     """
+
+    version = 2

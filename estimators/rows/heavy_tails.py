@@ -19,7 +19,15 @@ class StudentTKf(Row, solver=KalmanEstimator, model=Suitable, adaptation=Student
 
     Source: Y. Huang, Y. Zhang, N. Li, Z. Wu and J. A. Chambers, *A novel robust Student's t-based Kalman filter*, IEEE
     Trans. Aerospace and Electronic Systems 53(3), 2017.
+
+    Versions
+    --------
+    2
+        Innovations that persist while no other instrument contradicts them are taken as a wrong prediction, and not as
+        noise or gross errors of their instrument (`PredictionTest`).
     """
+
+    version = 2
 
 
 @register("student-t-rts")
@@ -28,6 +36,13 @@ class StudentTRts(StudentTKf, smoother=StudentTSmoother):
 
     Source: A. Y. Aravkin, J. V. Burke and G. Pillonetto, *Robust and trend-following Student's t Kalman smoothers*,
     SIAM J. Control and Optimization 52(5), 2014.
+
+    Versions
+    --------
+    2
+        Innovations that persist while no other instrument contradicts them are taken as a wrong prediction, and not as
+        noise or gross errors of their instrument (`PredictionTest`).
     """
 
+    version = 2
     formerly = _FORMERLY

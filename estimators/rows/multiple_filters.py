@@ -26,4 +26,13 @@ class SolutionSeparationEkf(Row, solver=SolutionSeparation, model=Suitable):
     It gives a protection level. Source: R. G. Brown and P. W. McBurney, *Self-contained GPS integrity check using
     maximum solution separation*, Navigation 35(1), 1988; J. Blanch, T. Walter, P. Enge et al., *Baseline advanced RAIM
     user algorithm and possible improvements*, IEEE Trans. Aerospace and Electronic Systems 51(1), 2015.
+
+    Versions
+    --------
+    2
+        The IMU is a suspect also beside a single fix or log. The last fix or log that delivers is not excluded if a
+        disturbed IMU would explain why it disagrees, and an excluded one is used again where the position without it
+        becomes more uncertain than the separation was.
     """
+
+    version = 2

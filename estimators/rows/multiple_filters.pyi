@@ -19,6 +19,7 @@ class HeadingBankEkf(Row, solver=HeadingBank, model=Suitable):
 
 @register("solution-separation")
 class SolutionSeparationEkf(Row, solver=SolutionSeparation, model=Suitable):
+    version = 2
     def __init__(
         self,
         *,

@@ -54,6 +54,7 @@ class FgoFull(Row, solver=FullGraph, model=InertialModel):
 
 @register("iae-fgo")
 class IaeFgo(Row, solver=_WINDOW, model=Suitable, adaptation=piece(InnovationBased, source="innovation")):
+    version = 2
     def __init__(
         self,
         *,
@@ -76,6 +77,7 @@ class IaeFgo(Row, solver=_WINDOW, model=Suitable, adaptation=piece(InnovationBas
 
 @register("iae-fgo-fixed")
 class IaeFgoFixed(Row, solver=_WINDOW, model=Suitable, adaptation=piece(FixedWindow, source="innovation")):
+    version = 2
     def __init__(
         self,
         *,

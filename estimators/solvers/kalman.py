@@ -93,6 +93,7 @@ class KalmanEstimator(Solver):
         """Begin a run; UnsuitableScenario if the model lacks an instrument."""
         instruments = by_channel(instruments)
         self.model = self._chosen(instruments)
+        self.model.reports_all |= self.reports_all
         self.covariance = self.model.begin(start, instruments)
         self._first_variances = self.covariance.diagonal().copy()
         if self.adaptation is not None:

@@ -18,8 +18,8 @@ With an IMU and without one, different rules say which instrument may be exclude
 (`simnav.estimators.solvers.exclusion_rules`). If an instrument is not excluded because the position without it is not
 accurate enough, no other instrument is excluded instead.
 
-**IMU.** The IMU may also be wrong: disturbed, or with larger errors than its datasheet says. If there are a fix and a
-log, one more filter uses all measurements with a much larger IMU noise (`disturbed_imu`). The IMU is excluded (this
+**IMU.** The IMU may also be wrong: disturbed, or with larger errors than its datasheet says. One more filter uses all
+measurements with a much larger IMU noise (`disturbed_imu`). If there are a fix and a log, the IMU is excluded (this
 filter becomes the main filter) if a test fails, the filter agrees with all instruments, and
 
 - no filter without an instrument agrees equally well; or
@@ -32,6 +32,11 @@ Then all instruments are used again. While the IMU is excluded no other instrume
 because a filter without an instrument would be too uncertain. A filter with the IMU of the datasheet runs in parallel.
 When it has agreed with all instruments for ``recovery`` seconds (longer after every further exclusion), the IMU is used
 again.
+
+The last fix or log that delivers has the IMU alone against it. A filter that expects a disturbed IMU follows any single
+instrument, so that its agreement does not show that the IMU is wrong, but neither does the disagreement of the main
+filter show that the instrument is. The error of an instrument is bounded, and that of an IMU alone is not. So the last
+instrument is excluded only if it also disagrees with that filter, that is, if even a disturbed IMU does not explain it.
 
 **The alternative.** If a fix is excluded, the sub-filter without the log is kept, and the other way round: it is the
 alternative hypothesis. If the log then fails a test, and the excluded fix agrees with all others in that sub-filter,
@@ -56,7 +61,8 @@ unless the measurements of its instrument stay improbable for `_PATIENCE` second
 **Readmission.** When an excluded instrument has agreed with the main filter for ``recovery`` seconds, it is used again.
 The time is doubled after every further exclusion, up to a factor of `_LONGEST`. For the next ``horizon`` seconds it is
 on probation: if any test fails, it is a suspect. Fixes and logs are excluded together for `COASTING` seconds at most,
-because an IMU alone soon has larger errors. Then the logs are used again or, if they deliver nothing, the fixes.
+because an IMU alone soon has larger errors, and no longer than until the position is more uncertain than the separation
+was at the exclusion. Then the logs are used again or, if they deliver nothing, the fixes.
 Without an IMU the fixes are excluded for `DEAD_RECKONING` seconds at most. For `_RECENT` seconds after that nothing is
 tested, because the filters differ only by the correction towards these measurements.
 
@@ -111,6 +117,7 @@ from .hypotheses import (
 from .iterated import Iteration
 from .kalman import KalmanEstimator
 from .separation import KNOWN_HEADING, SeparationTest
+from .state_difference import difference
 
 __all__ = ["SolutionSeparation"]
 
@@ -232,6 +239,7 @@ class SolutionSeparation(Solver):
             for sub, begin in zip(pair, (start.time, start.time - 0.5 * self._horizon), strict=True):
                 self._begin(sub, begin, None)
         self._coasting: float | None = None
+        self._apart: dict[str, float] = {}
         self._settled = start.time
         self._last_delivery = dict.fromkeys(self._names, start.time)
         self._silence = {name: max(_SILENCE, 3.0 / instruments[name].rate) for name in self._names}
@@ -244,8 +252,8 @@ class SolutionSeparation(Solver):
         if self._inertial and sigma[8] <= KNOWN_HEADING:
             self._wrong_start = Hypothesis(_START, self._filter(start=uncertain_start(start)), start.time)
         self._disturbed = False
-        witnesses = self._inertial and len(set(self._group.values())) > 1
-        self._imu = self._other_opinion_of_the_imu() if witnesses else None
+        self._imu = self._other_opinion_of_the_imu() if self._inertial and self._group else None
+        self._witnesses = len(set(self._group.values())) > 1
         self._trial = -np.inf
         self._searching = self._inertial and self._wrong_start is None
         if self._searching:  # a filter that finds its heading may think too early that it has
@@ -365,7 +373,7 @@ class SolutionSeparation(Solver):
         more_is_wrong = without != out and not (agrees and without <= out) and self._time - self._trial >= COASTING
         if more_is_wrong or not self._test.applies(imu.estimate):
             self._begin_imu(imu, without=out)
-        return {_IMU: self._test.largest([imu], estimate)} if agrees else {}
+        return {_IMU: self._test.largest([imu], estimate)} if agrees and self._witnesses else {}
 
     def _begin_imu(self, imu: ImuHypothesis, without: Collection[str]) -> None:
         """Begin the filter of the other opinion anew from the main one, without some instruments."""
@@ -415,7 +423,7 @@ class SolutionSeparation(Solver):
             return _IMU  # one fault explains what would be two
         contradicting = self._exclusion.contradicting(self._time) & ratios.keys()
         instruments = {*suspects, *probation, *contradicting} - {_IMU}
-        spared = [name for name in instruments if self._can_spare(name)]
+        spared = [name for name in instruments if self._can_spare(name) and not self._only_against_the_imu(name)]
         apart = {name: self._disagreement(self._older_filter(name).filter, {name, *out}) for name in spared}
         if self._imu is not None and _IMU in suspects:
             apart[_IMU] = self._disagreement(self._imu.filter, self._imu.exclusion.excluded)
@@ -437,6 +445,13 @@ class SolutionSeparation(Solver):
         """Whether what is left without an instrument gives a position."""
         out = {name} if self._mistaken(name) else {name, *self._exclusion.excluded}
         return self._rules.can_spare([n for n in self._delivering(self._names) if n not in out])
+
+    def _only_against_the_imu(self, name: str) -> bool:
+        """Whether an instrument is the last fix or log, and a disturbed IMU explains why it disagrees."""
+        left = set(self._delivering(self._group)) - {name, *self._exclusion.excluded}
+        if self._imu is None or self._disturbed or name not in self._group or left:
+            return False
+        return self._disagreement(self._imu.filter, self._imu.exclusion.excluded) <= _AGREEMENT
 
     def _delivering(self, names: Iterable[str]) -> list[str]:
         """Those of the instruments that are not silent."""
@@ -474,6 +489,8 @@ class SolutionSeparation(Solver):
         if excluded or chosen is before:
             self._alternatives = {}
         assert chosen.estimate is not None
+        apart = difference(chosen.estimate, self._main.model.estimate(self._main.covariance))
+        self._apart[name] = hypot(float(apart[0]), float(apart[1]))
         self._count[name] += 1
         self._exclusion.agrees_since.pop(name, None)
         excluded.add(name)
@@ -531,7 +548,7 @@ class SolutionSeparation(Solver):
         needed, first, longest = self._rules.lost_without(fixes, logs)
         coasting = bool(needed) and set(needed) <= excluded
         self._coasting = (time if self._coasting is None else self._coasting) if coasting else None
-        if self._coasting is not None and time - self._coasting >= longest:
+        if self._coasting is not None and (time - self._coasting >= longest or self._worse_than_excluded(first)):
             again += [n for n in first if n not in again]
             self._settled = time + _RECENT  # the filters go to them; until then they differ for that alone
         if again:
@@ -544,6 +561,13 @@ class SolutionSeparation(Solver):
                 one.mean_nis.pop(name, None)
             for k, sub in enumerate(self._pairs[name]):
                 self._begin(sub, time - 0.5 * self._horizon * k, None)
+
+    def _worse_than_excluded(self, names: list[str]) -> bool:
+        """Whether the position has become more uncertain than it was wrong, by the tests, with these instruments."""
+        covariance = self._main.model.estimate(self._main.covariance).covariance
+        assert covariance is not None
+        sigma = sqrt(float(covariance[0, 0] + covariance[1, 1]))
+        return self._inertial and sigma > max((self._apart.get(name, 0.0) for name in names), default=np.inf)
 
     def _renew(self, time: float) -> None:
         """Begin sub-filters anew that have come of age."""

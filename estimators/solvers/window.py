@@ -165,6 +165,7 @@ class WindowEstimator(LooksBack, Solver):
         """Begin a run; UnsuitableScenario if the model lacks an instrument."""
         instruments = by_channel(instruments)
         self.chain = chain_of(self._choice.choose(instruments, self.label))
+        self.chain.front.reports_all |= self.reports_all
         self.covariance = self.chain.begin(start, instruments)
         observed = [name for name, sheet in instruments.items() if self.chain.observes(sheet)]
         self._admission, self._owners = Admission(instruments, observed), owners(instruments)

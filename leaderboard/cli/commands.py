@@ -20,6 +20,7 @@ from simnav.leaderboard.publishing_requests import (
     SubmitRequest,
 )
 from simnav.leaderboard.requests import (
+    AllanRequest,
     BenchRequest,
     BoundRequest,
     CampaignRequest,
@@ -30,6 +31,7 @@ from simnav.leaderboard.requests import (
     RecordRequest,
     ReproduceRequest,
     RescoreRequest,
+    RobustnessRequest,
     RunRequest,
     Scenarios,
     SealRequest,
@@ -53,6 +55,7 @@ class Topic(StrEnum):
     ESTIMATORS = "estimators"
     INSTRUMENTS = "instruments"
     FAULTS = "faults"
+    IMUS = "imus"
 
 
 class Features(StrEnum):
@@ -65,7 +68,7 @@ class Features(StrEnum):
 
 @request
 class ListCommand:
-    """List scenarios, estimators, kinds of instruments or kinds of faults."""
+    """List scenarios, estimators, kinds of instruments, kinds of faults, or IMUs by name."""
 
     topic: Topic | None = option(
         default=None,
@@ -156,6 +159,14 @@ class ClaimCommand(ClaimRequest):
 
 
 @request
+class RobustnessCommand(RobustnessRequest):
+    """Compare estimators with the plain row when a datasheet is wrong: robustness profiles."""
+
+    _: KW_ONLY
+    plot: Path | None = option(default=None, help=_FIGURE)
+
+
+@request
 class WarmupCommand:
     """Compile every kernel, once; later starts are quick."""
 
@@ -166,6 +177,15 @@ class BoundCommand(BoundRequest):
 
     _: KW_ONLY
     csv: Path | None = option("--csv", default=None, help="Write every epoch to this file.")
+
+
+@request
+class AllanCommand(AllanRequest):
+    """Show the Allan deviation of an IMU and its noise coefficients, beside its datasheet."""
+
+    _: KW_ONLY
+    plot: Path | None = option(default=None, help=_FIGURE)
+    csv: Path | None = option("--csv", default=None, help="Write every averaging time to this file.")
 
 
 @request
@@ -239,9 +259,11 @@ COMMANDS: Mapping[str, tuple[type[Any], str]] = {
     "evaluate": (EvaluateRequest, "evaluate"),
     "campaign": (CampaignRequest, "campaign"),
     "sweep": (SweepCommand, "sweep"),
+    "robustness": (RobustnessCommand, "robustness"),
     "leaderboard": (SiteRequest, "leaderboard"),
     "warmup": (WarmupCommand, "warmup"),
     "bound": (BoundCommand, "bound"),
+    "allan": (AllanCommand, "allan"),
     "reproduce": (ReproduceRequest, "reproduce"),
     "claim": (ClaimCommand, "claim"),
     "reference": (ReferenceCommand, "reference"),
@@ -258,8 +280,8 @@ COMMANDS: Mapping[str, tuple[type[Any], str]] = {
 HEADINGS: Mapping[str, Sequence[str]] = {
     "Every day": ("list", "show", "run", "evaluate", "check", "new-estimator", "simulate", "sweep", "campaign",
                   "leaderboard"),
-    "Study and publish": ("tune", "train", "bench", "bound", "reproduce", "claim", "rescore", "merge", "submit",
-                          "verify", "seal", "cite"),
+    "Study and publish": ("tune", "train", "bench", "robustness", "bound", "allan", "reproduce", "claim", "rescore",
+                          "merge", "submit", "verify", "seal", "cite"),
     "Maintain": ("standard", "reference", "warmup"),
 }  # fmt: skip
 

@@ -1,4 +1,4 @@
-"""``simnav list``: scenarios, estimators, kinds of instruments and kinds of faults."""
+"""``simnav list``: scenarios, estimators, kinds of instruments, kinds of faults, and IMUs by name."""
 
 from __future__ import annotations
 
@@ -10,19 +10,22 @@ from simnav import sensors
 from simnav.estimator import describe, names
 from simnav.leaderboard.ranking import tables
 from simnav.scenario.catalogue import headers
+from simnav.sensors.imu_models import GRADES, IMU_MODELS
 
 from .commands import ListCommand, Topic
 from .console import Output
 
 if TYPE_CHECKING:
+    from rich.table import Table
+
     from simnav.scenario.catalogue import Header
     from simnav.spec import Spec
 
-__all__ = ["estimators", "faults", "instruments", "scenarios", "show"]
+__all__ = ["estimators", "faults", "imus", "instruments", "scenarios", "show"]
 
 
 def show(out: Output, request: ListCommand) -> None:
-    """List scenarios, estimators, kinds of instruments or kinds of faults."""
+    """List scenarios, estimators, kinds of instruments, kinds of faults, or IMUs by name."""
     found: dict[str, Any] = {}
     if request.topic in (None, Topic.SCENARIOS):
         found["scenarios"] = scenarios()
@@ -33,6 +36,9 @@ def show(out: Output, request: ListCommand) -> None:
     if request.topic in (Topic.INSTRUMENTS, Topic.FAULTS):
         found[request.topic] = instruments() if request.topic is Topic.INSTRUMENTS else faults()
         out.print(_kind_lines(request.topic.value.capitalize(), found[request.topic]))
+    if request.topic is Topic.IMUS:
+        found["imus"] = imus()
+        out.print(_imu_table(found["imus"]))
     out.document(found)
 
 
@@ -81,6 +87,21 @@ class KindItem:
     keys: Mapping[str, Key]
 
 
+@dataclass(frozen=True)
+class ImuItem:
+    """An IMU by name; ``stands_for_grade`` says whether ``grade`` in a scenario means this one."""
+
+    name: str
+    manufacturer: str
+    grade: str
+    stands_for_grade: bool
+    datasheet: str
+    read_in: str
+    gyroscope: Mapping[str, float]
+    accelerometer: Mapping[str, float]
+    effects: Mapping[str, float]
+
+
 def scenarios() -> list[ScenarioItem]:
     """Every scenario of every pack, by track and group."""
 
@@ -114,6 +135,15 @@ def faults() -> list[KindItem]:
     return [_kind(spec, "") for spec in sensors.fault_specs()]
 
 
+def imus() -> list[ImuItem]:
+    """Every IMU that a scenario may name, with the figures of its datasheet."""
+    return [
+        ImuItem(m.name, m.manufacturer, m.grade, GRADES[m.grade] == m.name, m.datasheet, m.read_in, m.gyroscope,
+                m.accelerometer, m.effects)
+        for m in IMU_MODELS.values()
+    ]  # fmt: skip
+
+
 def _kind(spec: type[Spec], fallback: str) -> KindItem:
     field = spec.model_fields.get("kind")
     kind = str(field.default) if field is not None else spec.__name__.removesuffix("Spec").lower()
@@ -126,7 +156,10 @@ def _kind(spec: type[Spec], fallback: str) -> KindItem:
 
 
 #: Tracks and groups as they are listed; those of others follow, by name.
-_TRACKS = ("aided-ins", "no-imu", "underwater", "long", "generalisation", "generalisation-no-imu", "recorded", "papers")
+_TRACKS = (
+    "aided-ins", "no-imu", "underwater", "long", "generalisation", "generalisation-no-imu", "robustness", "recorded",
+    "papers",
+)  # fmt: skip
 _GROUPS = ("clean", "degraded GNSS", "outages", "gross errors", "wrong datasheet", "wrong start", "extremes")
 
 
@@ -157,3 +190,18 @@ def _estimator_lines(found: list[EstimatorItem]) -> tables.Lines:
 
 def _kind_lines(title: str, found: list[KindItem]) -> tables.Lines:
     return tables.Lines(title, ["kind", "what it is"], [[e.kind, e.summary] for e in found], caption=_MORE)
+
+
+def _imu_table(found: list[ImuItem]) -> Table:
+    """A row an IMU, with the figures of its datasheet in their units."""
+
+    def figures(table: Mapping[str, float]) -> str:
+        return ", ".join(f"{key} = {value:.6g}" for key, value in table.items())
+
+    rows = [
+        [e.name, e.manufacturer, e.grade + (" *" if e.stands_for_grade else ""), figures(e.gyroscope),
+         figures(e.accelerometer), figures(e.effects), e.datasheet]
+        for e in found
+    ]  # fmt: skip
+    columns = ["model", "manufacturer", "grade", "gyroscope", "accelerometer", "effects", "datasheet"]
+    return tables.table("IMUs by name", columns, rows, caption="* this one is meant by the name of its grade")

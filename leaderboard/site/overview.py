@@ -13,6 +13,7 @@ from simnav.leaderboard.ranking.summary import limits
 
 from .charts import accuracy_and_cost, columns, detection, spread, spread_data
 from .columns import Column, column_dicts
+from .datasheets import COLUMN, cells
 from .heatmap import heatmap
 from .rounding import short
 
@@ -273,12 +274,15 @@ def _track(
         )
         for s in track.scenarios
     ]
+    wrong = cells(track, runs)
+    more = [COLUMN, *more] if wrong else more
     every = all(r.provisional for r in track.rows if r.ranked)
     rows = [
         board_row(
             row, estimators[row.estimator], cost_of(row.estimator, track.plain, track.score), others, provisional=every
         )
         | {f"s:{s}": {"value": short(v), "page": scenarios[s].page} for s, v in row.ratios.items()}
+        | ({COLUMN.key: wrong.get(row.estimator)} if wrong else {})
         for row, others in _once(track.rows)
     ]
     scored = [r for r in track.rows if r.ranked and math.isfinite(r.score)]

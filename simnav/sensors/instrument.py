@@ -195,6 +195,14 @@ class AidSpec(Spec):
         """
         return ()
 
+    def sources(self) -> Mapping[str, str]:
+        """The kind of each instrument, by its name in the scenario, whose readings this one reads; none, unless a
+        subclass says so.
+
+        With sources `build` returns a `simnav.sensors.DerivedInstrument`. A source reads no other instrument itself.
+        """
+        return {}
+
     @model_validator(mode="after")
     def _proper_channels(self) -> Self:
         channels = self.channels()

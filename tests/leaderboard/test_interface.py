@@ -130,6 +130,10 @@ CALLS: dict[str, tuple[list[str], Callable[[], Any]]] = {
         ["bound", "open-sea", "-n", "1"],
         lambda: {**simnav.bound("open-sea", runs=1).to_dict(), "csv": None},
     ),
+    "allan": (
+        ["allan", "open-sea", "--duration", "100", "--seed", "2"],
+        lambda: {**simnav.allan("open-sea", duration=100.0, seed=2).to_dict(), "plot": None, "csv": None},
+    ),
     "cite": (["cite"], lambda: simnav.cite().to_dict()),
     "sweep": (
         ["sweep", "pond.toml", "--dial", RATE + "=1,2", "-e", "gnss-only", "-n", "1", "--workers", "1", "-o", "swept"],
@@ -139,7 +143,7 @@ CALLS: dict[str, tuple[list[str], Callable[[], Any]]] = {
 }  # fmt: skip
 
 #: Commands whose calls are compared where their own tests are: they take minutes, or need what another one makes.
-ELSEWHERE = {"merge", "reference", "reproduce", "rescore", "seal", "submit", "tune", "verify"}
+ELSEWHERE = {"merge", "reference", "reproduce", "rescore", "robustness", "seal", "submit", "tune", "verify"}
 ELSEWHERE |= {"show", "standard run", "standard check", "standard audit", "standard publish", "train anfis"}
 
 
@@ -198,8 +202,10 @@ OF_THE_RESULT = {
     "run": {"plot", "stanford", "alert_limit"},
     "simulate": {"output", "csv"},
     "sweep": {"plot"},
+    "robustness": {"plot"},
     "bench": {"every", "output"},  # of all rows: simnav.costs
     "bound": {"csv"},
+    "allan": {"plot", "csv"},
     "verify": {"present", "tolerance"},  # of a bundle: simnav.verify_bundle
     "cite": {"text"},
     "tune": {"output", "plot", "parameters"},  # parameters that are held are a pair with the estimator

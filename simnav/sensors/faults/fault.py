@@ -189,7 +189,8 @@ class FaultSpec(Spec):
         """
         for name in self.instruments:
             if name == "imu":
-                raise SpecError(f"fault {self.kind!r}: on the IMU there is 'imu_disturbance' only")
+                own = ", ".join(repr(kind) for kind, cls in FAULTS.items().items() if cls.effect == "imu")
+                raise SpecError(f"fault {self.kind!r}: on the IMU there is {own} only")
             if name not in instruments and name not in instruments.values():
                 valid = sorted({*instruments, *instruments.values()})
                 raise SpecError(f"fault {self.kind!r}: there is no instrument {name!r}{closest(name, valid)}")

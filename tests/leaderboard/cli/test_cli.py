@@ -96,7 +96,7 @@ def test_version():
     assert call("--version").stdout.startswith("simnav 0.")
 
 
-@pytest.mark.parametrize("topic", ["scenarios", "estimators", "instruments", "faults"])
+@pytest.mark.parametrize("topic", ["scenarios", "estimators", "instruments", "faults", "imus"])
 def test_list_shows_the_same_to_people_and_machines(topic):
     entries = document("list", topic)[topic]
     assert entries

@@ -1,0 +1,121 @@
+"""Whether an adaptive or robust row is ever much worse than its plain row because the IMU is worse than its datasheet.
+
+On the voyages of the family `FAMILY` the IMU has up to 20 times the noise of its datasheet, gaps, disturbances or bias
+steps, and no measurement of another instrument is wrong. So a plain filter or window is right to use them all. Promised
+is, for every row: at most 2 % of the voyages above `WORSE` times the error of the plain row, and none above `RUINED`
+times; and, in 99 % of the voyages beyond `LOST` times the plain row, a covariance that admits it. A covariance admits
+an error if the normalised error squared of the horizontal position is at most `ADMITTED` by degree of freedom, in the
+mean over the run.
+
+``SIMNAV_AUDIT_POOR_IMU_RUNS`` sets the number of voyages; windows, which take longer, are run on every tenth of them.
+"""
+
+from __future__ import annotations
+
+import os
+import warnings
+from collections.abc import Callable, Iterator, Mapping
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from simnav.estimator import find, make, names
+from simnav.estimators.models.ship import ShipModel
+from simnav.estimators.solvers.federated import FederatedEstimator
+from simnav.estimators.solvers.imm import ImmEstimator
+from simnav.estimators.solvers.solution_separation import SolutionSeparation
+from simnav.estimators.solvers.window import WindowEstimator
+from simnav.scenario import load
+from simnav.scoring import score
+from simnav.source import record
+from simnav.spec import SpecError
+from simnav.trial import run_trial
+
+__all__ = ["FAMILY", "PLAIN", "parts", "rows"]
+
+FAMILY = "training-poor-imu"
+RUNS = int(os.environ.get("SIMNAV_AUDIT_POOR_IMU_RUNS", "200"))
+#: Seed of the first voyage, and voyages of a part; windows are run on the first of them only.
+FIRST, _BLOCK = 70_000, 10
+WORSE, RUINED, LOST, ADMITTED = 1.5, 5.0, 10.0, 10.0
+_MOST, _ADMITTING = 0.02, 0.99
+_SCORES = ("horizontal_rmse", "nees_horizontal")
+#: Solvers that are robust without an adaptation or a weighting.
+_ROBUST = (FederatedEstimator, ImmEstimator, SolutionSeparation)
+
+
+def plain(name: str) -> str:
+    """The plain row of the same kind; empty for a row that is neither adaptive nor robust, or is for ships."""
+    row = find(name)
+    recipe = getattr(row, "recipe", {})
+    if row.reference or name.endswith("-paper") or "model" not in recipe or recipe["model"].make is ShipModel:
+        return ""
+    solver = recipe["solver"].make
+    if not {"adaptation", "weighting"} & set(recipe) and not issubclass(solver, _ROBUST):
+        return ""
+    return "sw-fgo" if issubclass(solver, WindowEstimator) else "ekf"
+
+
+#: The rows of this section, each with its plain row.
+PLAIN = {name: plain(name) for name in names() if plain(name)}
+
+
+def there() -> bool:
+    """Whether the family is in the catalogue."""
+    try:
+        load(FAMILY)
+    except SpecError:
+        return False
+    return True
+
+
+def block(first: int, windows: bool) -> dict[str, list[tuple[float, float] | None]]:
+    """Horizontal RMSE [m] and NEES by degree of freedom of each row on the voyages of a part; None where it failed."""
+    wanted = sorted({n for n, p in PLAIN.items() if (p == "sw-fgo") is windows} | {"sw-fgo" if windows else "ekf"})
+    found: dict[str, list[tuple[float, float] | None]] = {name: [] for name in wanted}
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        for seed in range(first, first + (1 if windows else min(_BLOCK, FIRST + RUNS - first))):
+            recording = record(load(FAMILY), seed)
+            for name in wanted:
+                trial = run_trial(make(name), recording)
+                scores = score(trial, recording, _SCORES) if trial.status == "ok" else {}
+                values = tuple(float(scores.get(s, np.nan)) for s in _SCORES)
+                found[name].append((values[0], values[1]) if np.isfinite(values[0]) else None)
+    return found
+
+
+def parts() -> dict[str, Callable[[], Any]]:
+    """What is measured, by name: blocks of voyages with filters, and with windows; nothing without the family."""
+    if not there():
+        return {}
+    firsts = range(FIRST, FIRST + RUNS, _BLOCK)
+    kinds = {"filters": False, "windows": True}
+    return {f"{kind}-{first}": partial(block, first, windows) for kind, windows in kinds.items() for first in firsts}
+
+
+def rows(found: Mapping[str, Any]) -> Iterator[tuple[str, str, str, bool]]:
+    """What is measured, its figure, what is promised, and whether that is kept."""
+    if not there():
+        yield f"not measured: there is no family {FAMILY}", "", "", True
+        return
+    by_row: dict[str, list[tuple[tuple[float, float] | None, tuple[float, float]]]] = {}
+    for part in found.values():
+        for name in part.keys() & PLAIN.keys():
+            pairs = zip(part[name], part[PLAIN[name]], strict=True)
+            by_row.setdefault(name, []).extend((one, beside) for one, beside in pairs if beside is not None)
+    for name, pairs in sorted(by_row.items()):
+        ratio = np.array([np.inf if one is None else one[0] / beside[0] for one, beside in pairs])
+        share, worst = float(np.mean(ratio > WORSE)), float(ratio.max())
+        yield (
+            f"{name}: above {WORSE:g} times {PLAIN[name]}, of {len(ratio)}; largest",
+            f"{100.0 * share:.1f} %; {worst:.1f}",
+            f"at most {100.0 * _MOST:g} %; {RUINED:g}",
+            share <= _MOST and worst <= RUINED,
+        )
+        lost = [one for (one, _), r in zip(pairs, ratio) if r > LOST]
+        if lost:  # a row that failed has said so by its status
+            admitted = float(np.mean([one is None or one[1] <= ADMITTED for one in lost]))
+            what = f"{name}: admitted, of {len(lost)} beyond {LOST:g} times {PLAIN[name]}"
+            yield what, f"{100.0 * admitted:.0f} %", f"at least {100.0 * _ADMITTING:g} %", admitted >= _ADMITTING

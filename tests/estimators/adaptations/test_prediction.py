@@ -1,0 +1,170 @@
+"""The test of persistence: a state error is told from noise, a witness decides, and a poor IMU ruins no row."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from simnav.estimator import make
+from simnav.estimators.adaptations.base import Innovation
+from simnav.estimators.adaptations.innovation_based import FixedWindow, InnovationBased
+from simnav.estimators.adaptations.persistence import Course
+from simnav.estimators.adaptations.prediction import PredictionTest
+from simnav.estimators.adaptations.sage_husa import SageHusa
+from simnav.estimators.adaptations.variational_bayes import VariationalBayes
+from simnav.estimators.algebra.chi_square import normal_quantile
+from simnav.scenario import parse
+from simnav.scoring import score
+from simnav.source import record
+from simnav.trial import run_trial
+from simnav.types import Datasheet, ImuDatasheet, Instruments, Measurement, TriadDatasheet
+
+SHEETS = (
+    Datasheet("gnss", "gnss_position", 1.0, np.ones(3)),
+    Datasheet("dvl", "dvl", 1.0, np.ones(3)),
+)
+IMU = ImuDatasheet(100.0, TriadDatasheet(), TriadDatasheet())
+KINDS = {"gnss": "gnss_position", "dvl": "dvl"}
+CASES = Path(__file__).parents[2] / "cases"
+S99 = normal_quantile(0.99)
+
+
+def given(residual, time: float, name: str = "gnss", predicted: float = 0.5) -> Innovation:
+    """An innovation of three components with R = I."""
+    m = Measurement(time, name, KINDS[name], np.zeros(3))
+    return Innovation(m, np.asarray(residual, dtype=float), predicted * np.eye(3), np.eye(3))
+
+
+def course_of(innovations: np.ndarray) -> list[bool]:
+    """Whether innovations of three components, already standardised, are found correlated, one after the other."""
+    course, found = Course(), []
+    for k, u in enumerate(innovations):
+        course.add(tuple(u), 3, float(k))
+        found.append(course.correlated(S99))
+    return found
+
+
+def filtered(process: float, noise: float, rng: np.random.Generator, n: int = 4000) -> np.ndarray:
+    """Innovations of a filter of three random walks that takes both sigmas for 1."""
+    gain = (np.sqrt(5.0) - 1.0) / 2.0  # steady state: P = Q + P - P^2/(P + R), K = P/(P + R)
+    x, estimate, found = np.zeros(3), np.zeros(3), []
+    for _ in range(n):
+        x = x + process * rng.standard_normal(3)
+        v = x + noise * rng.standard_normal(3) - estimate
+        estimate = estimate + gain * v
+        found.append(v)
+    return np.array(found)
+
+
+def test_a_wrong_motion_correlates_innovations_and_a_wrong_noise_does_not():
+    """Mehra (1970): the lag-one correlation is above zero where Q is too small, and below where R is."""
+    rng = np.random.default_rng(0)
+    assert np.mean(course_of(filtered(10.0, 1.0, rng))) > 0.5
+    assert np.mean(course_of(filtered(1.0, 1.0, rng))) < 0.02
+    assert np.mean(course_of(filtered(1.0, 10.0, rng))) < 0.001
+
+
+def test_a_white_noise_of_any_size_and_tails_is_not_found_correlated():
+    rng = np.random.default_rng(1)
+    for u in (rng.standard_normal((4000, 3)), 30.0 * rng.standard_normal((4000, 3)), rng.standard_t(2.0, (4000, 3))):
+        assert np.mean(course_of(u)) < 0.02
+
+
+def test_large_is_chi_square():
+    """Unit normals are found too large at the level of the test at most; the fading lowers the share."""
+    rng = np.random.default_rng(2)
+    course, found = Course(), []
+    for k in range(20_000):
+        course.add(tuple(rng.standard_normal(3)), 3, float(k))
+        found.append(course.large(normal_quantile(0.95)))
+    assert 0.003 < np.mean(found) < 0.05
+
+
+def judged(imu: bool, dvl, gnss, dvl_until: float = 100.0, predicted: float = 0.5) -> list[bool]:
+    """The verdicts on 30 fixes of ``gnss(k)``, each after a velocity of ``dvl(k)`` that is heard until a time."""
+    test = PredictionTest(Instruments(SHEETS, IMU if imu else None))
+    found = []
+    for k in range(30):
+        if k <= dvl_until:
+            test.fails(given(dvl(k), k, "dvl", predicted))
+        found.append(test.fails(given(gnss(k), k + 0.5, "gnss", predicted)))
+    return found
+
+
+def test_a_lasting_error_is_that_of_the_fixes_if_the_log_is_a_witness():
+    rng = np.random.default_rng(3)
+    good = rng.standard_normal((30, 3))
+    off = 5.0 + good
+    assert not any(judged(True, lambda k: good[k], lambda k: off[k])[10:])
+
+
+def test_a_lasting_error_is_that_of_the_prediction_if_no_witness_is_heard_or_both_persist():
+    rng = np.random.default_rng(3)
+    good = rng.standard_normal((30, 3))
+    off = 3.0 + good
+    assert all(judged(True, lambda k: good[k], lambda k: off[k], dvl_until=3.0)[15:])
+    assert all(judged(True, lambda k: off[k], lambda k: off[k])[15:])
+
+
+def test_a_white_noise_without_a_witness_is_that_of_the_fixes():
+    noise = 6.0 * np.random.default_rng(4).standard_normal((30, 3))
+    assert np.mean(judged(True, lambda k: noise[k], lambda k: noise[k], dvl_until=3.0)[15:]) < 0.2
+
+
+def test_an_innovation_that_no_imu_explains_is_not_that_of_the_prediction():
+    """Nor is any without an IMU."""
+    off = 30.0 * np.ones(3)
+    assert not any(judged(True, lambda k: off, lambda k: off, dvl_until=-1.0, predicted=1e-3))
+    assert not any(judged(False, lambda k: off, lambda k: off, dvl_until=-1.0))
+
+
+@pytest.mark.parametrize("adaptation", [InnovationBased(), FixedWindow(), VariationalBayes(), SageHusa()])
+def test_a_memory_is_as_long_in_seconds_at_a_higher_rate(adaptation):
+    """After a noise step to 4 sigma, the time to half of the new sigma at 10 Hz is that at 1 Hz, to a third."""
+    times = []
+    for rate in (1.0, 10.0):
+        rng, found = np.random.default_rng(5), np.zeros(int(60 * rate))
+        for _ in range(20):
+            adaptation.reset(Instruments((Datasheet("gnss", "gnss_position", rate, np.ones(3)),)))
+            for _ in range(int(40 * rate)):
+                adaptation.adapt(given(1.05 * rng.standard_normal(3), 0.0, predicted=0.1))
+            for k in range(len(found)):
+                noise = adaptation.adapt(given(4.0 * rng.standard_normal(3), 0.0, predicted=0.1))
+                found[k] += noise[0, 0] / 20.0
+        times.append((1 + np.argmax(found > 8.0)) / rate)
+    assert times[1] == pytest.approx(times[0], rel=0.34)
+
+
+@pytest.fixture(scope="module")
+def voyages():
+    """A lone DVL and one second of a disturbed gyroscope; GNSS as the only aid, with an IMU eight times too noisy."""
+    found = {}
+    for name, seed in (("lone-dvl", 4), ("sole-gnss", 4)):
+        recording = record(parse((CASES / f"{name}.toml").read_text(encoding="utf-8")), seed)
+        found[name] = recording, error(recording, "ekf")
+    return found
+
+
+def error(recording, row: str) -> float:
+    """Horizontal RMSE of a row [m]."""
+    trial = run_trial(make(row), recording)
+    assert trial.status == "ok", trial.reason
+    return score(trial, recording, ["horizontal_rmse"])["horizontal_rmse"]
+
+
+@pytest.mark.parametrize(
+    "row", ["iae", "rae", "sage-husa", "vb-akf", "adkf", "igg3", "huber-kf", "gated-ekf", "mckf", "student-t", "imm"]
+)
+@pytest.mark.parametrize("case", ["lone-dvl", "sole-gnss"])
+def test_a_poor_imu_does_not_ruin_an_adaptive_row(voyages, case: str, row: str):
+    """Before the test of persistence most of these rows had 3 to 130 times the error of the plain filter."""
+    recording, plain = voyages[case]
+    assert error(recording, row) < 2.5 * plain
+
+
+@pytest.mark.parametrize("case", ["lone-dvl", "sole-gnss"])
+def test_a_poor_imu_does_not_ruin_solution_separation(voyages, case: str):
+    recording, plain = voyages[case]
+    assert error(recording, "solution-separation") < 4.0 * plain
