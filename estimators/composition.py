@@ -22,14 +22,14 @@ import inspect
 import re
 import typing
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from typing import Any, ClassVar
 
 from simnav.estimator import Estimator, Needs
 from simnav.estimator.parameters import former_names, under_present_names
-from simnav.types import Estimate, InitialState, Instruments, Measurements, NavigationStates
+from simnav.types import Array, Estimate, InitialState, Instruments, Measurements, NavigationStates
 
 if typing.TYPE_CHECKING:
     from simnav.recording import Recording
@@ -48,11 +48,15 @@ class Solver(Estimator):
         Pieces with which this solver cannot work, with the reason.
     row : str
         Name of the row that uses the solver, for messages. A solver that is registered itself has its own name.
+    reports_all : bool
+        If it is set to True before `reset`, Kalman filters and windows report all states of instruments by name, biases
+        and scale factors too (`simnav.types.Estimate.states`). For a row: ``row.solver.reports_all = True``.
     """
 
     pieces: ClassVar[tuple[str, ...]] = ()
     refuses: ClassVar[Mapping[str, str]] = {}
     row: str = ""
+    reports_all: bool = False
 
     @classmethod
     def misfit(cls, keyword: str, made: type) -> str:
@@ -231,6 +235,10 @@ class Row(Estimator):
     def smooth(self) -> NavigationStates | None:
         """The trajectory of a solver that smooths; else None."""
         return self.solver.smooth()
+
+    def earlier(self, lags: Sequence[float]) -> Array | None:
+        """The states of earlier times of a solver that looks back; else None."""
+        return self.solver.earlier(lags)
 
     def reveal(self, recording: Recording) -> None:
         """Pass the truth to a solver that is a reference."""

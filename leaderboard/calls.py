@@ -12,6 +12,7 @@ import operator
 import textwrap
 from collections.abc import Callable
 from dataclasses import MISSING, Field, dataclass, field, fields
+from fractions import Fraction
 from functools import wraps
 from typing import Any, ParamSpec, Protocol, TypeVar, cast, dataclass_transform
 
@@ -23,6 +24,7 @@ __all__ = [
     "Option",
     "call",
     "finite_number",
+    "numbers",
     "option",
     "option_of",
     "options_of",
@@ -192,3 +194,15 @@ def finite_number(name: str, value: Any, least: float = 0.0) -> float:
     if not (math.isfinite(number) and number >= least):
         raise RequestError(f"{name} = {value!r}: a finite number from {least:g} up is wanted")
     return number
+
+
+def numbers(name: str, text: str) -> tuple[float, ...]:
+    """Numbers that are separated by commas, as they are typed; each may be a fraction.
+
+    >>> numbers("--factors", "1/3, 3,10")
+    (0.3333333333333333, 3.0, 10.0)
+    """
+    try:
+        return tuple(float(Fraction(part.strip().replace(" ", ""))) for part in text.split(","))
+    except (ValueError, ZeroDivisionError):
+        raise RequestError(f"{name} {text}: numbers are wanted, separated by commas, like 1/3,3,10") from None

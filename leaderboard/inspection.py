@@ -14,9 +14,10 @@ from simnav.leaderboard.campaign.request import requests
 from simnav.leaderboard.results.errors import RequestError, StoreError, mistakes
 from simnav.leaderboard.results.scratch import scratch
 
-from .calls import call, whole_number
+from .calls import call, finite_number, whole_number
 from .given import absolute, results_of, scenario_of, scenarios_of
 from .requests import (
+    AllanRequest,
     BoundRequest,
     CiteRequest,
     MergeRequest,
@@ -38,7 +39,9 @@ if TYPE_CHECKING:
     from simnav.leaderboard.results.citation import Citation
     from simnav.leaderboard.results.result import Result
 
-__all__ = ["bound", "cite", "merge", "rank", "reproduce", "rescore", "seal", "verify"]
+    from .allan import AllanReport
+
+__all__ = ["allan", "bound", "cite", "merge", "rank", "reproduce", "rescore", "seal", "verify"]
 
 
 @call(RankRequest)
@@ -161,7 +164,8 @@ def cite(request: CiteRequest) -> Citation:
     """
     from simnav.leaderboard.results.citation import citation
 
-    return citation(None if request.results is None else [r.provenance for r in results_of(request.results)])
+    found = None if request.results is None else [r.provenance for r in results_of(request.results)]
+    return citation(found, request.author)
 
 
 @call(BoundRequest)
@@ -177,6 +181,31 @@ def bound(request: BoundRequest) -> BoundReport:
     return bounds_of(
         scenario_of(request.scenario), whole_number("runs", request.runs, 1), request.smoothed, request.progress
     )
+
+
+@call(AllanRequest)
+def allan(request: AllanRequest) -> AllanReport:
+    """The Allan deviation of an IMU and its noise coefficients, beside its datasheet.
+
+    Returns
+    -------
+    simnav.leaderboard.allan.AllanReport
+
+    Raises
+    ------
+    RequestError
+        If there is no IMU, or there are too few samples.
+    """
+    from .allan import allan_of_file, allan_of_scenario
+
+    seed, start = whole_number("seed", request.seed, 0), finite_number("start", request.start)
+    end = None if request.end is None else finite_number("end", request.end)
+    given = request.scenario
+    with mistakes():
+        if isinstance(given, (str, Path)) and str(given).endswith(".npz"):
+            return allan_of_file(absolute(given), start, end)
+        scenario = scenario_of(given)
+        return allan_of_scenario(scenario, seed, finite_number("duration", request.duration), start, end)
 
 
 @call(VerifyRequest)

@@ -15,11 +15,12 @@ from __future__ import annotations
 from simnav.leaderboard.campaign.request import EstimatorLike, Estimators
 from simnav.leaderboard.results.errors import RequestError
 
+from .claiming import claim
 from .costing import bench, costs
 from .given import results_of, scenario_of, scenarios_of
-from .inspection import bound, cite, merge, rank, reproduce, rescore, seal, verify
+from .inspection import allan, bound, cite, merge, rank, reproduce, rescore, seal, verify
 from .requests import ScenarioLike, Scenarios
-from .running import campaign, check, evaluate, make, record, run, sweep, tune
+from .running import campaign, check, evaluate, make, record, robustness, run, sweep, tune
 
 __all__ = [
     "EstimatorLike",
@@ -27,11 +28,13 @@ __all__ = [
     "RequestError",
     "ScenarioLike",
     "Scenarios",
+    "allan",
     "bench",
     "bound",
     "campaign",
     "check",
     "cite",
+    "claim",
     "costs",
     "evaluate",
     "make",
@@ -41,6 +44,7 @@ __all__ = [
     "reproduce",
     "rescore",
     "results_of",
+    "robustness",
     "run",
     "scenario_of",
     "scenarios_of",

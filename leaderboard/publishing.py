@@ -29,7 +29,7 @@ from .publishing_requests import (
 from .running import campaign
 
 if TYPE_CHECKING:
-    from simnav.leaderboard.ranking.reports import CampaignReport
+    from simnav.leaderboard.ranking.reports import CampaignReport, StandardReport
     from simnav.leaderboard.site.report import SiteReport
     from simnav.leaderboard.standard.auditing import Audit
     from simnav.leaderboard.standard.currency import Outdated
@@ -44,6 +44,7 @@ __all__ = [
     "publish_standard",
     "run_standard",
     "site",
+    "standard",
     "submit",
     "verify_bundle",
 ]
@@ -210,6 +211,28 @@ def verify_bundle(request: VerifyBundleRequest) -> SubmissionReport:
         absolute(request.bundle), read_seal(request.key), sample=request.sample, present=request.present,
         tolerance=TOLERANCE if request.tolerance is None else request.tolerance, progress=request.progress,
     )  # fmt: skip
+
+
+def standard() -> StandardReport:
+    """The result that comes with simnav, with its ranking: ``simnav.standard().to_frame()``.
+
+    Returns
+    -------
+    StandardReport
+
+    Raises
+    ------
+    RequestError
+        If this version of simnav comes without one.
+    """
+    from simnav.leaderboard.ranking.ranking import rank
+    from simnav.leaderboard.ranking.reports import StandardReport
+
+    from .results import requested
+
+    folder = _standard_results(None)
+    found = results_of(folder)
+    return StandardReport(found, rank(found, requested=requested.read(folder)))
 
 
 @call(StandardRequest)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 from simnav.leaderboard.campaign.options import CampaignOptions, PathLike, RunOptions
 
-from .calls import option, request
+from .calls import numbers, option, request
 from .papers import PAPERS
 
 if TYPE_CHECKING:
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from simnav.scenario import Scenario
 
 __all__ = [
+    "AllanRequest",
     "BenchRequest",
     "BoundRequest",
     "CampaignRequest",
@@ -34,6 +35,7 @@ __all__ = [
     "RecordRequest",
     "ReproduceRequest",
     "RescoreRequest",
+    "RobustnessRequest",
     "RunRequest",
     "SealRequest",
     "SweepRequest",
@@ -51,12 +53,13 @@ _SCENARIO = "Name, versioned id, or path of a TOML file."
 _SCENARIO_MORE = "Or the `simnav.scenario.Scenario` itself."
 _SCENARIOS = "Names, tracks or TOML files, separated by commas. Default: all."
 _ESTIMATORS = "Names or files, separated by commas; 'sw-fgo:window=10' sets a parameter."
+_FIVE = "'all': every registered one. Default: five baselines that suit the scenario."
 PARAMETERS = "Value of a parameter of the estimators."
 _EACH_GETS = "Each estimator gets the parameters that it has."
 PROGRESS = "Called with the number of finished parts, the number of all parts, and the next part as ``note=``."
 CAMPAIGN_PROGRESS = "Called with a `simnav.leaderboard.campaign.campaign.Progress` from time to time."
 FOLDER = "Folder that a campaign wrote."
-_PROFILE = "What is run: smoke, quick, standard, full, or a TOML file of your own."
+_PROFILE = "What is run: smoke, quick, standard, full, robustness, or a TOML file of your own."
 _OWN_SCENARIOS = "TOML files of scenarios outside the catalogue."
 _FIRST_SEED = "Seed of the first run; the others count up."
 
@@ -74,10 +77,18 @@ class RunRequest:
     """Run estimators once over one scenario, in this process, and score them."""
 
     scenario: ScenarioLike = option(help=_SCENARIO, more=_SCENARIO_MORE, argument=True, metavar="SCENARIO")
-    estimators: Estimators = option("--estimator", "-e", default=None, help=f"{_ESTIMATORS} Default: all.")
+    estimators: Estimators = option("--estimator", "-e", default=None, help=f"{_ESTIMATORS} {_FIVE}")
     _: KW_ONLY
     seed: int = option(default=0, help="Seed of the run.", least=0)
     parameters: Parameters = option("--set", default=None, help=PARAMETERS, more=_EACH_GETS, metavar="NAME=VALUE")
+    lags: str | Sequence[float] | None = option(
+        "--lags",
+        default=None,
+        cli=str | None,
+        metavar="SECONDS",
+        help="Also estimate the times so many seconds before, like 1/5/10/30: the accuracy of an output that is late.",
+        more="The parameter ``lags`` of all estimators (`simnav.estimator.looking_back`).",
+    )
     progress: Bar = option(default=None, help=PROGRESS, hidden=True)
 
 
@@ -95,9 +106,7 @@ class EvaluateRequest(RunOptions):
     _: KW_ONLY
     runs: int = option("--runs", "-n", default=20, help="Seeds of each scenario.", least=2)
     seed: int = option("--seed", default=0, help=_FIRST_SEED, least=0)
-    against: Estimators = option(
-        default=None, help="Baselines, separated by commas. Default: all that suit the scenario."
-    )
+    against: Estimators = option(default=None, help=f"Rows to compare with, separated by commas. {_FIVE}")
     parameters: Parameters = option(
         "--set", default=None, help=PARAMETERS, more="Of the estimators under test.", metavar="NAME=VALUE"
     )
@@ -175,6 +184,45 @@ class SweepRequest(RunOptions):
     )
     parameters: Parameters = option("--set", default=None, help=PARAMETERS, more=_EACH_GETS, metavar="NAME=VALUE")
     seed: int = option("--seed", default=0, help=_FIRST_SEED, least=0)
+    progress: CampaignProgress = option(default=None, help=CAMPAIGN_PROGRESS, hidden=True)
+
+
+@request
+class RobustnessRequest(RunOptions):
+    """Compare estimators with the plain row when a datasheet is wrong: robustness profiles.
+
+    The figures of one instrument after the other are multiplied by each factor, and its true errors stay the same. The
+    scenarios are two short ones that come with simnav, of a ship with an IMU and of one without. Started again, the
+    sweep continues where it stopped.
+    """
+
+    estimators: Estimators = option(
+        default=None,
+        help="my_filter.py, or a name; one or several. Default: all that come with simnav and are not slow.",
+        argument=True,
+        metavar="FILE_OR_NAME...",
+    )
+    factors: Sequence[float] = option(
+        "--factors",
+        default=(1.0 / 3.0, 3.0, 10.0),
+        cli=str | None,
+        cli_default=None,
+        read=lambda given: (1.0 / 3.0, 3.0, 10.0) if given is None else numbers("--factors", given),
+        help="Datasheet over truth, separated by commas. Default: 1/3, 3 and 10.",
+        more="The true datasheet is added.",
+    )
+    _: KW_ONLY
+    runs: int = option("--runs", "-n", default=4, help="Seeds of each datasheet.", least=1)
+    seed: int = option("--seed", default=0, help=_FIRST_SEED, least=0)
+    folder: PathLike = option("--results", default="results/robustness", help="Folder of the results.")
+    parameters: Parameters = option("--set", default=None, help=PARAMETERS, more=_EACH_GETS, metavar="NAME=VALUE")
+    output: PathLike | None = option(
+        "--output",
+        "-o",
+        default=None,
+        help="File that the profiles are written to, with machine, versions and day.",
+        more="The one that boards show is ``leaderboard/standard/robustness.json``.",
+    )
     progress: CampaignProgress = option(default=None, help=CAMPAIGN_PROGRESS, hidden=True)
 
 
@@ -371,6 +419,8 @@ class CiteRequest:
     results: PathLike | None = option(
         default=None, help=f"{FOLDER} Default: simnav itself.", argument=True, metavar="RESULTS"
     )
+    _: KW_ONLY
+    author: str = option("--author", default="", help="Who made the results. Default: the authors of simnav.")
 
 
 @request
@@ -387,6 +437,27 @@ class BoundRequest:
     runs: int = option("--runs", "-n", default=12, help="Seeds over which it is averaged.", least=1)
     smoothed: bool = option("--smoothed", default=False, help="Bound of smoothed output, not of real-time output.")
     progress: Bar = option(default=None, help=PROGRESS, hidden=True)
+
+
+@request
+class AllanRequest:
+    """The Allan deviation of an IMU and its noise coefficients, beside its datasheet.
+
+    Of a simulated scenario it is that of the errors at rest; of a log, that of the recorded samples, with all motion
+    that is in them.
+    """
+
+    scenario: ScenarioLike = option(
+        help="A scenario, simulated or recorded, or a recording (.npz).",
+        more=_SCENARIO_MORE,
+        argument=True,
+        metavar="SCENARIO_OR_LOG",
+    )
+    _: KW_ONLY
+    seed: int = option(default=0, help="Seed of the simulated errors; of a log, the number of the recording.", least=0)
+    duration: float = option(default=21600.0, least=1.0, help="Seconds that are simulated.")
+    start: float = option(default=0.0, least=0.0, help="Of a log: begin here, in seconds.")
+    end: float | None = option(default=None, least=0.0, help="Of a log: end here, in seconds. Default: at its end.")
 
 
 @request

@@ -10,18 +10,21 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from simnav.estimator.looking_back import LAGS, lags_of
 from simnav.leaderboard.campaign.options import RunOptions, shared
 from simnav.leaderboard.campaign.request import EstimatorLike, EstimatorRequest, Estimators, requests, together
 from simnav.leaderboard.campaign.request import request as one_request
 from simnav.leaderboard.results.errors import RequestError, StoreError, mistakes
 from simnav.leaderboard.results.scratch import scratch
 
+from .baselines import baselines_or
 from .calls import call, whole_number
 from .given import absolute, results_of, scenario_of, scenarios_of, seeds_of
 from .requests import (
     CampaignRequest,
     EvaluateRequest,
     RecordRequest,
+    RobustnessRequest,
     RunRequest,
     Scenarios,
     SweepRequest,
@@ -31,15 +34,17 @@ from .requests import (
 if TYPE_CHECKING:
     from simnav.estimator import Estimator
     from simnav.leaderboard.campaign.campaign import Summary
-    from simnav.leaderboard.campaign.single_run import RunReport
     from simnav.leaderboard.ranking.reports import CampaignReport, EvaluationReport
+    from simnav.leaderboard.sweep.datasheets import Robustness
     from simnav.leaderboard.sweep.report import Sweep
     from simnav.leaderboard.tuning.tuning import Tuning
     from simnav.recording import Recording
     from simnav.scenario import Scenario
     from simnav.testing.contract_check import Report
 
-__all__ = ["campaign", "check", "evaluate", "make", "record", "run", "sweep", "tune"]
+    from .single_run import RunReport
+
+__all__ = ["campaign", "check", "evaluate", "make", "record", "robustness", "run", "sweep", "tune"]
 
 
 def make(estimator: EstimatorLike, **parameters: Any) -> Estimator:
@@ -118,10 +123,15 @@ def run(request: RunRequest) -> RunReport:
     RunReport
         The recording, all trials and their scores.
     """
-    from simnav.leaderboard.campaign.single_run import run_once
+    from .single_run import run_once
 
     chosen, seed = scenario_of(request.scenario), whole_number("seed", request.seed)
-    return run_once(chosen, requests(request.estimators, request.parameters), seed, request.progress)
+    asked = baselines_or(request.estimators, [chosen], request.parameters)
+    if request.lags is not None:
+        with mistakes():
+            lags = "/".join(f"{lag:g}" for lag in lags_of(request.lags))
+        asked = requests([one_request(r, {LAGS: lags}) for r in asked])
+    return run_once(chosen, asked, seed, request.progress)
 
 
 @call(EvaluateRequest)
@@ -141,8 +151,8 @@ def evaluate(request: EvaluateRequest) -> EvaluationReport:
     if not request.estimators:
         raise RequestError("no estimator was asked for; name those that should be evaluated")
     mine = requests(request.estimators, request.parameters)
-    everyone = together([*mine, *requests(request.against)])
     chosen, seeds = scenarios_of(request.scenarios), seeds_of(request.seed, request.runs)
+    everyone = together([*mine, *baselines_or(request.against, chosen)])
     with _folder(request.results) as folder:
         _run(request, chosen, everyone, seeds, folder)
         found = results_of(folder)
@@ -242,6 +252,49 @@ def sweep(request: SweepRequest) -> Sweep:
                  request.limit, results, tuple(found), summary)  # fmt: skip
     write(made)
     return made
+
+
+@call(RobustnessRequest)
+def robustness(request: RobustnessRequest) -> Robustness:
+    """Compare with the plain row under wrong datasheets.
+
+    Returns
+    -------
+    Robustness
+        A profile of each estimator and plain row.
+
+    Raises
+    ------
+    RequestError
+        If an estimator is unknown, a factor makes no sense, or the file cannot be written.
+    """
+    from simnav.estimator import describe, find, names
+    from simnav.leaderboard.campaign.request import comes_with_simnav
+    from simnav.leaderboard.ranking.plain_row import plain_rows
+    from simnav.leaderboard.ranking.stored_robustness import save
+    from simnav.leaderboard.results.provenance import here
+    from simnav.leaderboard.sweep.datasheets import SCORE, Robustness, bases, checked_factors, profiles, settings
+
+    asked, output = request.estimators, request.output
+    if asked is None:
+        own = (describe(name) for name in names() if comes_with_simnav(find(name)))
+        asked = [d.name for d in own if not d.slow and not d.reference]
+    if output is not None and not absolute(output).parent.is_dir():
+        raise RequestError(f"output = {os.fspath(output)!r}: there is no folder {absolute(output).parent}")
+    factors, seeds = checked_factors(request.factors), seeds_of(request.seed, request.runs)
+    mine = requests(asked, request.parameters)
+    everyone = together([*mine, *requests(list(plain_rows(SCORE)))])
+    found = [s for table in bases() for s in settings(table, factors)]
+    measured, folder = here(), absolute(request.folder)  # before, for the code may be edited meanwhile
+    summary = _run(request, [s.scenario for s in found], everyone, seeds, folder)
+    ids, known = {s.scenario.id for s in found}, {r.label for r in everyone}
+    results = [r for r in results_of(folder) if r.scenario in ids and r.estimator in known and r.seed in seeds]
+    rows = profiles(found, results, [r.label for r in mine])
+    unsuitable = tuple(r.label for r in mine if r.label not in {row.estimator for row in rows})
+    if output is None:
+        return Robustness(tuple(rows), unsuitable, summary)
+    with mistakes(OSError):
+        return Robustness(tuple(rows), unsuitable, summary, str(save(rows, absolute(output), measured)))
 
 
 @call(TuneRequest)

@@ -25,19 +25,21 @@ if TYPE_CHECKING:
     from simnav.environment import EstimatorAgent, NavigationEnv, NavigationVectorEnv
     from simnav.estimator import Estimator, UnsuitableScenario, names, register
     from simnav.kinds import Component, Kind
+    from simnav.leaderboard.claiming import claim
     from simnav.leaderboard.costing import bench, costs
-    from simnav.leaderboard.inspection import bound, cite, merge, rank, reproduce, rescore, seal, verify
+    from simnav.leaderboard.inspection import allan, bound, cite, merge, rank, reproduce, rescore, seal, verify
     from simnav.leaderboard.publishing import (
         audit_standard,
         check_standard,
         publish_standard,
         run_standard,
         site,
+        standard,
         submit,
         verify_bundle,
     )
     from simnav.leaderboard.results.errors import RequestError
-    from simnav.leaderboard.running import campaign, check, evaluate, make, record, run, sweep, tune
+    from simnav.leaderboard.running import campaign, check, evaluate, make, record, robustness, run, sweep, tune
     from simnav.plugins import load_plugin
     from simnav.recording import Recording
     from simnav.scenario import Scenario, load
@@ -85,6 +87,7 @@ __all__ = [
     "TriadDatasheet",
     "Trial",
     "UnsuitableScenario",
+    "allan",
     "audit_standard",
     "bench",
     "bound",
@@ -92,6 +95,7 @@ __all__ = [
     "check",
     "check_standard",
     "cite",
+    "claim",
     "costs",
     "evaluate",
     "load",
@@ -109,12 +113,14 @@ __all__ = [
     "register_score",
     "reproduce",
     "rescore",
+    "robustness",
     "run",
     "run_standard",
     "run_trial",
     "score",
     "seal",
     "site",
+    "standard",
     "submit",
     "sweep",
     "tune",
@@ -150,16 +156,18 @@ _HOMES = {
         "NavigationStates",
         "TriadDatasheet",
     ),
+    "leaderboard.claiming": ("claim",),
     "leaderboard.costing": ("bench", "costs"),
-    "leaderboard.inspection": ("bound", "cite", "merge", "rank", "reproduce", "rescore", "seal", "verify"),
+    "leaderboard.inspection": ("allan", "bound", "cite", "merge", "rank", "reproduce", "rescore", "seal", "verify"),
     "leaderboard.results.errors": ("RequestError",),
-    "leaderboard.running": ("campaign", "check", "evaluate", "make", "record", "run", "sweep", "tune"),
+    "leaderboard.running": ("campaign", "check", "evaluate", "make", "record", "robustness", "run", "sweep", "tune"),
     "leaderboard.publishing": (
         "audit_standard",
         "check_standard",
         "publish_standard",
         "run_standard",
         "site",
+        "standard",
         "submit",
         "verify_bundle",
     ),

@@ -20,20 +20,39 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from math import inf, isfinite
-from typing import Literal, get_args
+from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 
 from simnav.compiled import Array
 from simnav.spec import UNITS
 
-__all__ = ["NAVIGATION", "Process", "StateBlock", "blocks_of"]
+__all__ = ["NAVIGATION", "Process", "Rates", "StateBlock", "blocks_of"]
 
 Process = Literal["constant", "random_walk", "gauss_markov", "clock"]
+_PROCESSES: tuple[str, ...] = get_args(Process)
 #: In a Jacobian by block, the name of position, velocity and attitude.
 NAVIGATION = "navigation"
 
 _NAME = re.compile(r"[a-z][a-z0-9]*(_[a-z0-9]+)*")
+
+
+class Rates(NamedTuple):
+    """How one component x of a block moves: x' = -x times ``decay``, and white noise of the density ``noise``.
+
+    Attributes
+    ----------
+    variance : float
+        Variance at the start of a run [x^2].
+    decay : float
+        Inverse of the correlation time [1/s].
+    noise : float
+        Density of the driving noise [x^2/s].
+    """
+
+    variance: float
+    decay: float
+    noise: float
 
 
 @dataclass(frozen=True)
@@ -83,8 +102,8 @@ class StateBlock:
                 raise ValueError(f"{field} = {text!r} of a block of states should be in snake_case, like 'iron'")
         if isinstance(self.size, bool) or not isinstance(self.size, int) or self.size < 1:
             raise ValueError(f"block {self.name!r}: size = {self.size!r} should be an integer of 1 or more")
-        if self.process not in get_args(Process):
-            valid = ", ".join(get_args(Process))
+        if self.process not in _PROCESSES:
+            valid = ", ".join(_PROCESSES)
             raise ValueError(f"block {self.name!r}: process = {self.process!r} should be one of: {valid}")
         units = (self.units,) * self.size if isinstance(self.units, str) else tuple(self.units)
         if len(units) != self.size or any(unit and unit not in UNITS for unit in units):
@@ -105,15 +124,30 @@ class StateBlock:
 
     def _figures(self, field: str) -> tuple[float, ...]:
         given = getattr(self, field)
-        try:
-            figures = np.broadcast_to(np.asarray(given, dtype=np.float64), (self.size,)).tolist()
-        except (TypeError, ValueError):
-            figures = []
+        if type(given) is float:
+            figures = [given] * self.size
+        elif type(given) is tuple and len(given) == self.size and all(type(x) is float for x in given):
+            figures = [*given]
+        else:
+            try:
+                figures = np.broadcast_to(np.asarray(given, dtype=np.float64), (self.size,)).tolist()
+            except (TypeError, ValueError):
+                figures = []
         if not figures or not all(isfinite(x) and x >= 0.0 for x in figures):
             raise ValueError(
                 f"block {self.name!r}: {field} = {given!r} should be one number or {self.size}, finite and not negative"
             )
         return tuple(figures)
+
+    @classmethod
+    def stationary(
+        cls, name: str, size: int, units: str | tuple[str, ...], sigma: float | tuple[float, ...],
+        correlation_time: float,
+    ) -> StateBlock:  # fmt: skip
+        """A block of a constant sigma: Gauss-Markov, or constant where the correlation time [s] is infinite."""
+        if correlation_time == inf:
+            return cls(name, size, units, sigma)
+        return cls(name, size, units, sigma, "gauss_markov", correlation_time=correlation_time)
 
     def label(self, instrument: str) -> str:
         """The name among all blocks of a run: the shared one, or ``INSTRUMENT.NAME``."""
@@ -124,18 +158,15 @@ class StateBlock:
         """Whether a run may draw another value than zero."""
         return any(self.sigma) or (self.process in ("random_walk", "clock") and any(self.density))  # type: ignore[arg-type]
 
-    def rates(self) -> list[tuple[float, float, float]]:
-        """Initial variance, decay [1/s] and noise density [unit^2/s] of each component.
-
-        The noise of a clock is not in it: its components are not independent (`noise`).
-        """
+    def rates(self) -> list[Rates]:
+        """How each component moves. The noise of a clock is not in it: its components are not independent (`noise`)."""
         assert isinstance(self.sigma, tuple)
         assert isinstance(self.density, tuple)
         if self.process == "gauss_markov":
-            return [(s * s, 1.0 / self.correlation_time, 2.0 * s * s / self.correlation_time) for s in self.sigma]
+            return [Rates(s * s, 1.0 / self.correlation_time, 2.0 * s * s / self.correlation_time) for s in self.sigma]
         if self.process == "random_walk":
-            return [(s * s, 0.0, q * q) for s, q in zip(self.sigma, self.density, strict=True)]
-        return [(s * s, 0.0, 0.0) for s in self.sigma]
+            return [Rates(s * s, 0.0, q * q) for s, q in zip(self.sigma, self.density, strict=True)]
+        return [Rates(s * s, 0.0, 0.0) for s in self.sigma]
 
     def transition(self, elapsed: float) -> Array:
         """(k, k) transition matrix over a time [s]."""

@@ -216,7 +216,7 @@ class Block:
         return Block(first.start, parts[-1].end, imu, labels, aids, truth)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Recording:
     """A whole run.
 
@@ -257,6 +257,10 @@ class Recording:
     draws: Mapping[str, Any] = field(default_factory=dict)
     actual: Instruments | None = None
     actual_covariance: Array | None = None
+
+    def __repr__(self) -> str:
+        names = [*(["imu"] if self.instruments.imu is not None else []), *self.instruments]
+        return f"<Recording: {self.scenario}, seed {self.seed}, {self.duration:g} s, {', '.join(names)}>"
 
     @property
     def duration(self) -> float:

@@ -78,6 +78,19 @@ UNITS: dict[str, float] = {
     "g": _G,
     "ug_sqrt_hz": _G * 1e-6,
     "ug_sqrt_s": _G * 1e-6,
+    "mg_sqrt_hz": _G * 1e-3,
+    "mm_s2": 0.001,
+    "mm_s_sqrt_h": 0.001 / 60.0,
+    "ft_s_sqrt_h": 0.3048 / 60.0,
+    "deg_s_sqrt_hz": _DEG,
+    "mrad": 0.001,
+    "k": 1.0,
+    "deg_h_k": _DEG / 3600.0,
+    "ug_k": _G * 1e-6,
+    "deg_h_g": _DEG / 3600.0 / _G,
+    "deg_s_g": _DEG / _G,
+    "deg_h_g2": _DEG / 3600.0 / _G**2,
+    "ug_g2": 1e-6 / _G,
     "m_s_sqrt_h": 1.0 / 60.0,
     "m_s_sqrt_s": 1.0,
     "m_sqrt_s": 1.0,
@@ -129,7 +142,7 @@ def register_unit(name: str, factor: float) -> None:
         raise SpecError(f"the unit {name!r} is known: it is {UNITS[name]:g} in SI, not {factor:g}")
 
 
-def quantity(unit: str, default: Any = PydanticUndefined, **kwargs: Any) -> Any:
+def quantity(unit: str, default: Any = PydanticUndefined, *, also: Sequence[str] = (), **kwargs: Any) -> Any:
     """Declare a field that has the unit ``unit`` in TOML and the SI unit in memory.
 
     Parameters
@@ -138,12 +151,16 @@ def quantity(unit: str, default: Any = PydanticUndefined, **kwargs: Any) -> Any:
         Unit in TOML, a key of `UNITS`. It is also the end of the TOML key: ``rate_hz``.
     default : float or tuple, optional
         Default value in SI. A field without a default is required.
+    also : sequence of str
+        Further units in which the field is read, each with a key of its own: those of datasheets.
     **kwargs
         Arguments of `pydantic.Field` (``description``, ``gt``, ...). Bounds are in SI.
     """
-    if unit not in UNITS:
-        raise SpecError(f"unknown unit {unit!r}; register_unit adds one; there are: {', '.join(UNITS)}")
-    return Field(default, json_schema_extra={"unit": unit}, **kwargs)
+    for name in (unit, *also):
+        if name not in UNITS:
+            raise SpecError(f"unknown unit {name!r}; register_unit adds one; there are: {', '.join(UNITS)}")
+    extra: dict[str, Any] = {"unit": unit, "also": list(also)} if also else {"unit": unit}
+    return Field(default, json_schema_extra=extra, **kwargs)
 
 
 def entries(key: str, default: Any = PydanticUndefined, **kwargs: Any) -> Any:
@@ -228,14 +245,16 @@ class Spec(BaseModel):
         """
         if not isinstance(table, Mapping):
             raise SpecError(f"{source}: {path or 'the file'} = {table!r} should be a table")
-        keys = cls.toml_keys()
+        keys, others = cls.toml_keys(), cls._keys_in_other_units()
         values: dict[str, Any] = {}
         for key, raw in table.items():
             where = f"{path}.{key}" if path else key
-            if key not in keys:
+            if key not in keys and key not in others:
                 raise SpecError(f"{source}: unknown key '{where}' (value {raw!r}){_hint(key, keys)}")
-            name, info = keys[key]
-            unit = unit_of(info)
+            name, info = keys[key] if key in keys else others[key][:2]
+            unit = unit_of(info) if key in keys else others[key][2]
+            if name in values:
+                raise SpecError(f"{source}: '{where}' says the same as another key, in another unit; give one of them")
             if unit is not None:
                 values[name] = _convert(raw, UNITS[unit], _may_be_infinite(info), source, where)
             else:
@@ -245,13 +264,41 @@ class Spec(BaseModel):
         except ValidationError as error:
             raise SpecError(_sentence(cls, error, table, source, path)) from None
 
+    @classmethod
+    def _keys_in_other_units(cls) -> dict[str, tuple[str, FieldInfo, str]]:
+        """Keys of fields in their further units: name and description of the field, and the unit."""
+        found: dict[str, tuple[str, FieldInfo, str]] = {}
+        for name, info in cls.model_fields.items():
+            extra = info.json_schema_extra
+            also = extra.get("also", ()) if isinstance(extra, dict) else ()
+            if isinstance(also, list):
+                found |= {f"{name}_{unit}": (name, info, str(unit)) for unit in also}
+        return found
+
+    @classmethod
+    def replaced(cls, table: Mapping[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:
+        """A table of TOML keys, with the given keys in place of those of the same fields, in whatever unit."""
+        names = {key: name for key, (name, _) in cls.toml_keys().items()}
+        names |= {key: name for key, (name, _, _) in cls._keys_in_other_units().items()}
+        said = {names.get(key, key) for key in given}
+        return {**{key: value for key, value in table.items() if names.get(key, key) not in said}, **given}
+
     def to_toml(self) -> dict[str, Any]:
         """The TOML table from which `from_toml` makes an equal specification: the given fields, and the kind."""
         table = {}
+        others = self._keys_in_other_units()
         for key, (name, info) in self.toml_keys().items():
             value = getattr(self, name)
             if value is not None and (name in self.model_fields_set or name == "kind"):
-                table[key] = _plain(value, unit_of(info))
+                unit = unit_of(info)
+                table[key] = _plain(value, unit)
+                if unit is None or not isinstance(value, float) or table[key] * UNITS[unit] == value:
+                    continue
+                for other, (field, _, another) in others.items():  # a unit in which no digit is lost
+                    if field == name and _plain(value, another) * UNITS[another] == value:
+                        del table[key]
+                        table[other] = _plain(value, another)
+                        break
         return table
 
 

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from math import exp, log1p, sqrt
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
@@ -21,6 +22,7 @@ from simnav.kinds import BODY_VELOCITY, HEADING, WATER_SPEED
 from simnav.types import Array, Instruments
 
 from .anfis_file import FEATURES, FeatureSet, Parameters, shipped
+from .anfis_level import Level
 from .base import Innovation
 from .noise import NoiseAdaptation
 
@@ -134,7 +136,10 @@ class Anfis(NoiseAdaptation):
     file : str
         Parameter file of `simnav train anfis`; empty: the file that comes with simnav.
     lowest, highest : float
-        Bounds of the sigma, as multiples of the datasheet's sigma.
+        Bounds of the sigma, as multiples of the datasheet's sigma (of the learned one with ``level="learned"``).
+    level : "datasheet" or "learned"
+        What the inputs and the output are relative to: the datasheet's noise, as in the training; or the noise that the
+        last innovations have, for a datasheet that may be wrong (`simnav.estimators.adaptations.anfis_level`).
 
     Raises
     ------
@@ -142,25 +147,41 @@ class Anfis(NoiseAdaptation):
         If the bounds are not 0 < lowest <= highest, or the file cannot be used or holds other features.
     """
 
-    def __init__(self, features: FeatureSet = "innovation", file: str = "", lowest: float = 1.0, highest: float = 30.0):
+    def __init__(
+        self,
+        features: FeatureSet = "innovation",
+        file: str = "",
+        lowest: float = 1.0,
+        highest: float = 30.0,
+        level: Literal["datasheet", "learned"] = "datasheet",
+    ):
+        if level not in ("datasheet", "learned"):
+            raise ValueError(f"level is {level!r}; it must be 'datasheet' or 'learned'")
         if not 0.0 < lowest <= highest:
             raise ValueError(f"lowest = {lowest:g} and highest = {highest:g}: it must be 0 < lowest <= highest")
         path = Path(file).expanduser() if file else shipped(features)
         self.parameters = Parameters.load(path)
         if self.parameters.features != features:
             raise ValueError(f"{path}: features should be {features!r}, not {self.parameters.features!r}")
-        self.features, self.lowest, self.highest = features, lowest, highest
+        self.features, self.lowest, self.highest, self.level = features, lowest, highest, level
 
     def reset(self, instruments: Instruments) -> None:
         """Begin a run. The network was trained with a model that does not use the IMU."""
         super().reset(Instruments(list(instruments.values()), None, instruments.step))
         self._inputs = Features(self.features, instruments)
         self._seen: list[float] | None = None
+        self._levels: dict[str, Level] = {}
 
     def adapt(self, innovation: Innovation) -> Array | None:
         """The noise to use; also updates the motion from compass and log."""
-        self._seen = self._inputs.observe(innovation)
-        return super().adapt(innovation)
+        if self.level == "datasheet" or not equation_of_kind(innovation.measurement.kind).has_height:
+            self._seen = self._inputs.observe(innovation)
+            return super().adapt(innovation)
+        level = self._levels.setdefault(innovation.measurement.instrument, Level())
+        relative = innovation._replace(noise=innovation.noise * level.value)
+        level.observe(innovation)
+        self._seen = self._inputs.observe(relative)
+        return super().adapt(relative)
 
     def choose(self, innovation: Innovation) -> Array:
         """The noise scaled by the network, for a fix; the nominal noise for anything else."""

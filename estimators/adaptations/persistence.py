@@ -61,4 +61,4 @@ class Course:
         distribution of chi-square*, PNAS 17, 1931.
         """
         spread = 2.0 / (9.0 * self._freedom)
-        return self._squares > self._freedom * (1.0 - spread + quantile * spread**0.5) ** 3
+        return bool(self._squares > self._freedom * (1.0 - spread + quantile * spread**0.5) ** 3)

@@ -23,6 +23,7 @@ from typing import Any
 import numpy as np
 
 from simnav.estimators.models.channels import of_channels, whole
+from simnav.estimators.models.declared_errors import error_of_fault
 from simnav.estimators.models.fault_states import FaultState
 from simnav.recording import AidStream, FaultLabel, Recording
 from simnav.sensors.faults import FAULTS, effect_of, size_by_component, size_range
@@ -82,7 +83,8 @@ class TrueNoise(Adaptation):
                 mask = 1 << j | (found[key][1] if key in found else 0)
                 factor: Callable[[float], float] = partial(self._factor, name, mask, fault.start if growing else None)
                 time = float(fault.parameters.get("correlation_time", np.inf))
-                found[key] = FaultState(name, np.abs(size), time, factor), mask
+                block = error_of_fault(self._streams[name][0].kind, size, time)
+                found[key] = FaultState(name, block, factor), mask
                 self._states[name] |= mask
         return [state for state, _ in found.values()]
 

@@ -29,8 +29,8 @@ the next nominal value, as in an extended Kalman filter.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import replace
+from itertools import islice
 from math import remainder, tau
 from typing import NamedTuple
 
@@ -50,17 +50,17 @@ from simnav.types import (
     TriadDatasheet,
 )
 
-from .base import ErrorModel, Linearised, is_fast, stationary
+from .base import ErrorModel, Linearised
+from .declared_errors import errors_of, errors_of_triad
 from .equations import equation_of
-from .inertial import CURRENT, CURRENT_TIME, InertialModel, roll_pitch_yaw
+from .inertial import InertialModel, roll_pitch_yaw
 from .propagation import correct_inertial
 from .state_blocks import StateBlocks
+from .sum_of_processes import apart, merged
 
 __all__ = ["AboutTruthModel"]
 
 _NAV, _INERTIAL = 9, 15
-#: In-run biases of the IMU that change faster than this are white noise [s], as in `InertialModel`.
-_SHORTEST = 1.0
 #: Times closer than this are one and the same [s].
 _SAME = 1e-6
 #: Three less the trace of a rotation matrix that is a vector product to third order: an angle of 3 mrad.
@@ -108,28 +108,30 @@ class AboutTruthModel(ErrorModel):
 
     def begin(self, start: InitialState, instruments: Instruments) -> Array:
         """Set the state; UnsuitableScenario without an IMU."""
-        self._states: list[tuple[float, float, float]] = []  # initial variance, decay, noise density
         self._imu_errors: list[_ImuError] = []
         self._aids: dict[str, _AidErrors] = {}
+        self.blocks = StateBlocks(_INERTIAL)
         imu = instruments.imu
         if imu is not None:
-            triads = [self._triad(t, first) for t, first in ((imu.gyroscope, 0), (imu.accelerometer, 3))]
+            triads = [
+                self._triad(f"{imu.name}.{name}", triad, unit, first)
+                for name, triad, unit, first in (
+                    ("gyroscope", imu.gyroscope, "deg_s", 0), ("accelerometer", imu.accelerometer, "m_s2", 3),
+                )
+            ]  # fmt: skip
             imu = replace(imu, gyroscope=triads[0], accelerometer=triads[1])
         sheets = [self._aid(sheet) for sheet in instruments.values()]
         self.nominal = InertialModel()
         own = self.nominal.begin(start, Instruments(sheets, imu, instruments.step))
         self.sheets, self.time = instruments, start.time
-        mine = [s for s in instruments.values() if s.name in self.nominal.own]
-        self.blocks = StateBlocks(mine, _INERTIAL + len(self._states))
-        self._states += self.blocks.states
+        self.blocks.bring(s for s in instruments.values() if s.name in self.nominal.own)
         #: Places of the blocks in y, and in the error of the nominal state, where their values are.
-        self._block_at = [(at, self.nominal.blocks.at[label]) for label, at in self.blocks.at.items()]
-        n = self.size = _INERTIAL + len(self._states)
-        variance, rate, density = np.array(self._states).reshape(-1, 3).T
+        self._block_at = [(self.blocks.at[label], self.nominal.blocks.at[label]) for label in self.blocks.brought]
+        n = self.size = self.blocks.size
+        variance, _, _ = self.blocks.columns(_INERTIAL)
         covariance = np.zeros((n, n))
         covariance[:_INERTIAL, :_INERTIAL] = own[:_INERTIAL, :_INERTIAL]
         covariance[range(_INERTIAL, n), range(_INERTIAL, n)] = variance
-        self._rate, self._density = rate, density
         self._unused = np.zeros_like(own)
         self._axes = np.array([_NAV + e.axis for e in self._imu_errors], dtype=np.intp)
         self._times = np.array([e.times for e in self._imu_errors], dtype=np.intp)
@@ -139,61 +141,41 @@ class AboutTruthModel(ErrorModel):
         self._anchor()
         return covariance
 
-    def _state(self, variance: float, decay: float = 0.0, noise: float = 0.0) -> int:
-        self._states.append((variance, decay, noise))
-        return _INERTIAL + len(self._states) - 1
+    def _triad(self, name: str, triad: TriadDatasheet, unit: str, first: int) -> TriadDatasheet:
+        """Make the states of a triad; return its datasheet with what is left for the inertial model.
 
-    def _several(self, sigmas: Iterable[float]) -> int:
-        """Constant states; the place of the first."""
-        first = _INERTIAL + len(self._states)
-        for sigma in sigmas:
-            self._state(float(sigma) ** 2)
-        return first
-
-    def _triad(self, triad: TriadDatasheet, first: int) -> TriadDatasheet:
-        """Make the states of a triad; return its datasheet with what is left for the inertial model."""
-        moving = triad.bias_instability > 0.0 and np.isfinite(triad.correlation_time)
-        if moving and triad.correlation_time >= _SHORTEST and (triad.bias or triad.rate_random_walk):
-            for axis in range(first, first + 3):
-                self._imu(_ImuError(axis, -1), triad.bias**2, triad.rate_random_walk**2)
+        The inertial model has a state for each in-run bias. Beside one, the rest of the bias is a state here.
+        """
+        errors = errors_of_triad(triad, unit)
+        bias = errors["bias"]
+        beside = tuple(p for p in bias.slow if p.process != "gauss_markov")
+        if beside and len(beside) < len(bias.slow):
+            self.blocks.add(name, "bias", merged(replace(bias, processes=beside)))
+            self._imu_errors += [_ImuError(axis, -1) for axis in range(first, first + 3)]
             triad = replace(triad, bias=0.0, rate_random_walk=0.0)
+        scale, misalignment = (iter(apart(errors[name])) for name in ("scale", "misalignment"))
         for axis in range(first, first + 3):
             for other in range(first, first + 3):
-                sigma = triad.scale if other == axis else triad.misalignment
-                if sigma > 0.0:
-                    self._imu(_ImuError(axis, other), sigma**2)
+                for _, _, rates in islice(scale if other == axis else misalignment, 1):
+                    self.blocks.add(name, f"axis_{axis - first}_by_{other - first}", [rates])
+                    self._imu_errors.append(_ImuError(axis, other))
         return replace(triad, scale=0.0, misalignment=0.0)
-
-    def _imu(self, error: _ImuError, variance: float, noise: float = 0.0) -> None:
-        assert len(self._imu_errors) == len(self._states)  # they come first
-        self._state(variance, 0.0, noise)
-        self._imu_errors.append(error)
 
     def _aid(self, sheet: Datasheet) -> Datasheet:
         """Make the states of an aid; return its datasheet with what is left for the inertial model."""
-        bias = [(i, self._state(b * b)) for i, b in enumerate(sheet.bias.tolist()) if b]
-        time = sheet.correlation_time
-        fast = is_fast(sheet)
-        if not fast:
-            for i, s in enumerate(sheet.bias_instability.tolist()):
-                if s and np.isfinite(time):
-                    bias.append((i, self._state(s * s, 1.0 / time, 2.0 * s * s / time)))
-                elif s:
-                    bias.append((i, self._state(0.0, 0.0, s * s)))
-        equation = equation_of(sheet)
-        if equation.through_water and self.water is None:
-            bias.append((0, self._state(*stationary(CURRENT, CURRENT_TIME)[:3])))
-        scale = misalignment = deviation = -1
-        if equation.has_scale and sheet.scale:
-            scale = self._state(sheet.scale**2)
-        if equation.in_body and np.any(sheet.misalignment):
-            misalignment = self._several(sheet.misalignment)
-        amplitude = float(sheet.details.get("deviation", 0.0))
-        if amplitude:
-            deviation = self._several([amplitude, amplitude])
-        self._aids[sheet.name] = _AidErrors(bias, scale, misalignment, deviation)
+        name, errors, bias = sheet.name, errors_of(sheet), []
+        for process, component, rates in apart(errors["bias"]):
+            bias.append((component, self.blocks.add(name, f"{process.name}_{component}", [rates])))
+        if "current" in errors and self.water is None:  # along the keel
+            bias.append((0, self.blocks.add(name, "current", merged(errors["current"])[:1])))
+        at = {
+            error: self.blocks.add(name, error, merged(errors[error]))
+            for error in ("scale", "misalignment", "deviation")
+            if error in errors and errors[error].processes
+        }
+        self._aids[name] = _AidErrors(bias, *(at.get(error, -1) for error in ("scale", "misalignment", "deviation")))
         none = np.zeros_like(sheet.bias)
-        white = sheet.bias_instability if fast else none
+        white = sheet.bias_instability if errors["bias"].fast else none
         return replace(sheet, bias=none, bias_instability=white, scale=0.0, misalignment=np.zeros(3))
 
     def _anchor(self) -> None:
@@ -263,7 +245,7 @@ class AboutTruthModel(ErrorModel):
         phi, m = self.transition, _INERTIAL
         phi[:m, :m] = self.nominal.transition
         index = np.arange(m, self.size)
-        decay = np.exp(-self._rate * elapsed)
+        decay, noise = self.blocks.step(elapsed)
         phi[index, index] = decay
         for at in self.blocks.clocks:
             phi[at, at + 1] = elapsed
@@ -271,9 +253,6 @@ class AboutTruthModel(ErrorModel):
             measured = self._measured(self.time, until)
             factor = np.append(measured, 1.0)[self._times]  # -1, for a bias, is the last
             phi[:_NAV, m : m + len(factor)] = factor * phi[:_NAV, self._axes]
-        noise = self._density * elapsed
-        moving = self._rate > 0.0
-        noise[moving] = self._density[moving] * (1.0 - decay[moving] ** 2) / (2.0 * self._rate[moving])
         covariance[:] = phi @ covariance @ phi.T
         covariance[:m, :m] += self.nominal.process_noise
         covariance[index, index] += noise
@@ -341,10 +320,9 @@ class AboutTruthModel(ErrorModel):
         """The state as an estimate, all nine components."""
         position, velocity, dcm = self._navigation()
         estimate = Estimate(self.time, position, velocity, roll_pitch_yaw(dcm), covariance[:_NAV, :_NAV].copy())
-        if self.blocks:
-            values = np.zeros(self.size)
+        if self.blocks.brought or self.reports_all:
+            values = self.y.copy()
             for mine, theirs in self._block_at:
-                here = slice(theirs.start - _INERTIAL, theirs.stop - _INERTIAL)
-                values[mine] = self.nominal.calibration[here] + self.y[mine]
-            estimate.states = self.blocks.report(values, 0, covariance)
+                values[mine] += self.nominal.calibration[theirs.start - _INERTIAL : theirs.stop - _INERTIAL]
+            estimate.states = self.blocks.report(values, 0, covariance, self.reports_all)
         return estimate

@@ -21,15 +21,11 @@ from simnav.types import (
     InitialState,
     Instruments,
     Measurement,
-    TriadDatasheet,
 )
 
 from .own_observation import OwnObservation
 
-__all__ = [
-    "ErrorModel", "GaussMarkov", "Linearised", "Observation", "aid_biases", "gauss_markov", "is_fast", "stationary",
-    "triad_bias",
-]  # fmt: skip
+__all__ = ["ErrorModel", "Linearised", "Observation"]
 
 #: A measurement of m components with the covariance P of n states: innovation (m,), P H' (n, m), H P H' (m, m) and
 #: noise (m, m).
@@ -79,6 +75,9 @@ class ErrorModel(ABC):
     size: int
     time: float
     own: Mapping[str, OwnObservation] = MappingProxyType({})
+    #: Whether `estimate` reports all states of instruments (`simnav.types.Estimate.states`), or only the blocks that
+    #: instruments bring along.
+    reports_all: bool = False
     #: Names of the arrays that `correct` changes.
     state: ClassVar[tuple[str, ...]] = ()
     #: Names of further arrays that `propagate` keeps from one call to the next.
@@ -280,83 +279,3 @@ class ErrorModel(ABC):
     @abstractmethod
     def estimate(self, covariance: Array) -> Estimate:
         """The state as an estimate at the present time."""
-
-
-class GaussMarkov(NamedTuple):
-    """A first-order Gauss-Markov bias, and white noise in place of faster errors.
-
-    Attributes
-    ----------
-    variance : float
-        Initial variance [x^2].
-    decay : float
-        Inverse of the correlation time [1/s].
-    noise : float
-        Density of the driving noise [x^2/s].
-    white : float
-        Density of white noise in the output [x^2 s].
-    """
-
-    variance: float
-    decay: float
-    noise: float
-    white: float
-
-
-def gauss_markov(
-    bias: float, instability: float, correlation_time: float, rate_random_walk: float = 0.0, *, shortest: float = 1.0
-) -> GaussMarkov:
-    """One Gauss-Markov state for a turn-on bias and an in-run bias together.
-
-    With the sigma b of the turn-on bias and the sigma s and correlation time tau of the in-run bias, their sum has the
-    autocovariance ``b^2 + s^2 exp(-t/tau)``. One state with the variance ``b^2 + s^2`` and the correlation time
-    ``tau (b^2 + s^2) / s^2`` has the same value and the same slope at lag 0, and a smaller autocovariance at all other
-    lags, so its variance after averaging is not too small. It is exact if b or s is zero.
-
-    Parameters
-    ----------
-    bias : float
-        Turn-on bias, one sigma [x].
-    instability, correlation_time : float
-        Stationary sigma [x] and correlation time [s] of the in-run bias; where the time is infinite it is a random walk
-        of ``instability`` per sqrt(s).
-    rate_random_walk : float
-        Density of the random walk of the bias [x/sqrt(s)].
-    shortest : float
-        A correlation time below this [s] is white noise of the same density at low frequency, 2 s^2 tau.
-    """
-    constant, moving = bias * bias, instability * instability
-    walk = rate_random_walk * rate_random_walk
-    if np.isinf(correlation_time):
-        return GaussMarkov(constant, 0.0, moving + walk, 0.0)
-    if correlation_time < shortest:
-        return GaussMarkov(constant, 0.0, walk, 2.0 * moving * max(correlation_time, 0.0))
-    if moving == 0.0:
-        return GaussMarkov(constant, 0.0, walk, 0.0)
-    total = constant + moving
-    return GaussMarkov(total, moving / (total * correlation_time), 2.0 * moving / correlation_time + walk, 0.0)
-
-
-def stationary(sigma: float, correlation_time: float) -> GaussMarkov:
-    """A state of a stationary sigma and a correlation time [s], which begins with that sigma."""
-    return GaussMarkov(sigma**2, 1.0 / correlation_time, 2.0 * sigma**2 / correlation_time, 0.0)
-
-
-def is_fast(sheet: Datasheet) -> bool:
-    """Whether the in-run bias of an aid changes from sample to sample, so that it is white noise."""
-    return sheet.correlation_time < 0.5 / sheet.rate
-
-
-def aid_biases(sheet: Datasheet) -> list[GaussMarkov]:
-    """The bias state of each component of an aid; a bias that `is_fast` has no part in it."""
-    return [
-        gauss_markov(b, s, sheet.correlation_time, shortest=0.5 / sheet.rate)
-        for b, s in zip(sheet.bias, sheet.bias_instability)
-    ]
-
-
-def triad_bias(triad: TriadDatasheet, extra: float = 0.0) -> GaussMarkov:
-    """The bias state of three gyroscopes or accelerometers; ``extra`` adds to the turn-on bias."""
-    return gauss_markov(
-        float(np.hypot(triad.bias, extra)), triad.bias_instability, triad.correlation_time, triad.rate_random_walk
-    )

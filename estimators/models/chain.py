@@ -13,7 +13,8 @@ prediction is then a function of that node through the motion between them, and 
 noise of the measurement. Two measurements that are folded onto one node share a part of this noise; this correlation is
 neglected.
 
-A subclass compiles four loops over a window: `linearise_motion`, `linearise_aids`, `retract`, `along_motion`.
+A subclass has the loops over a window: `linearise_motion`, `observe`, `move_folds`, `retract`, `along_motion`. All but
+`observe` are in `simnav.estimators.models.moving_chain` for models whose motion depends on state and time only.
 """
 
 from __future__ import annotations

@@ -37,6 +37,7 @@ from typing import Literal
 
 import numpy as np
 
+from simnav.blocks import StateBlock
 from simnav.estimator import UnsuitableScenario
 from simnav.estimator.needs import IMU, Needs
 from simnav.geometry.earth import ROTATION_RATE, gravity
@@ -44,8 +45,10 @@ from simnav.kinds import BODY_VELOCITY, POSITION, VELOCITY, kinds_with
 from simnav.types import Array, Datasheet, InitialState, Instruments, Measurement
 
 from .base import Linearised
+from .declared_errors import errors_of
 from .inertial import InertialModel
 from .measurements import DVL, observe
+from .sum_of_processes import merged
 
 __all__ = ["DELAY", "LEVER_ARM", "MISALIGNMENT", "SCALE", "DvlCalibrationModel"]
 
@@ -105,9 +108,12 @@ class DvlCalibrationModel(InertialModel):
                 self.noise[sheet.name] = _PRINTED[sheet.equation] ** 2 * np.eye(3)
         return covariance
 
-    def _more_states(self) -> list[tuple[float, float, float]]:
-        sigmas = [*self._dvl.misalignment, *[self.lever_arm] * 3, self._dvl.scale, self.delay]
-        return [(float(s) ** 2, 0.0, 0.0) for s in sigmas]
+    def _more_blocks(self) -> None:
+        name, errors = self._dvl.name, errors_of(self._dvl)
+        self.blocks.add(name, "misalignment", merged(errors["misalignment"]))
+        self.blocks.add(name, "lever_arm", StateBlock("lever_arm", 3, "m", self.lever_arm).rates())
+        self.blocks.add(name, "scale", merged(errors["scale"]))
+        self.blocks.add(name, "delay", StateBlock("delay", 1, "s", self.delay).rates())
 
     def measure(self, measurement: Measurement) -> Linearised | None:
         """Linearise one measurement: the DVL as in the module, others as in `simnav.estimators.models.measurements`."""

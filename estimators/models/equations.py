@@ -8,6 +8,7 @@ reading alone is a function (`simnav.estimators.models.readings`).
 from __future__ import annotations
 
 from collections.abc import Mapping
+from types import MappingProxyType
 from typing import ClassVar
 
 import numpy as np
@@ -20,6 +21,9 @@ from . import measurements as codes
 from .readings import READINGS
 
 __all__ = ["EQUATIONS", "Equation", "equation_of", "equation_of_kind"]
+
+
+_NO_ERRORS: Mapping[str, Array] = MappingProxyType({})
 
 
 class Equation:
@@ -57,9 +61,26 @@ class Equation:
     has_scale: ClassVar[bool] = False
     calibrates: ClassVar[bool] = False
 
-    def read(self, point: NavigationPoint, sheet: Datasheet) -> Array | None:
-        """The (d,) reading at a state, without bias and scale factor; None where there is none."""
-        return READINGS[self.name](point, sheet)
+    def read(self, point: NavigationPoint, sheet: Datasheet, errors: Mapping[str, Array] = _NO_ERRORS) -> Array | None:
+        """The (d,) reading at a state; None where there is none.
+
+        Parameters
+        ----------
+        point : NavigationPoint
+            The state.
+        sheet : Datasheet
+            Datasheet of the instrument.
+        errors : mapping of str to array
+            Values of its errors but the bias, by name (`simnav.estimators.models.declared_errors`). ``current``, north
+            and east, is the velocity of the water.
+        """
+        if self.through_water and "current" in errors:
+            point = point._replace(velocity=point.velocity - np.append(errors["current"], 0.0))
+        reading = READINGS[self.name](point, sheet)
+        if reading is None or errors.keys().isdisjoint(("scale", "misalignment")):
+            return reading
+        turned = np.cross(reading, errors["misalignment"]) if "misalignment" in errors else 0.0
+        return np.asarray((1.0 + errors.get("scale", 0.0)) * reading + turned)
 
     def white_noise(self, sheet: Datasheet, faster: Array | float, rate_variance: float) -> Array:
         """(d, d) noise: that of the instrument, biases ``faster`` than a state, gyroscope noise times the lever arm."""
@@ -69,12 +90,6 @@ class Equation:
 
     def _add_rate_noise(self, noise: Array, arm: Array, rate_variance: float) -> None:
         """Add the noise of the gyroscopes to that of a velocity, in place; here there is none."""
-
-    def scale_sigmas(self, sheet: Datasheet) -> tuple[float, ...]:
-        """The sigmas of scale factor and misalignment, which are states; empty without any error."""
-        if not (self.calibrates and (sheet.scale or np.any(sheet.misalignment))):
-            return ()
-        return (sheet.scale, *(sheet.misalignment if self.in_body else ()))
 
     def uncalibrated_noise(self, sheet: Datasheet, predicted: Array) -> Array:
         """(d, d) noise in place of a scale factor and a misalignment without states, at a ``predicted`` velocity."""

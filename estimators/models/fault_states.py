@@ -18,9 +18,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from simnav.blocks import StateBlock
 from simnav.types import Array, Datasheet, Estimate, ImuSamples, InitialState, Instruments, Measurement
 
 from .base import ErrorModel, Linearised
+from .state_blocks import StateBlocks
 
 __all__ = ["FaultState", "FaultStateModel"]
 
@@ -32,17 +34,14 @@ class FaultState(NamedTuple):
     ----------
     instrument : str
         Name of the instrument, or the source of a channel (`simnav.types.Measurement.source`).
-    sigma : (d,) array
-        Standard deviation of each component; a component with 0 has no state.
-    correlation_time : float
-        Correlation time [s]; infinite for a constant.
+    block : StateBlock
+        The error; a component of the sigma 0 has no state.
     factor : callable
         Function from the time of a measurement [s] to the factor of the state in it; 0 if the fault does not affect it.
     """
 
     instrument: str
-    sigma: Array
-    correlation_time: float
+    block: StateBlock
     factor: Callable[[float], float]
 
 
@@ -65,17 +64,17 @@ class FaultStateModel(ErrorModel):
         own = self.inner.begin(start, instruments)
         self.time, n = start.time, len(own)
         self._of: dict[str, list[tuple[FaultState, NDArray[np.intp], int]]] = {}
-        sigma, rate = [0.0] * n, [0.0] * n
-        for fault in self.faults:
-            axes = np.flatnonzero(fault.sigma)
-            self._of.setdefault(fault.instrument, []).append((fault, axes, len(sigma)))
-            sigma += fault.sigma[axes].tolist()
-            rate += [1.0 / fault.correlation_time] * len(axes)
-        self.size = len(sigma)
-        self._variance, self._rate = np.array(sigma[n:]) ** 2, np.array(rate[n:])
+        self.blocks = StateBlocks(n)
+        for j, fault in enumerate(self.faults):
+            axes, rates = np.flatnonzero(fault.block.sigma), fault.block.rates()
+            at = self.blocks.add(fault.instrument, f"{fault.block.name}_{j}", [rates[axis] for axis in axes])
+            self._of.setdefault(fault.instrument, []).append((fault, axes, at))
+        self.size = self.blocks.size
+        self._variance, self._rate, _ = self.blocks.columns(n)
         self.values = np.zeros(self.size - n)
-        covariance = np.diag(np.square(sigma))
+        covariance = np.zeros((self.size, self.size))
         covariance[:n, :n] = own
+        covariance[range(n, self.size), range(n, self.size)] = self._variance
         return covariance
 
     def observes(self, instrument: Datasheet) -> bool:
@@ -142,6 +141,10 @@ class FaultStateModel(ErrorModel):
         self.values[:] = snapshot[-1]
 
     def estimate(self, covariance: Array) -> Estimate:
-        """As the model within."""
+        """As the model within, and on request the states of the faults."""
         n = self.inner.size
-        return self.inner.estimate(covariance[:n, :n].copy())
+        self.inner.reports_all = self.reports_all
+        estimate = self.inner.estimate(covariance[:n, :n].copy())
+        if self.reports_all:
+            estimate.states = {**estimate.states, **self.blocks.report(self.values, n, covariance, everything=True)}
+        return estimate

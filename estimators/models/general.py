@@ -12,15 +12,18 @@ A subclass says in plain NumPy
 
 From these come the transition matrix, the Jacobian of each measurement, sigma points, and the chain for windows and
 full graphs (`GeneralChain`). Derivatives are central differences. A subclass may override `transition` or `read` with
-faster forms. After its own states come the biases of the instruments, if their datasheets have any, and the blocks that
-instruments bring along (`simnav.blocks`). Scale factors and misalignments have no states.
+faster forms. After its own states come the errors of its instruments
+(`simnav.estimators.models.sum_of_processes.merged_states`) and the blocks that instruments bring along
+(`simnav.blocks`).
 
-`simnav.estimators.models.inertial` and `simnav.estimators.models.ship` are compiled forms for their states.
+`simnav.estimators.models.inertial` and `simnav.estimators.models.ship` are compiled forms of such models. In the tests
+both stand in the general form, too, with the same blocks, and give the same numbers (``tests/cases/general_forms.py``).
 """
 
 from __future__ import annotations
 
 from abc import abstractmethod
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import ClassVar
 
@@ -30,12 +33,15 @@ from numpy.typing import NDArray
 from simnav.kinds import NavigationPoint
 from simnav.types import KINDS, NO_SIDE, Array, Datasheet, Estimate, InitialState, Instruments, Measurement
 
-from .base import Linearised, aid_biases, is_fast
+from .base import Linearised
 from .chain import Chain, Columns, chain_of
+from .declared_errors import bias_of
 from .equations import EQUATIONS, equation_of
+from .moving_chain import MovingChain, MovingModel
 from .own_observation import OwnObservation
 from .points import PointModel
 from .state_blocks import StateBlocks
+from .sum_of_processes import merged_states
 
 __all__ = ["GeneralChain", "GeneralModel"]
 
@@ -43,7 +49,7 @@ __all__ = ["GeneralChain", "GeneralModel"]
 PART, SMALLEST = 1e-3, 1e-6
 
 
-class GeneralModel(PointModel):
+class GeneralModel(PointModel, MovingModel):
     """The model of the module; a subclass defines its abstract methods.
 
     Attributes
@@ -51,17 +57,21 @@ class GeneralModel(PointModel):
     x : (m,) array
         The state of the motion.
     extra : (k,) array
-        Biases of the instruments, then the blocks that they bring along.
+        Errors of the instruments, then the blocks that they bring along.
     blocks : StateBlocks
         The blocks, and their places in the error.
     equations : tuple of str
         Measurement equations (`simnav.kinds.EQUATIONS`) that the model uses; also every kind with an observation of its
         own. Subclasses may override it.
+    errors : tuple of str
+        Errors of instruments that have states (`simnav.estimators.models.declared_errors`). A subclass leaves out what
+        is among its own states, and returns it from `own_errors`.
     """
 
     state = ("x", "extra")
     moving = (slice(0, 0), slice(0, 0))
     equations: ClassVar[tuple[str, ...]] = tuple(EQUATIONS)
+    errors: ClassVar[tuple[str, ...]] = ("bias", "current", "scale", "misalignment")
 
     @abstractmethod
     def initial(self, start: InitialState, instruments: Instruments) -> tuple[Array, Array]:
@@ -83,6 +93,10 @@ class GeneralModel(PointModel):
     def describe(self, x: Array, time: float, covariance: Array) -> Estimate:
         """A state with the (n, n) covariance of its error as an estimate."""
 
+    def own_errors(self, x: Array) -> Mapping[str, Array]:
+        """Values of errors that are among the model's own states, by name, like a ``current``; by default none."""
+        return {}
+
     def retract(self, x: Array, error: Array) -> Array:
         """The state that differs from another by an (n,) error; by default their sum."""
         return np.asarray(x + error)
@@ -92,20 +106,20 @@ class GeneralModel(PointModel):
         return np.asarray(x - reference)
 
     def read(self, x: Array, time: float, sheet: Datasheet, extra: Array, side: Array = NO_SIDE) -> Array | None:
-        """What an instrument should read at a state: (d,) array, or None; with its bias and the blocks in ``extra``.
+        """What an instrument should read at a state: (d,) array, or None; with its errors and the blocks in ``extra``.
 
         ``side`` is the (s,) side information of the reading of a channel.
         """
         own = self.own.get(sheet.name)
         point = self.navigation(x, time)
+        errors = {**self.own_errors(x), **{name: extra[at] for name, at in self._errors_at[sheet.name].items()}}
         if own is None:
-            reading = equation_of(sheet).read(point, sheet)
+            reading = equation_of(sheet).read(point, sheet, errors)
         else:
             reading = own.read(point._replace(blocks=own.blocks(extra), channel=own.channel, side=side))
-        at = self._bias_at.get(sheet.name, -1)
-        if reading is None or at < 0:
+        if reading is None or "bias" not in errors:
             return reading
-        return KINDS[sheet.kind].add_error(reading, extra[at : at + len(reading)])
+        return KINDS[sheet.kind].add_error(reading, errors["bias"])
 
     def observes(self, instrument: Datasheet) -> bool:
         """Whether the model uses an instrument."""
@@ -117,24 +131,22 @@ class GeneralModel(PointModel):
         x, own = self.initial(start, instruments)
         self.x, self.n_own = np.array(x, dtype=np.float64), len(own)
         self.sheets = {name: s for name, s in instruments.items() if self.observes(s)}
-        rates: list[tuple[float, float, float]] = []
-        self._bias_at: dict[str, int] = {}
+        self.blocks = StateBlocks(self.n_own)
+        self._errors_at: dict[str, dict[str, slice]] = {}
         self._white: dict[str, Array] = {}
         for name, sheet in self.sheets.items():
-            white = sheet.sigma**2 + (sheet.bias_instability**2 if is_fast(sheet) else 0.0)
-            self._white[name] = np.diag(white)
-            biases = aid_biases(sheet)
-            if any(b.variance or b.noise for b in biases):
-                self._bias_at[name] = len(rates)
-                rates += [(b.variance, b.decay, b.noise) for b in biases]
+            self._white[name] = np.diag(sheet.sigma**2 + bias_of(sheet).white_variance())
+            at = self._errors_at[name] = {}
+            for error, rates in merged_states(sheet).items():
+                if error in self.errors:
+                    first = self.blocks.add(name, error, rates) - self.n_own
+                    at[error] = slice(first, first + len(rates))
         brought = [s for s in self.sheets.values() if KINDS[s.kind].observation is not None]
-        self.blocks = StateBlocks(brought, self.n_own + len(rates))
-        rates += self.blocks.states
-        places = {s.name: self.blocks.places(s.name, self.n_own) for s in brought}
-        self.own = {s.name: OwnObservation(s, places[s.name], start.time) for s in brought}
-        self.extra = np.zeros(len(rates))
-        variance, self._decay, self._density = np.array(rates).reshape(-1, 3).T.copy()
-        self.size = self.n_own + len(rates)
+        self.blocks.bring(brought)
+        self.own = {s.name: OwnObservation(s, self.blocks.places(s.name, self.n_own), start.time) for s in brought}
+        self.size = self.blocks.size
+        self.extra = np.zeros(self.size - self.n_own)
+        variance, _, _ = self.blocks.columns(self.n_own)
         covariance = np.zeros((self.size, self.size))
         covariance[: self.n_own, : self.n_own] = own
         covariance[range(self.n_own, self.size), range(self.n_own, self.size)] = variance
@@ -146,8 +158,8 @@ class GeneralModel(PointModel):
     # --- what follows
 
     def moved_extra(self, extra: Array, elapsed: float) -> Array:
-        """(k,) or (j, k) biases and blocks after a time [s]."""
-        moved = np.asarray(extra * np.exp(-self._decay * elapsed))
+        """(k,) or (j, k) errors and blocks after a time [s]."""
+        moved = np.asarray(extra * self.blocks.step(elapsed)[0])
         self.blocks.carry_values(moved.T, self.n_own, elapsed)
         return moved
 
@@ -160,7 +172,7 @@ class GeneralModel(PointModel):
             step[j] = self._steps[j]
             ends = [self.difference(self.move(self.retract(x, s * step), elapsed), moved) for s in (1.0, -1.0)]
             F[:m, j] = (ends[0] - ends[1]) / (2.0 * step[j])
-        F[range(m, self.size), range(m, self.size)] = np.exp(-self._decay * elapsed)
+        F[range(m, self.size), range(m, self.size)] = self.blocks.step(elapsed)[0]
         for at in self.blocks.clocks:
             F[at, at + 1] = elapsed
         return F
@@ -172,13 +184,9 @@ class GeneralModel(PointModel):
             return
         moved = self.move(self.x, elapsed)
         F = self._last = self.transition(self.x, moved, elapsed)
-        added = self._density * elapsed
-        varies = self._decay > 0.0
-        rate = self._decay[varies]
-        added[varies] = self._density[varies] * -np.expm1(-2.0 * rate * elapsed) / (2.0 * rate)
         covariance[:] = F @ covariance @ F.T
         covariance[:m, :m] += self.noise(self.x, elapsed)
-        covariance[range(m, self.size), range(m, self.size)] += added
+        covariance[range(m, self.size), range(m, self.size)] += self.blocks.step(elapsed)[1]
         self.blocks.add_noise(covariance, elapsed)
         covariance[:] = 0.5 * (covariance + covariance.T)
         self.x[:], self.extra[:], self.time = moved, self.moved_extra(self.extra, elapsed), until
@@ -211,9 +219,7 @@ class GeneralModel(PointModel):
 
     def _extra_of(self, name: str) -> list[int]:
         """Which of ``extra`` an instrument depends on."""
-        at = self._bias_at.get(name)
-        biases = [] if at is None else list(range(at, at + len(self._white[name])))
-        return biases + [k - self.n_own for place in self.blocks.of(name) for k in range(place.start, place.stop)]
+        return [k - self.n_own for place in self.blocks.of(name) for k in range(place.start, place.stop)]
 
     def measure(self, measurement: Measurement) -> Linearised | None:
         """Linearise one measurement at the present state."""
@@ -256,16 +262,35 @@ class GeneralModel(PointModel):
                 differences[k] = kind.difference(there, reading)
         return np.asarray(differences)
 
+    def move_all(self, states: tuple[Array, ...], elapsed: Array, jacobian: Array | None = None) -> None:
+        """As `MovingModel.move_all`."""
+        for k, (x, extra, time) in enumerate(zip(*states, elapsed.tolist(), strict=True)):
+            moved = self.move(x, time)
+            if jacobian is not None:
+                jacobian[k] = self.transition(x, moved, time)
+            x[:], extra[:] = moved, self.moved_extra(extra, time)
+
+    def difference_all(self, states: tuple[Array, ...], others: tuple[Array, ...]) -> Array:
+        """As `MovingModel.difference_all`."""
+        own = [self.difference(x, other) for x, other in zip(states[0], others[0], strict=True)]
+        return np.hstack([np.reshape(own, (len(own), self.n_own)), states[1] - others[1]])
+
+    def retract_all(self, states: tuple[Array, ...], steps: Array) -> None:
+        """As `MovingModel.retract_all`."""
+        for x, step in zip(states[0], steps, strict=True):
+            x[:] = self.retract(x, step[: self.n_own])
+        states[1][...] += steps[:, self.n_own :]
+
     def estimate(self, covariance: Array) -> Estimate:
         """The state as an estimate."""
         m = self.n_own
         estimate = self.describe(self.x.copy(), self.time, covariance[:m, :m])
-        states = self.blocks.report(self.extra, m, covariance) if self.blocks else {}
+        states = self.blocks.report(self.extra, m, covariance, self.reports_all)
         return replace(estimate, states={**estimate.states, **states})
 
 
-class GeneralChain(Chain):
-    """The chain of a general model: a motion factor is the motion itself, from the present state of the older node.
+class GeneralChain(MovingChain):
+    """The chain of a general model.
 
     Parameters
     ----------
@@ -274,23 +299,6 @@ class GeneralChain(Chain):
     """
 
     front: GeneralModel
-
-    def _moved(self, k: int, elapsed: float) -> tuple[Array, Array, Array]:
-        """Where a node leads in a time: its two arrays, and the derivative."""
-        front, x, extra = self.front, self.nodes["x"][k], self.nodes["extra"][k]
-        moved = front.move(x, elapsed)
-        return moved, front.moved_extra(extra, elapsed), front.transition(x, moved, elapsed)
-
-    def _difference(self, x: Array, extra: Array, other: Array, other_extra: Array) -> Array:
-        return np.concatenate([self.front.difference(x, other), extra - other_extra])
-
-    def linearise_motion(self, first: int = 0) -> None:
-        """As `Chain.linearise_motion`."""
-        nodes, motions = self.nodes, self.motions
-        for k in range(first, len(motions)):
-            x, extra, F = self._moved(k, float(nodes["time"][k + 1] - nodes["time"][k]))
-            motions["residual"][k] = self._difference(nodes["x"][k + 1], nodes["extra"][k + 1], x, extra)
-            motions["jacobian"][k] = F
 
     def observe(self, first: int, row: NDArray[np.int64], states: Columns, prefix: str, jacobian: Array) -> None:
         """As `Chain.observe`."""
@@ -303,35 +311,6 @@ class GeneralChain(Chain):
             found = self.front.linearise(name, aids["time"][i], aids["value"][i, :d], x[row[i]], extra[row[i]], side)
             if found is not None:
                 aids["residual"][i, :d], jacobian[i, :d], aids["components"][i] = *found, d
-
-    def move_folds(self, first: int) -> None:
-        """As `Chain.move_folds`."""
-        nodes, folds = self.nodes, self.folds
-        for i in range(first, len(folds)):
-            k = int(folds["node"][i]) - self.base
-            elapsed = float(folds["time"][i] - nodes["time"][k])
-            folds["now_x"][i], folds["now_extra"][i], folds["jacobian"][i] = self._moved(k, elapsed)
-
-    def retract(self, step: Array) -> None:
-        """As `Chain.retract`; the motion factors need no shifts."""
-        front, nodes, m = self.front, self.nodes, self.front.n_own
-        for k, each in enumerate(step):
-            nodes["x"][k] = front.retract(nodes["x"][k], each[:m])
-        nodes["extra"][...] += step[:, m:]
-        self.prior_shift = self.relative_shift(self.prior_shift, step[0])
-
-    def along_motion(self, step: Array) -> Array:
-        """As `Chain.along_motion`."""
-        front, nodes, motions, m = self.front, self.nodes, self.motions, self.front.n_own
-        along = np.empty_like(step)
-        along[0] = step[0]
-        for k in range(len(motions)):
-            error = motions["residual"][k] + step[k + 1] - motions["jacobian"][k] @ step[k]
-            elapsed = float(nodes["time"][k + 1] - nodes["time"][k])
-            x = front.move(front.retract(nodes["x"][k], along[k, :m]), elapsed)
-            extra = front.moved_extra(nodes["extra"][k] + along[k, m:], elapsed)
-            along[k + 1] = error + self._difference(x, extra, nodes["x"][k + 1], nodes["extra"][k + 1])
-        return along
 
 
 @chain_of.register

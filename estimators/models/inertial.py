@@ -32,6 +32,7 @@ added to the next increment, so that its sum stays within one step; it is neglec
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from math import atan2, exp, hypot
 from typing import Any, ClassVar
 
@@ -55,15 +56,8 @@ from simnav.types import (
     Measurement,
 )
 
-from .base import (
-    ErrorModel,
-    Linearised,
-    Observation,
-    aid_biases,
-    is_fast,
-    stationary,
-    triad_bias,
-)
+from .base import ErrorModel, Linearised, Observation
+from .declared_errors import CURRENT, bias_of, bias_of_triad
 from .equations import EQUATIONS, equation_of
 from .inertial_update import absorb_inertial, assimilate_inertial, innovate_inertial
 from .measurements import (
@@ -81,13 +75,12 @@ from .propagation import (
     propagate_inertial,
 )
 from .state_blocks import StateBlocks
+from .sum_of_processes import merged, merged_states
 
 __all__ = ["InertialModel", "roll_pitch_yaw"]
 
-#: Sigma and correlation time of each component of the current, for a speed log [m/s], [s].
-CURRENT, CURRENT_TIME = 0.5, 1800.0
-
-_NAV = 15
+#: Components of the error without calibration states, and without the biases of the IMU.
+_NAV, _MOTION = 15, 9
 _NO_TIMES, _NO_VECTORS = np.empty(0), np.empty((0, 3))
 _GRAVITY = 9.81
 
@@ -201,33 +194,42 @@ class InertialModel(ErrorModel):
         self._bind()
         self.transition, self.process_noise = np.empty((_NAV, _NAV)), np.empty((_NAV, _NAV))
         self.load(None)
-        gyro, level, vertical = self._sensors(imu)
+        self.blocks = StateBlocks(_MOTION)
+        self._imu(imu)
         self._aids()
-        n = self.size
+        n = self.size = self.blocks.size
+        variance, decay, density = self.blocks.columns(_MOTION)
+        self._decay, self._density = decay[6:], density[6:]
+        self.calibration = np.zeros(n - _NAV)
+        self._jacobians = {name: np.empty((len(noise), n)) for name, noise in self.noise.items()}
         covariance = np.zeros((n, n))
-        covariance[:9, :9] = start.covariance
-        variance = [*[gyro] * 3, level, level, vertical, *(v for v, _, _ in self._states)]
-        covariance[range(9, n), range(9, n)] = variance
+        covariance[:_MOTION, :_MOTION] = start.covariance
+        covariance[range(_MOTION, n), range(_MOTION, n)] = variance
         return covariance
 
-    def _sensors(self, imu: ImuDatasheet) -> tuple[float, float, float]:
-        """Noise of the IMU; return the bias variances: gyroscopes, level accelerometers, vertical accelerometer."""
+    def _imu(self, imu: ImuDatasheet) -> None:
+        """The biases of the IMU and its noise."""
         g, a = imu.gyroscope, imu.accelerometer
-        gyro = triad_bias(g)
         # A level vehicle: gravity on the vertical axis, and on the others through their misalignment.
-        level, vertical = triad_bias(a, a.misalignment * _GRAVITY), triad_bias(a, a.scale * _GRAVITY)
+        level, vertical = (
+            bias_of_triad(replace(a, bias=float(np.hypot(a.bias, share * _GRAVITY))), "m_s2")
+            for share in (a.misalignment, a.scale)
+        )
+        gyro, acceleration = bias_of_triad(g, "deg_s"), [*merged(level)[:2], merged(vertical)[2]]
+        turning = merged(gyro)
+        self.blocks.add(imu.name, "gyroscope_bias", turning)
+        self.blocks.add(imu.name, "accelerometer_bias", acceleration)
         dt = 1.0 / imu.rate
-        gyro_white = g.random_walk**2 + gyro.white
+        gyro_white = g.random_walk**2 + float(gyro.white_density()[0])
         self._noise = np.array([
             gyro_white,
-            a.random_walk**2 + level.white,
-            gyro.decay, gyro.noise,
-            min(level.decay, vertical.decay), max(level.noise, vertical.noise),
+            a.random_walk**2 + float(level.white_density()[0]),
+            turning[0].decay, turning[0].noise,
+            min(x.decay for x in acceleration), max(x.noise for x in acceleration),
             g.scale**2 * TURN_TIME, g.misalignment**2 * TURN_TIME,
             dt,
         ])  # fmt: skip
         self._rate_variance = 2.5 * gyro_white / dt  # of 3/2 of a sample less 1/2 of the one before
-        return gyro.variance, level.variance, vertical.variance
 
     def _aids(self) -> None:
         """Calibration states and white noise of the aiding instruments."""
@@ -237,47 +239,35 @@ class InertialModel(ErrorModel):
         self.uncalibrated: set[str] = set()
         self.aid_parameters: dict[str, Aid] = {}
         self.own: dict[str, OwnObservation] = {}
-        self._states: list[tuple[float, float, float]] = []  # initial variance, decay, noise density
-        for sheet in self.instruments.values():
-            if not self.observes(sheet):
-                continue
-            equation, states = equation_of(sheet), aid_biases(sheet)
-            white = sheet.bias_instability**2 if is_fast(sheet) else np.zeros(len(states))
-            if equation.through_water and self.calibrate:
-                states += 2 * [stationary(CURRENT, CURRENT_TIME)]
-            if not self.calibrate:
+        observed = [sheet for sheet in self.instruments.values() if self.observes(sheet)]
+        for sheet in observed:
+            bias, equation, states = bias_of(sheet), equation_of(sheet), merged_states(sheet)
+            white = bias.white_variance()
+            if self.calibrate:
+                at = {name: self.blocks.add(sheet.name, name, rates) for name, rates in states.items()}
+                for places, name in ((self.bias_at, "bias"), (self.scale_at, "scale")):
+                    if name in at:
+                        places[sheet.name] = at[name]
+            else:
                 along_keel = CURRENT**2 if equation.through_water else 0.0
-                white = white + [s.variance + along_keel for s in states]
-            elif any(s.variance or s.noise for s in states):
-                self.bias_at[sheet.name] = _NAV + len(self._states)
-                self._states += [(s.variance, s.decay, s.noise) for s in states]
-            if sigmas := equation.scale_sigmas(sheet):
-                if self.calibrate:
-                    self.scale_at[sheet.name] = _NAV + len(self._states)
-                    self._states += [(x * x, 0.0, 0.0) for x in sigmas]
-                else:
+                white = white + [rates.variance + along_keel for rates in merged(bias)]
+                if "scale" in states:
                     self.uncalibrated.add(sheet.name)
             self.noise[sheet.name] = equation.white_noise(sheet, white, self._rate_variance)
             self.aid_parameters[sheet.name] = (
                 equation.code, np.array(sheet.lever_arm, dtype=np.float64),
                 self.bias_at.get(sheet.name, -1), self.scale_at.get(sheet.name, -1),
             )  # fmt: skip
-        self._states += self._more_states()
-        own = [s for s in self.instruments.values() if s.name in self.noise and KINDS[s.kind].observation is not None]
-        self.blocks = StateBlocks(own if self.calibrate else [], _NAV + len(self._states))
-        self._states += self.blocks.states
+        self._more_blocks()
+        own = [sheet for sheet in observed if KINDS[sheet.kind].observation is not None]
+        if self.calibrate:
+            self.blocks.bring(own)
         for sheet in own:
             self.own[sheet.name] = OwnObservation(sheet, self.blocks.places(sheet.name, _NAV), self.time)
         self._fused = set(self.noise) - self.uncalibrated - set(self.own) if self.fused else set()
-        self.size = _NAV + len(self._states)
-        self._jacobians = {name: np.empty((len(noise), self.size)) for name, noise in self.noise.items()}
-        self.calibration = np.zeros(len(self._states))
-        self._decay = np.array([d for _, d, _ in self._states])
-        self._density = np.array([q for _, _, q in self._states])
 
-    def _more_states(self) -> list[tuple[float, float, float]]:
-        """A hook: initial variance, decay and noise density of further calibration states."""
-        return []
+    def _more_blocks(self) -> None:
+        """A hook: append further blocks of calibration states."""
 
     def observes(self, instrument: Datasheet) -> bool:
         """Every kind of instrument that has a measurement equation."""
@@ -341,7 +331,7 @@ class InertialModel(ErrorModel):
         propagate_covariance(
             covariance, self.transition, self.process_noise, self.calibration, self._decay, self._density, elapsed
         )
-        if self.blocks:
+        if self.blocks.clocks:
             self.blocks.carry_values(self.calibration, _NAV, elapsed)
             self.blocks.carry_covariance(covariance, elapsed)
 
@@ -354,7 +344,7 @@ class InertialModel(ErrorModel):
             error[:m] = self.transition @ error[:m]
             if len(self._decay):
                 error.T[..., m:] *= np.exp(-self._decay * elapsed)
-        if self.blocks:
+        if self.blocks.clocks:
             self.blocks.carry(error, elapsed)
 
     @property
@@ -449,8 +439,9 @@ class InertialModel(ErrorModel):
         """The state as an estimate, all nine components."""
         attitude = roll_pitch_yaw(self.dcm)
         estimate = Estimate(self.time, self.position.copy(), self.velocity.copy(), attitude, covariance[:9, :9].copy())
-        if self.blocks:
-            estimate.states = self.blocks.report(self.calibration, _NAV, covariance)
+        if self.blocks.brought or self.reports_all:
+            values = np.concatenate([self.bias, self.calibration])
+            estimate.states = self.blocks.report(values, _MOTION, covariance, self.reports_all)
         return estimate
 
 

@@ -218,7 +218,7 @@ class InertialPoints(InertialModel, PointModel):
                 errors,
             )  # fmt: skip
         errors[:, 15:] *= np.exp(-self._decay * elapsed)
-        if self.blocks:
+        if self.blocks.clocks:
             self.blocks.carry(errors.T, elapsed)
         return noise
 

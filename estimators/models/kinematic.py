@@ -16,8 +16,10 @@ from simnav.kinds import POSITION, VELOCITY, kinds_with
 from simnav.types import Array, Datasheet, Estimate, InitialState, Instruments, Measurement
 
 from .base import ErrorModel, Linearised
+from .declared_errors import bias_of
 from .equations import equation_of
 from .measurements import radii, wrap
+from .sum_of_processes import with_variance
 
 __all__ = ["KinematicModel"]
 
@@ -68,7 +70,7 @@ class KinematicModel(ErrorModel):
         self.position = np.array(start.position, dtype=np.float64)
         self.velocity = np.array(start.velocity, dtype=np.float64)
         self._yaw = np.array(start.attitude[2], dtype=np.float64)
-        slow = [r.bias**2 + r.bias_instability**2 for r in receivers]
+        slow = [with_variance(np.zeros(3), bias_of(r).processes) for r in receivers]
         self._slow = np.diag(np.max(slow, axis=0))
         return np.array(start.covariance[:6, :6])
 

@@ -20,6 +20,7 @@ from simnav.types import Array, InitialState, Instruments, Measurement
 from .base import Linearised
 from .equations import equation_of
 from .inertial import InertialModel
+from .state_blocks import StateBlocks
 
 __all__ = ["NineStateModel"]
 
@@ -57,7 +58,7 @@ class NineStateModel(InertialModel):
     def begin(self, start: InitialState, instruments: Instruments) -> Array:
         """Set the state; UnsuitableScenario without an IMU."""
         self._unused = super().begin(start, instruments)
-        self.size = 9
+        self.size, self.blocks = 9, StateBlocks(9)
         self._full = np.zeros(15)
         self._noise[:8] = 0.0
         for sheet in instruments.values():

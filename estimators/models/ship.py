@@ -7,7 +7,7 @@ time T of a state, and ' for the time derivative:
 
 - p' = u (cos psi, sin psi) + c
 - u' = white noise; psi' = r; r' = -r/T + noise; c' = -c/T + noise; biases as in
-  `simnav.estimators.models.base.gauss_markov`
+  `simnav.estimators.models.sum_of_processes.merged`
 
 Speed and heading are states, and log and compass are measurements of them. So their biases are estimated while there is
 GNSS, and the position is propagated through an outage. Height, roll and pitch are not estimated. A lever arm is turned
@@ -26,13 +26,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simnav import kinds
+from simnav.blocks import StateBlock
 from simnav.estimator import UnsuitableScenario
 from simnav.estimator.needs import Needs
 from simnav.types import KINDS, NO_SIDE, Array, Datasheet, Estimate, InitialState, Instruments, Measurement
 
-from .base import ErrorModel, GaussMarkov, Linearised, aid_biases, is_fast, stationary
+from .base import ErrorModel, Linearised
+from .declared_errors import bias_of
 from .equations import equation_of
 from .measurements import wrap
+from .moving_chain import MovingModel
 from .ship_kernels import (
     BODY_VELOCITY,
     HEADING,
@@ -45,11 +48,15 @@ from .ship_kernels import (
     U,
     advance_ship,
     correct_ship,
+    correct_ships,
     describe_ship,
+    differ_ships,
     observe_ship,
+    sail_ships,
 )
 from .ship_observation import HEEL, VERTICAL_SPEED, ShipObservation
 from .state_blocks import StateBlocks
+from .sum_of_processes import merged_states, with_variance
 
 __all__ = ["OBSERVED", "POSITIONS", "E", "N", "ShipModel"]
 
@@ -59,7 +66,7 @@ VELOCITIES = (kinds.VELOCITY, kinds.BODY_VELOCITY, kinds.WATER_SPEED)
 OBSERVED = (*POSITIONS, *VELOCITIES, kinds.HEADING)
 
 
-class ShipModel(ErrorModel):
+class ShipModel(MovingModel):
     """The model of the module.
 
     Parameters
@@ -138,35 +145,17 @@ class ShipModel(ErrorModel):
             raise UnsuitableScenario("the ship model needs GNSS, a compass or a log; there is none of them")
         self.time = start.time
         self.position = np.array(start.position, dtype=np.float64)
-        states: list[GaussMarkov] = [
-            GaussMarkov(0.0, 0.0, self.acceleration**2, 0.0),
-            GaussMarkov(float(start.covariance[8, 8]), 0.0, 0.0, 0.0),
-            stationary(self.turn_rate, self.turn_time),
-            stationary(self.current, self.current_time),
-            stationary(self.current, self.current_time),
-        ]
+        self.blocks = StateBlocks(U)
+        for block in self._motion():
+            self.blocks.add("ship", block.name, block.rates())
         self.bias_at: dict[str, int] = {}
         self.scale_at: dict[str, int] = {}
         for sheet in instruments.values():
-            equation, own = equation_of(sheet), KINDS[sheet.kind].observation is not None
-            if own and not self.observes(sheet):
-                continue
-            if not own and not (equation.is_heading or equation.is_position or equation.through_water):
-                continue
-            d = len(sheet.sigma) if own else 2 if equation.is_position else 1
-            biases = aid_biases(sheet)[:d]
-            if any(b.variance or b.noise for b in biases):
-                self.bias_at[sheet.name] = 2 + len(states)
-                states += biases
-            if equation.through_water and sheet.scale:
-                self.scale_at[sheet.name] = 2 + len(states)
-                states.append(GaussMarkov(sheet.scale**2, 0.0, 0.0, 0.0))
-        brought = [s for s in instruments.values() if KINDS[s.kind].observation is not None and self.observes(s)]
-        self.blocks = StateBlocks(brought, 2 + len(states))
-        states += [GaussMarkov(*rates, 0.0) for rates in self.blocks.states]
-        self.size = n = 2 + len(states)
-        self.decay = np.array([0.0, 0.0, *(s.decay for s in states)])
-        self.density = np.array([0.0, 0.0, *(s.noise for s in states)])
+            self._calibrate(sheet)
+        self.blocks.bring(s for s in instruments.values() if KINDS[s.kind].observation is not None and self.observes(s))
+        self.size = n = self.blocks.size
+        variance, decay, density = self.blocks.columns(U)
+        self.decay, self.density = np.concatenate([[0.0, 0.0], decay]), np.concatenate([[0.0, 0.0], density])
         self.transition = np.eye(n)
         self._height_variance = float(start.covariance[2, 2])
         self._tabulate()
@@ -175,7 +164,8 @@ class ShipModel(ErrorModel):
         self.x[PSI] = psi
         P = np.zeros((n, n))
         P[:2, :2] = start.covariance[:2, :2]
-        P[range(2, n), range(2, n)] = [s.variance for s in states]
+        P[range(U, n), range(U, n)] = variance
+        P[PSI, PSI] = start.covariance[8, 8]
         # The initial velocity over ground is a measurement of u and c; the prior of u has no information.
         P[U, U] = 1e4
         north, east = start.velocity[:2].tolist()
@@ -190,6 +180,29 @@ class ShipModel(ErrorModel):
         joseph = np.eye(n) - gain @ H
         P = joseph @ P @ joseph.T + gain @ noise @ gain.T
         return np.ascontiguousarray(P)
+
+    def _motion(self) -> tuple[StateBlock, ...]:
+        """The states of the ship behind its position. Those of speed and heading at the start are set in `begin`."""
+        return (
+            StateBlock("speed", 1, "m_s", 0.0, "random_walk", self.acceleration),
+            StateBlock("heading", 1, "deg", 0.0),
+            StateBlock.stationary("turn_rate", 1, "deg_s", self.turn_rate, self.turn_time),
+            StateBlock.stationary("current", 2, "m_s", self.current, self.current_time),
+        )
+
+    def _calibrate(self, sheet: Datasheet) -> None:
+        """The states of an instrument where the compiled loops expect them: the bias of what it measures, and scale."""
+        equation, own = equation_of(sheet), KINDS[sheet.kind].observation is not None
+        if own and not self.observes(sheet):
+            return
+        if not own and not (equation.is_heading or equation.is_position or equation.through_water):
+            return
+        states = merged_states(sheet)
+        bias = states.get("bias", [])[: None if own else 2 if equation.is_position else 1]
+        if any(rates.variance or rates.noise for rates in bias):
+            self.bias_at[sheet.name] = self.blocks.add(sheet.name, "bias", bias)
+        if "scale" in states:
+            self.scale_at[sheet.name] = self.blocks.add(sheet.name, "scale", states["scale"])
 
     def _tabulate(self) -> None:
         """The instruments: those for the kernels, and those with an equation of their own."""
@@ -242,6 +255,24 @@ class ShipModel(ErrorModel):
         """Add a correction to the state."""
         correct_ship(self.position, self.x, dx)
 
+    def move_all(self, states: tuple[Array, ...], elapsed: Array, jacobian: Array | None = None) -> None:
+        """As `MovingModel.move_all`."""
+        if jacobian is None:
+            jacobian = np.empty((len(elapsed), self.size, self.size))
+        position, x = states
+        sail_ships(position, x, elapsed, self.decay, self.turn_time, jacobian)
+
+    def difference_all(self, states: tuple[Array, ...], others: tuple[Array, ...]) -> Array:
+        """As `MovingModel.difference_all`."""
+        (position, x), (other, other_x), difference = states, others, np.empty_like(states[1])
+        differ_ships(position, x, other, other_x, difference)
+        return difference
+
+    def retract_all(self, states: tuple[Array, ...], steps: Array) -> None:
+        """As `MovingModel.retract_all`."""
+        position, x = states
+        correct_ships(position, x, steps)
+
     def estimate(self, covariance: Array) -> Estimate:
         """Horizontal position and velocity, and heading."""
         psi = float(self.x[PSI])
@@ -251,23 +282,21 @@ class ShipModel(ErrorModel):
         full[6, 6] = full[7, 7] = HEEL**2
         attitude = np.array([0.0, 0.0, wrap(psi)])
         estimate = Estimate(self.time, self.position.copy(), velocity, attitude, full, ESTIMATED)
-        if self.blocks:
-            estimate.states = self.blocks.report(self.x, 0, covariance)
+        if self.blocks.brought or self.reports_all:
+            estimate.states = self.blocks.report(self.x, 0, covariance, self.reports_all)
         return estimate
 
 
 def _aid(sheet: Datasheet, sway: float) -> tuple[int, list[float]]:
     """Kind and numbers of an instrument, for the kernels (`simnav.estimators.models.ship_kernels`)."""
     lx, ly, lz = sheet.lever_arm.tolist()
-    fast, white, equation = is_fast(sheet), _white(sheet), equation_of(sheet)
+    white, equation = _white(sheet), equation_of(sheet)
     if equation.is_heading or equation.through_water:
         kind = LOG if equation.through_water else HEADING
         return kind, [lx, ly, float(white[0]), 0.0, 0.0, 0.0, 0.0]
-    white = white[:2]
     if equation.is_position:
-        return POSITION, [lx, ly, *(white + (HEEL * lz) ** 2).tolist(), 0.0, 0.0, 0.0]
-    # A velocity's bias has no state.
-    white = white + sheet.bias[:2] ** 2 + (0.0 if fast else sheet.bias_instability[:2] ** 2)
+        return POSITION, [lx, ly, *(white[:2] + (HEEL * lz) ** 2).tolist(), 0.0, 0.0, 0.0]
+    white = with_variance(white, bias_of(sheet).slow)[:2]  # a velocity's bias has no state
     if equation.is_fix:
         return VELOCITY, [lx, ly, *white.tolist(), sway**2, 0.0, 0.0]
     white = white + (HEEL * sway) ** 2
@@ -276,7 +305,7 @@ def _aid(sheet: Datasheet, sway: float) -> tuple[int, list[float]]:
 
 def _white(sheet: Datasheet) -> Array:
     """(d,) variances of the white noise."""
-    return np.asarray(sheet.sigma**2 + (sheet.bias_instability**2 if is_fast(sheet) else 0.0))
+    return np.asarray(sheet.sigma**2 + bias_of(sheet).white_variance())
 
 
 #: North, east, their velocities, and heading.

@@ -35,10 +35,13 @@ __all__ = [
     "U",
     "advance_ship",
     "correct_ship",
+    "correct_ships",
     "describe_ship",
+    "differ_ships",
     "move_ships",
     "observe_ship",
     "read_ships",
+    "sail_ships",
 ]
 
 N, E, U, PSI, R, CN, CE = range(7)
@@ -177,6 +180,46 @@ def move_ships(states: Array, rate: Array, turn_time: float, elapsed: float) -> 
             north, east, _u, _c, _s = sail(states[k], decay, turning, dt)
             states[k, N] += north
             states[k, E] += east
+
+
+@kernel("void(f8[:, ::1], f8[:, ::1], f8[::1], f8[::1], f8, f8[:, :, ::1])")
+def sail_ships(
+    position: Array, x: Array, elapsed: Array, rate: Array, turn_time: float, transition: Array
+) -> None:  # fmt: skip
+    """Advance K states, each by a time of its own, in place.
+
+    Parameters
+    ----------
+    position, x : (K, 3), (K, n) arrays
+        The states (see the module); updated.
+    elapsed : (K,) array
+        Times [s].
+    rate : (n,) array
+        Inverse correlation times [1/s].
+    turn_time : float
+        Correlation time of the turn rate [s].
+    transition : (K, n, n) array
+        Overwritten with the transition matrices.
+    """
+    decay = np.empty(rate.size)
+    for k in range(x.shape[0]):
+        set_identity(transition[k])
+        steps, dt, turning = steps_of(elapsed[k], turn_time)
+        decay_of(rate, dt, decay)
+        for _ in range(steps):
+            sail_step(position[k], x[k], transition[k], decay, turning, dt)
+
+
+@kernel("void(f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1])")
+def differ_ships(position: Array, x: Array, other: Array, other_x: Array, difference: Array) -> None:
+    """Fill in (K, n) by how much K states differ from K others, in metres with the radii of the others."""
+    for k in range(x.shape[0]):
+        meridian, prime = radii_scalar(sin(other[k, 0]))
+        east = position[k, 1] - other[k, 1]
+        difference[k, N] = (position[k, 0] - other[k, 0]) * (meridian + other[k, 2])
+        difference[k, E] = atan2(sin(east), cos(east)) * (prime + other[k, 2]) * cos(other[k, 0])
+        for i in range(2, x.shape[1]):
+            difference[k, i] = x[k, i] - other_x[k, i]
 
 
 @kernel()
@@ -324,6 +367,13 @@ def correct_ship(position: Array, x: Array, dx: Array) -> None:
     displace_ship(position, dx[N], dx[E])
     for i in range(2, x.size):
         x[i] += dx[i]
+
+
+@kernel("void(f8[:, ::1], f8[:, ::1], f8[:, ::1])")
+def correct_ships(position: Array, x: Array, steps: Array) -> None:
+    """Add (K, n) corrections to K states, in place."""
+    for k in range(steps.shape[0]):
+        correct_ship(position[k], x[k], steps[k])
 
 
 @kernel("void(f8[::1], f8[:, ::1], f8, f8[::1], f8[:, ::1])")

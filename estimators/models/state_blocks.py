@@ -1,22 +1,27 @@
-"""The blocks of states that the instruments of a run bring along (`simnav.blocks`), behind the states of a model.
+"""The blocks of states of a model: the errors of its instruments, and what instruments bring along (`simnav.blocks`).
 
-All components but those of a clock are independent, and a model moves them like its own calibration states, by decay
-and noise density. A clock's bias is coupled to its drift, and its noise is correlated: that is done here.
+A model appends blocks here, and learns their places and rates. Its compiled loops get the places, and a vector of decay
+and one of noise density: all components but those of a clock are independent. A clock's bias is coupled to its drift,
+and its noise is correlated: that is done here.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
+from typing import TypeAlias
 
 import numpy as np
 
-from simnav.blocks import StateBlock, blocks_of
+from simnav.blocks import Rates, StateBlock, blocks_of
 from simnav.types import Array, Datasheet, Instruments
 
 from .channels import instrument_of
 
-__all__ = ["StateBlocks", "without_shared_blocks"]
+__all__ = ["Reported", "StateBlocks", "without_shared_blocks"]
+
+#: Value and standard deviation of blocks of states, by label.
+Reported: TypeAlias = dict[str, tuple[Array, Array]]
 
 
 def without_shared_blocks(instruments: Instruments) -> Instruments:
@@ -35,55 +40,108 @@ def without_shared_blocks(instruments: Instruments) -> Instruments:
 
 
 class StateBlocks:
-    """The blocks of some instruments, and their places in an error state.
+    """The blocks of states of a model: which places of the error they have, and how they move.
 
     Parameters
     ----------
-    sheets : iterable of Datasheet
-        Datasheets of the instruments whose blocks become states.
     first : int
         Index of the first component of the first block in the error state.
 
     Attributes
     ----------
     at : dict of str to slice
-        Places of each block in the error state, by label (`StateBlock.label`).
-    states : list of (float, float, float)
-        Initial variance, decay and noise density of each component; the noise of a clock is added by `add_noise`.
+        Places of each block in the error state, by label: that of `StateBlock.label`, or ``SOURCE.NAME`` of an error of
+        a datasheet, where a channel is a source of its own.
+    states : list of Rates
+        Of each component; the noise of a clock is added by `add_noise`.
+    brought : Mapping of str to StateBlock
+        The blocks that instruments bring along, by label.
+    clocks : list of int
+        Indices of the biases of the clocks; the drift of each follows it.
     """
 
-    def __init__(self, sheets: Iterable[Datasheet], first: int):
-        self._sheets = {sheet.name: sheet for sheet in sheets}
-        self.blocks: Mapping[str, StateBlock] = blocks_of((instrument_of(s), s.blocks) for s in self._sheets.values())
+    def __init__(self, first: int):
+        self.first = first
         self.at: dict[str, slice] = {}
-        self.states: list[tuple[float, float, float]] = []
+        self.states: list[Rates] = []
+        self.brought: Mapping[str, StateBlock] = {}
+        self._of: dict[str, dict[str, slice]] = {}
+        self._names: dict[str, tuple[str, ...]] = {}
+        self.clocks: list[int] = []
         self._clocks: list[tuple[int, StateBlock]] = []
-        for label, block in self.blocks.items():
-            begin = first + len(self.states)
-            self.at[label] = slice(begin, begin + block.size)
-            self.states += block.rates()
-            if block.process == "clock":
-                self._clocks.append((begin, block))
-
-    def __len__(self) -> int:
-        return len(self.blocks)
+        self._columns: Array | None = None
+        self._step: tuple[float, Array, Array] | None = None
 
     @property
-    def clocks(self) -> list[int]:
-        """Indices of the biases of the clocks; the drift of each follows it."""
-        return [at for at, _ in self._clocks]
+    def size(self) -> int:
+        """Number of components of the error state up to the last block."""
+        return self.first + len(self.states)
+
+    def add(self, source: str, name: str, rates: Sequence[Rates]) -> int:
+        """Append a block of an instrument or channel; the index of its first component."""
+        first = self.size
+        self._of.setdefault(source, {})[name] = self._append(f"{source}.{name}", rates)
+        return first
+
+    def bring(self, sheets: Iterable[Datasheet]) -> None:
+        """Append the blocks that instruments bring along.
+
+        Raises
+        ------
+        ValueError
+            If two of them do not agree, or one has the name of an error that is a state already.
+        """
+        sheets = list(sheets)
+        self.brought = blocks_of((instrument_of(s), s.blocks) for s in sheets)
+        for label, block in self.brought.items():
+            at = self._append(label, block.rates())
+            if block.process == "clock":
+                self.clocks.append(at.start)
+                self._clocks.append((at.start, block))
+        for sheet in sheets:
+            known = self._of.setdefault(sheet.name, {})
+            for block in sheet.blocks:
+                if block.name in known:
+                    raise ValueError(
+                        f"instrument {instrument_of(sheet)!r}: its block of states {block.name!r} has the name of an "
+                        f"error of its datasheet; give the block another name, or set {block.name} to 0"
+                    )
+                known[block.name] = self.at[block.label(instrument_of(sheet))]
+            self._names[sheet.name] = tuple(block.name for block in sheet.blocks)
+
+    def _append(self, label: str, rates: Sequence[Rates]) -> slice:
+        at = self.at[label] = slice(self.size, self.size + len(rates))
+        self.states += rates
+        self._columns = self._step = None
+        return at
+
+    def step(self, elapsed: float) -> tuple[Array, Array]:
+        """What a time [s] does to the components: factors by which they decay, and variances that are added to them.
+
+        What belongs to clocks beyond that is done by `carry` and `add_noise`. Both arrays are kept until another time
+        is asked for; they are not to be changed.
+        """
+        if self._step is None or self._step[0] != elapsed:
+            _, rate, density = self.columns(self.first)
+            decay, noise, moving = np.exp(-rate * elapsed), density * elapsed, rate > 0.0
+            noise[moving] = density[moving] * (1.0 - decay[moving] ** 2) / (2.0 * rate[moving])
+            self._step = elapsed, decay, noise
+        return self._step[1:]
+
+    def columns(self, first: int) -> tuple[Array, Array, Array]:
+        """Initial variance, decay and noise density of the components from an index of the error state on."""
+        if self._columns is None:
+            self._columns = np.array(self.states, dtype=np.float64).reshape(-1, 3).T.copy()
+        variance, decay, noise = self._columns[:, first - self.first :]
+        return variance, decay, noise
 
     def places(self, name: str, offset: int) -> dict[str, int]:
-        """By name of the block, the index of the first state of each block of an instrument, less an offset."""
-        sheet = self._sheets.get(name)
-        if sheet is None:
-            return {}
-        return {b.name: self.at[b.label(instrument_of(sheet))].start - offset for b in sheet.blocks}
+        """By name, the index of the first state of each block that an instrument brings along, less an offset."""
+        return {block: self._of[name][block].start - offset for block in self._names.get(name, ())}
 
-    def of(self, name: str) -> list[slice]:
-        """Places of the blocks of an instrument in the error state."""
-        sheet = self._sheets.get(name)
-        return [] if sheet is None else [self.at[b.label(instrument_of(sheet))] for b in sheet.blocks]
+    def of(self, source: str) -> list[slice]:
+        """Places of all blocks that an instrument or channel depends on."""
+        return list(self._of.get(source, {}).values())
 
     def carry(self, error: Array, elapsed: float) -> None:
         """Move the biases of clocks by their drifts in an (n,) or (n, k) array of errors, in place."""
@@ -117,8 +175,8 @@ class StateBlocks:
         for at, block in self._clocks:
             covariance[at : at + 2, at : at + 2] += block.noise(elapsed)
 
-    def report(self, values: Array, offset: int, covariance: Array) -> dict[str, tuple[Array, Array]]:
-        """Value and standard deviation of each block, by label (`simnav.types.Estimate.states`).
+    def report(self, values: Array, offset: int, covariance: Array, everything: bool) -> Reported:
+        """Value and standard deviation of blocks, by label (`simnav.types.Estimate.states`).
 
         Parameters
         ----------
@@ -128,8 +186,13 @@ class StateBlocks:
             Index in the error state of the first value.
         covariance : (n, n) array
             Covariance of the error state.
+        everything : bool
+            False: the blocks that instruments bring along. True: those of their datasheets, too.
         """
+        labels = self.at if everything else self.brought
         sigma = np.sqrt(np.maximum(covariance.diagonal(), 0.0))
-        return {
-            label: (values[at.start - offset : at.stop - offset].copy(), sigma[at]) for label, at in self.at.items()
-        }
+        found = {}
+        for label in labels:
+            at = self.at[label]
+            found[label] = values[at.start - offset : at.stop - offset].copy(), sigma[at]
+        return found

@@ -26,12 +26,20 @@ class _Window(Row, solver=piece(WindowEstimator, defaults={"tolerance": 0.05}, e
 
 
 class _Robust(_Window, isolation=FaultIsolation):
-    """The window that isolates faults, without its weighting."""
+    """The window that isolates faults, without its weighting.
+
+    Version 2: a log that is the last witness is believed against the motion, and the motion that leads to the node of
+    the first suspect reading is loosened, too.
+    """
+
+    version = 2
 
 
 @register("huber-fgo")
 class HuberFgo(_Robust, weighting=piece(TunedMEstimator, weight=huber)):
     """Sliding window with Huber's weights: a residual beyond c sigma pulls no harder than one of c sigma.
+
+    Version 2: a log that is the last witness beside the motion is not rejected for good.
 
     Source: P. J. Huber, *Robust Statistics*, 1981.
     """
@@ -41,6 +49,8 @@ class HuberFgo(_Robust, weighting=piece(TunedMEstimator, weight=huber)):
 class TukeyFgo(_Robust, weighting=piece(TunedMEstimator, weight=tukey)):
     """Sliding window with Tukey's biweight: a residual beyond c sigma counts for next to nothing.
 
+    Version 2: a log that is the last witness beside the motion is not rejected for good.
+
     Source: A. E. Beaton and J. W. Tukey, *The fitting of power series*, Technometrics 16(2), 1974.
     """
 
@@ -48,6 +58,8 @@ class TukeyFgo(_Robust, weighting=piece(TunedMEstimator, weight=tukey)):
 @register("cauchy-fgo")
 class CauchyFgo(_Robust, weighting=piece(TunedMEstimator, weight=cauchy)):
     """Sliding window with Cauchy's weights, which fall with the square of the residual.
+
+    Version 2: a log that is the last witness beside the motion is not rejected for good.
 
     Source: P. W. Holland and R. E. Welsch, *Robust regression using iteratively reweighted least-squares*, 1977.
     """
@@ -57,6 +69,8 @@ class CauchyFgo(_Robust, weighting=piece(TunedMEstimator, weight=cauchy)):
 class GmFgo(_Robust, weighting=piece(TunedMEstimator, weight=geman_mcclure)):
     """Sliding window with Geman and McClure's weights, which fall with the fourth power of the residual.
 
+    Version 2: a log that is the last witness beside the motion is not rejected for good.
+
     Source: S. Geman and D. E. McClure, *Statistical methods for tomographic image reconstruction*, 1987.
     """
 
@@ -64,6 +78,8 @@ class GmFgo(_Robust, weighting=piece(TunedMEstimator, weight=geman_mcclure)):
 @register("dcs-fgo")
 class DcsFgo(_Robust, weighting=DynamicCovarianceScaling):
     """Sliding window with dynamic covariance scaling.
+
+    Version 2: a log that is the last witness beside the motion is not rejected for good.
 
     Source: P. Agarwal, G. D. Tipaldi, L. Spinello et al., *Robust map optimization using dynamic covariance scaling*,
     ICRA 2013.
@@ -73,6 +89,8 @@ class DcsFgo(_Robust, weighting=DynamicCovarianceScaling):
 @register("switchable-fgo")
 class SwitchableFgo(_Robust, weighting=SwitchableConstraints):
     """Sliding window with switchable constraints, the switches eliminated in closed form.
+
+    Version 2: a log that is the last witness beside the motion is not rejected for good.
 
     Source: N. Sünderhauf and P. Protzel, *Switchable constraints for robust pose graph SLAM*, IROS 2012.
     """
@@ -86,6 +104,8 @@ class GncFgo(
 ):
     """Sliding window with graduated non-convexity: after an outlier the robust cost begins convex and hardens.
 
+    Version 2: a log that is the last witness beside the motion is not rejected for good.
+
     Source: H. Yang, P. Antonante, V. Tzoumas and L. Carlone, *Graduated non-convexity for robust spatial perception*,
     IEEE Robotics and Automation Letters 5(2), 2020.
     """
@@ -95,6 +115,8 @@ class GncFgo(
 class MaxMixtureFgo(_Robust, weighting=MaxMixture):
     """Sliding window in which each measurement is of the nominal or of a wide noise, whichever is the more probable.
 
+    Version 2: a log that is the last witness beside the motion is not rejected for good.
+
     Source: E. Olson and P. Agarwal, *Inference on networks of mixtures for robust robot mapping*, IJRR 32(7), 2013.
     """
 
@@ -102,6 +124,9 @@ class MaxMixtureFgo(_Robust, weighting=MaxMixture):
 @register("ga-fgo")
 class GaFgo(_Window, weighting=piece(GradientAdaptive, fewest=5)):
     """Gradient-adaptive factor graph, its residuals whitened and its scales consistent.
+
+    Motion keeps three tenths of its information however wrong it is, so a disturbed IMU is not rejected. On
+    ``lone-dvl`` its error is 2.7 times that of ``gnc-fgo``, and 0.85 times that of ``ekf``.
 
     Source: M. Guo, B. Wang, L. Wei et al., *Robust INS/GNSS/DVL integrated navigation for MASS based on
     gradient-adaptive factor graph optimization*, 2026.

@@ -29,6 +29,7 @@ class _Window(Row, solver=piece(WindowEstimator, defaults={"tolerance": 0.05}, e
     ) -> None: ...
 
 class _Robust(_Window, isolation=FaultIsolation):
+    version = 2
     def __init__(
         self,
         *,

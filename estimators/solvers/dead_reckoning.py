@@ -28,9 +28,10 @@ import numpy as np
 from simnav.estimator import UnsuitableScenario
 from simnav.estimator.needs import IMU, Needs
 from simnav.estimators.composition import Solver
-from simnav.estimators.models.base import triad_bias
+from simnav.estimators.models.declared_errors import bias_of, bias_of_triad
 from simnav.estimators.models.equations import equation_of
 from simnav.estimators.models.measurements import radii, wrap
+from simnav.estimators.models.sum_of_processes import merged, with_variance
 from simnav.geometry.earth import gravity
 from simnav.geometry.rotation import dcm_from_rotation_vector, dcm_from_rpy, rpy_from_dcm
 from simnav.kinds import BODY_VELOCITY, DEPTH, HEADING, WATER_SPEED, kinds_with
@@ -104,9 +105,9 @@ class DeadReckoningEstimator(Solver):
         P[_PSI, _PSI] = start.covariance[8, 8]
         self._gyro_walk = 0.0
         if self._imu is not None:
-            drift = triad_bias(self._imu.gyroscope)
-            P[_GYRO, _GYRO] = drift.variance
-            self._gyro_walk = self._imu.gyroscope.random_walk**2 + drift.white
+            drift = bias_of_triad(self._imu.gyroscope, "deg_s")
+            P[_GYRO, _GYRO] = merged(drift)[0].variance
+            self._gyro_walk = self._imu.gyroscope.random_walk**2 + float(drift.white_density()[0])
         self._covariance = P
         self._use(speeds[0])
 
@@ -114,7 +115,7 @@ class DeadReckoningEstimator(Solver):
         """Take the errors of an instrument as those of the speed."""
         self._source = sheet
         speed = hypot(*self._body[:2].tolist())
-        slow = sheet.bias**2 + sheet.bias_instability**2
+        slow = with_variance(np.zeros(len(sheet.bias)), bias_of(sheet).processes)
         ahead = float(slow[0]) + (sheet.scale * speed) ** 2
         equation = equation_of(sheet)
         abeam = float(slow[1]) + (sheet.misalignment[2] * speed) ** 2 if equation.in_body else 0.0
@@ -243,7 +244,7 @@ class DeadReckoningEstimator(Solver):
             white = float(self._compass.sigma[0]) ** 2
             if self._imu is not None:
                 white = white / (2.0 * COMPASS_TIME * self._compass.rate) + self._gyro_walk * COMPASS_TIME
-            slow = float(self._compass.bias[0]) ** 2 + float(self._compass.bias_instability[0]) ** 2
+            slow = float(with_variance(np.zeros(1), bias_of(self._compass).processes)[0])
             slow += float(P[_GYRO, _GYRO]) * COMPASS_TIME**2
             limit = slow + white
             settled = 1.0 if self._imu is None else min(1.0, 2.0 * dt / COMPASS_TIME)

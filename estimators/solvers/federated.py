@@ -146,15 +146,12 @@ class FederatedEstimator(KalmanEstimator):
             raise UnsuitableScenario(f"{len(shares)} shares do not fit {len(names)} aiding sensors: {', '.join(names)}")
         model = self.model
         self._common = c = len(model.transition)
-        starts: dict[str, list[int]] = {name: [] for name in names}
+        own: dict[str, dict[int, None]] = {name: {} for name in names}  # each place once, in order
         for source, name in self._of.items():
-            starts[name] += [at[source] for at in (model.bias_at, model.scale_at) if source in at]
-            starts[name] += [at.start for at in model.blocks.of(source) if at.start not in starts[name]]
-        stops = sorted([*(at for each in starts.values() for at in each), model.size])
+            own[name] |= {k: None for at in model.blocks.of(source) for k in range(at.start, at.stop)}
         self._locals: dict[str, _Local] = {}
         for name, share in zip(names, shares):
-            own = [k for at in starts[name] for k in range(at, stops[stops.index(at) + 1])]
-            self._locals[name] = self._local(share, np.array(own, dtype=np.intp))
+            self._locals[name] = self._local(share, np.array(list(own[name]), dtype=np.intp))
         if self.master_share:
             self._locals[""] = self._local(self.master_share, np.array([], dtype=np.intp))
         period = self.fusion_period
@@ -187,7 +184,7 @@ class FederatedEstimator(KalmanEstimator):
             propagate_covariance(local.covariance, transition, noise, self._still, decay, density, elapsed)
             local.error[:c] = transition @ local.error[:c]
             local.error[c:] *= kept
-            if model.blocks:
+            if model.blocks.clocks:
                 model.blocks.carry_covariance(local.covariance, elapsed)
                 model.blocks.carry(local.error, elapsed)
 

@@ -17,7 +17,7 @@ Source: P. D. Groves 2013, sections 3.2 and 3.4.3.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from math import hypot
 from typing import ClassVar
 
@@ -93,6 +93,7 @@ class KalmanEstimator(Solver):
         """Begin a run; UnsuitableScenario if the model lacks an instrument."""
         instruments = by_channel(instruments)
         self.model = self._chosen(instruments)
+        self.model.reports_all |= self.reports_all
         self.covariance = self.model.begin(start, instruments)
         self._first_variances = self.covariance.diagonal().copy()
         if self.adaptation is not None:
@@ -141,6 +142,10 @@ class KalmanEstimator(Solver):
     def smooth(self) -> NavigationStates | None:
         """The smoother's trajectory at the ends of all steps; None before the first, and without a smoother."""
         return None if self.smoother is None else self.smoother.smooth(self.model, self.covariance)
+
+    def earlier(self, lags: Sequence[float]) -> Array | None:
+        """The fixed-lag smoothed states of earlier times; None without a smoother."""
+        return None if self.smoother is None else self.smoother.earlier(self.model, lags)
 
     @property
     def smoothed_covariance(self) -> Array:

@@ -32,6 +32,8 @@ import numpy as np
 from simnav.estimators.models.base import ErrorModel, Linearised
 from simnav.types import Array, Datasheet, NavigationStates
 
+from .looking_back import smoothed_rows
+
 __all__ = ["Smoother", "Stretches", "scale_of", "smoother_gains"]
 
 #: Stretches are stored, and gains are solved for, this many at a time.
@@ -118,6 +120,8 @@ class Smoother:
     """
 
     stepwise: ClassVar[bool] = False
+    #: Whether its estimate is the Rauch-Tung-Striebel one, so that `earlier` gives its estimates of earlier times.
+    looks_back: ClassVar[bool] = True
     smoothed_covariance: Array
 
     def begin(self, model: ErrorModel, observed: Sequence[Datasheet]) -> None:
@@ -126,6 +130,7 @@ class Smoother:
         self._here = np.zeros(model.size)
         self._identity = np.eye(model.size)
         self._ends: list[tuple[int, float]] = []
+        self._gains: dict[int, Array] = {}
 
     @property
     def stops(self) -> int:
@@ -177,6 +182,44 @@ class Smoother:
                 ahead = stretches.correction[k]
                 stop -= 1
                 yield stop, stretches.states[k], c, s
+
+    def earlier(self, model: ErrorModel, lags: Sequence[float]) -> Array | None:
+        """Smoothed states of earlier times, from the measurements so far (`simnav.estimator.Estimator.earlier`).
+
+        Parameters
+        ----------
+        model : ErrorModel
+            The model at the end of the last step. It is in the same state afterwards.
+        lags : sequence of float
+            Times before the end of the step [s].
+
+        Returns
+        -------
+        (k, 9) array or None
+            None for a smoother whose estimate is another one than this class's.
+        """
+        if not self.looks_back:
+            return None
+        return smoothed_rows(model, lags, self._ends, lambda first: self._corrections(model, first))
+
+    def _corrections(self, model: ErrorModel, first: int) -> tuple[list[list[Array]], list[Array]]:
+        """States of the filter at the stops from ``first`` to the present one, and what the smoother adds to them."""
+        for stop in [s for s in self._gains if s < first]:
+            del self._gains[stop]
+        states, c, ahead = [model.snapshot()], np.zeros(model.size), self._here
+        found = [c]
+        for stop in range(self.stops - 1, first - 1, -1):
+            stretches, k = self._stretches[stop // _BATCH], stop % _BATCH
+            if stop not in self._gains:
+                one = slice(k, k + 1)
+                self._gains[stop] = smoother_gains(
+                    stretches.covariance[one], stretches.transition[one], stretches.predicted[one]
+                )[0]
+            c = self._gains[stop] @ (ahead + c)
+            ahead = stretches.correction[k]
+            states.append(stretches.states[k])
+            found.append(c)
+        return states[::-1], found[::-1]
 
     def smooth(self, model: ErrorModel, covariance: Array) -> NavigationStates | None:
         """The smoothed trajectory at the ends of all steps; None before the first.

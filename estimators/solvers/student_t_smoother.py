@@ -131,6 +131,7 @@ class StudentTSmoother(Smoother):
     """
 
     stepwise = True
+    looks_back = False
     weights: dict[int, list[float]]
 
     def __init__(self, dof: float = 6.0, passes: int = 20):

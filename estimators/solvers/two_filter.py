@@ -65,7 +65,7 @@ class TwoFilterSmoother(Smoother):
     ----------
     seed_backward : bool
         Start the backward filter with the forward result, as the post-processing paper prints it, instead of with
-        nothing. Uses all data twice: over-confident.
+        nothing. Uses all data twice: optimistic.
     """
 
     stepwise = True

@@ -62,6 +62,7 @@ from simnav.types import Array, Estimate, InitialState, Instruments, Measurement
 
 from .admission import Admission
 from .cost_consistency import CostTest
+from .looking_back import LooksBack
 
 __all__ = ["WindowEstimator"]
 
@@ -73,7 +74,7 @@ FIRST_DAMPING, DAMPING_FACTOR = 1e-2, 10.0
 FAULTY_WEIGHT = 0.5
 
 
-class WindowEstimator(Solver):
+class WindowEstimator(LooksBack, Solver):
     """The solver of the module.
 
     Parameters
@@ -164,6 +165,7 @@ class WindowEstimator(Solver):
         """Begin a run; UnsuitableScenario if the model lacks an instrument."""
         instruments = by_channel(instruments)
         self.chain = chain_of(self._choice.choose(instruments, self.label))
+        self.chain.front.reports_all |= self.reports_all
         self.covariance = self.chain.begin(start, instruments)
         observed = [name for name, sheet in instruments.items() if self.chain.observes(sheet)]
         self._admission, self._owners = Admission(instruments, observed), owners(instruments)

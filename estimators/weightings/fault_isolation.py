@@ -6,6 +6,11 @@ Zhan et al. 2026), the motion is a suspect if fixes and logs fail their chi-squa
 row. A filter cannot distinguish this from two instruments that are wrong at once, but a window can. For one iteration,
 the motion factors of that time get nearly no weight. Then correct measurements agree with each other, and wrong ones do
 not. Only those that agree get their full weight.
+
+If no fix was heard for a while, a log is the last witness beside the motion. If it fails several times in a row, one of
+the two is wrong, and nothing in the measurements says which. Then the motion is suspected: a log that is rejected for
+good leaves a prediction without bound, and a log that is wrongly believed leaves an error that grows with its own.
+The assumption is that a log is not wrong for long while it is the last witness.
 """
 
 from __future__ import annotations
@@ -62,8 +67,9 @@ class FaultIsolation:
     def reset(self, instruments: Instruments) -> None:
         """Begin a run."""
         self._is_fix = fixes_and_logs(instruments)
-        if len(set(self._is_fix.values())) < 2 or not self.together:
-            self._is_fix = {}  # the test needs instruments of both groups
+        if False not in self._is_fix.values() or not self.together:
+            self._is_fix = {}  # the test needs a log
+        self._fixed = -np.inf  # the time of the latest fix
         self._failures: dict[str, tuple[int, float, float]] = {}  # running; the time of the first and of the latest
         self._blamed: list[tuple[float, float, NDArray[np.bool_]]] = []  # from, to, and which instruments agreed
         self._tested = -np.inf
@@ -94,6 +100,8 @@ class FaultIsolation:
                 count = min(len(factors.weight), len(self._weight))
                 factors.weight[:count] = self._weight[:count]
                 factors.motion_weight[:] = self._motion_weight
+                if self._alone(asked[1]):
+                    self._failures.clear()  # what is folded onto a node by a wrong motion contradicts itself for good
                 return False
             if self._blamed and asked[0] <= self._blamed[-1][1]:
                 self._blamed.pop()
@@ -107,7 +115,9 @@ class FaultIsolation:
         start, end = self._asking = suspected
         self._weight, self._motion_weight = factors.weight.copy(), factors.motion_weight.copy()
         factors.weight[(factors.time >= start) & (factors.time <= end)] = 1.0
-        factors.motion_weight[(factors.motion_time >= start) & (factors.motion_time <= end)] = LOOSE
+        # The first reading may be folded onto an older node, so the motion that leads there is loosened, too.
+        first = max(int(np.searchsorted(factors.motion_time, start, side="right")) - 1, 0)
+        factors.motion_weight[first:][factors.motion_time[first:] <= end] = LOOSE
         return False
 
     def _suspect(self, factors: Factors) -> tuple[float, float] | None:
@@ -117,6 +127,9 @@ class FaultIsolation:
         if first == len(factors.time):
             return None
         self._tested = now = float(factors.time[-1])
+        for i, time in zip(factors.instrument[new].tolist(), factors.time[new].tolist()):
+            if self._is_fix.get(factors.names[i]):
+                self._fixed = time
         if not (self._failures or self._blamed or failing_now):
             return None
         failed = factors.norm[new] ** 2 > self._limits[factors.components[new]]
@@ -132,12 +145,20 @@ class FaultIsolation:
         if self._blamed and now - self._blamed[-1][1] <= self.recent and failing:
             return self._blamed[-1][0], now
         failing = {n: f for n, f in failing.items() if f[0] >= self.together}
-        if len({self._is_fix[name] for name in failing}) < 2:
+        kinds = {self._is_fix[name] for name in failing}
+        if len(kinds) < 2 and not (kinds == {False} and self._alone(now)):
             return None
         return min(since for _, since, _ in failing.values()), now
 
+    def _alone(self, now: float) -> bool:
+        """Whether logs are the last witnesses: no fix was heard for a while."""
+        return now - self._fixed > self.recent
+
     def _agreeing(self, factors: Factors, start: float, end: float) -> NDArray[np.bool_] | None:
-        """A mask of the instruments that agree without the motion; None unless a fix and a log are among them."""
+        """A mask of the instruments that agree without the motion.
+
+        None unless a log is among them, and a fix as well where one was heard lately.
+        """
         from scipy.special import chdtri
 
         asked = (factors.time >= start) & (factors.time <= end)
@@ -148,4 +169,4 @@ class FaultIsolation:
             if freedom and float(np.sum(factors.norm[its] ** 2)) <= chdtri(freedom, 1.0 - self.sound):
                 agreeing[i] = True
                 kinds.add(self._is_fix.get(name))
-        return agreeing if kinds >= {True, False} else None
+        return agreeing if kinds >= ({False} if self._alone(end) else {True, False}) else None

@@ -10,13 +10,13 @@ import tempfile
 from typing import TYPE_CHECKING, Any
 
 from simnav.leaderboard.campaign.confinement.isolation import isolate
-from simnav.leaderboard.results.errors import sentence
+from simnav.leaderboard.results.errors import mistakes, sentence
 
 if TYPE_CHECKING:
     from simnav.recording import Recording
     from simnav.scenario import Scenario
 
-__all__ = ["NoRecordingError", "record_within", "time_limit"]
+__all__ = ["NoRecordingError", "record_here", "record_within", "time_limit"]
 
 _ALIGNED = 64  # bytes at which an array begins
 
@@ -28,6 +28,14 @@ class NoRecordingError(Exception):
 def time_limit(scenario: Scenario) -> float:
     """Default time that an estimator may take for a run [s]: a fifth of real time, at least a minute."""
     return max(60.0, 0.2 * scenario.duration)
+
+
+def record_here(scenario: Scenario, seed: int) -> Recording:
+    """A recording made in this process; RequestError where the files of a log are not there or cannot be used."""
+    from simnav.source import record
+
+    with mistakes(ValueError, FileNotFoundError):
+        return record(scenario, seed)
 
 
 def record_within(scenario: Scenario, seed: int, seconds: float) -> Recording:

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 from simnav.estimator import Estimator, describe, find, make, names, register
+from simnav.estimator.looking_back import LAGS
 from simnav.estimator.lookup import former_names_of
 from simnav.estimator.parameters import former_names, under_present_names
 from simnav.leaderboard.results.admission import label_fault, lookalikes
@@ -243,7 +244,7 @@ def _items(given: Estimators) -> list[EstimatorLike]:
 def _known(item: EstimatorLike, parameters: Mapping[str, Any]) -> dict[str, Any]:
     """Those of the parameters that an estimator has."""
     about = describe(request(item).name)
-    known = {p.name for p in about.parameters} | set(former_names(about.cls))
+    known = {p.name for p in about.parameters} | set(former_names(about.cls)) | {LAGS}
     return {k: v for k, v in parameters.items() if k in known}
 
 

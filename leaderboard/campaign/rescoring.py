@@ -20,8 +20,8 @@ from simnav.spec import closest
 
 from .fingerprint import recording_digest, simulator_version
 from .own_scores import same_code, scoring_code, scoring_differs
+from .recorder import record_here
 from .seal import PUBLIC, Seal
-from .single_run import record
 
 if TYPE_CHECKING:
     from simnav.leaderboard.results.result import Result
@@ -128,7 +128,7 @@ def rescore_results(
     for done, ((scenario, seed), found) in enumerate(sorted(by_run.items(), key=lambda item: item[0])):
         if progress is not None:
             progress(done, len(by_run), note=f"{scenario}, seed {seed}")
-        recording = record(known[scenario], seal.seed(scenario, seed))
+        recording = record_here(known[scenario], seal.seed(scenario, seed))
         for result, chosen in found:
             trial, thinned = trials.read(path, result.key, recording)
             now = [n for n in chosen if not (thinned and SCORES[n].uses_covariance and n in result.scores)]

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from simnav.estimator import EstimatorError, find
+from simnav.estimator.looking_back import inner_of
 from simnav.estimator.registry import is_own_reference, point_of
 from simnav.leaderboard.campaign.confinement.attempt import describe, prepare
 from simnav.leaderboard.campaign.confinement.isolation import isolate
@@ -104,7 +105,7 @@ def _absolute(value: Any) -> Any:
 def _describe(entrant: Entrant) -> dict[str, Any]:
     """In the isolated process: what `simnav.leaderboard.campaign.confinement.attempt.describe` gives."""
     made = entrant.make()
-    cls = type(made)
+    cls = type(inner_of(made))
     return {
         "reference": cls.reference, "source": own_code(cls), "learned_from": declared_ranges(made),
         "version": cls.version,

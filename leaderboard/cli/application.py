@@ -16,7 +16,7 @@ import typer
 
 from simnav.leaderboard.results.errors import shortened
 
-from .commands import COMMANDS, GROUPS
+from .commands import COMMANDS, GROUPS, HEADINGS
 from .console import USER, Output
 from .derived import command
 
@@ -26,7 +26,6 @@ app = typer.Typer(
     name="simnav",
     help="The open benchmark for marine integrated navigation: simulate, estimate, score, rank.",
     no_args_is_help=True,
-    add_completion=False,
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
@@ -62,14 +61,16 @@ def root(
                 raise typer.BadParameter(text, param_hint="--plugin") from None
 
 
-for _name, (_request, _home) in COMMANDS.items():
-    app.command(_name)(command(_request, _home))
+_heading = {name: heading for heading, names in HEADINGS.items() for name in names}
+for _name in sorted(COMMANDS, key=[*_heading].index):
+    _request, _home = COMMANDS[_name]
+    app.command(_name, rich_help_panel=_heading[_name])(command(_request, _home))
 for _group, (_help, _commands) in GROUPS.items():
     _typer = typer.Typer(help=_help, no_args_is_help=True)
     for _name, (_request, _home) in _commands.items():
         _typer.command(_name)(command(_request, _home))
     _typer.callback()(lambda: None)
-    app.add_typer(_typer, name=_group)
+    app.add_typer(_typer, name=_group, rich_help_panel=_heading[_group])
 
 
 def _open_streams() -> None:

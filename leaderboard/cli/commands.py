@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import KW_ONLY
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from simnav.leaderboard.calls import option, request
+from simnav.leaderboard.claim_requests import ClaimRequest
 from simnav.leaderboard.publishing_requests import (
     AuditRequest,
     BundleOptions,
@@ -19,6 +20,7 @@ from simnav.leaderboard.publishing_requests import (
     SubmitRequest,
 )
 from simnav.leaderboard.requests import (
+    AllanRequest,
     BenchRequest,
     BoundRequest,
     CampaignRequest,
@@ -29,6 +31,7 @@ from simnav.leaderboard.requests import (
     RecordRequest,
     ReproduceRequest,
     RescoreRequest,
+    RobustnessRequest,
     RunRequest,
     Scenarios,
     SealRequest,
@@ -40,7 +43,7 @@ from simnav.leaderboard.requests import (
 if TYPE_CHECKING:
     from simnav.leaderboard.campaign.request import Estimators
 
-__all__ = ["COMMANDS", "GROUPS", "Features", "Topic"]
+__all__ = ["COMMANDS", "GROUPS", "HEADINGS", "Features", "Topic"]
 
 _FIGURE = "Write a figure: .png, .svg or .pdf."
 
@@ -52,6 +55,7 @@ class Topic(StrEnum):
     ESTIMATORS = "estimators"
     INSTRUMENTS = "instruments"
     FAULTS = "faults"
+    IMUS = "imus"
 
 
 class Features(StrEnum):
@@ -64,7 +68,7 @@ class Features(StrEnum):
 
 @request
 class ListCommand:
-    """List scenarios, estimators, kinds of instruments or kinds of faults."""
+    """List scenarios, estimators, kinds of instruments, kinds of faults, or IMUs by name."""
 
     topic: Topic | None = option(
         default=None,
@@ -72,6 +76,13 @@ class ListCommand:
         help="What to list; without it, scenarios and estimators.",
         argument=True,
     )
+
+
+@request
+class ShowCommand:
+    """Show all about a scenario, an estimator, a kind of instrument or a kind of fault."""
+
+    name: str = option(help="Its name, as 'simnav list' has it.", argument=True, metavar="NAME")
 
 
 @request
@@ -140,6 +151,22 @@ class SweepCommand(SweepRequest):
 
 
 @request
+class ClaimCommand(ClaimRequest):
+    """Under which conditions does a claim hold: one method is better than another by so much?"""
+
+    _: KW_ONLY
+    plot: Path | None = option(default=None, help=_FIGURE)
+
+
+@request
+class RobustnessCommand(RobustnessRequest):
+    """Compare estimators with the plain row when a datasheet is wrong: robustness profiles."""
+
+    _: KW_ONLY
+    plot: Path | None = option(default=None, help=_FIGURE)
+
+
+@request
 class WarmupCommand:
     """Compile every kernel, once; later starts are quick."""
 
@@ -150,6 +177,15 @@ class BoundCommand(BoundRequest):
 
     _: KW_ONLY
     csv: Path | None = option("--csv", default=None, help="Write every epoch to this file.")
+
+
+@request
+class AllanCommand(AllanRequest):
+    """Show the Allan deviation of an IMU and its noise coefficients, beside its datasheet."""
+
+    _: KW_ONLY
+    plot: Path | None = option(default=None, help=_FIGURE)
+    csv: Path | None = option("--csv", default=None, help="Write every averaging time to this file.")
 
 
 @request
@@ -214,6 +250,7 @@ class TrainAnfisCommand:
 #: Name of a command -> its request, and the module of this package that runs it.
 COMMANDS: Mapping[str, tuple[type[Any], str]] = {
     "list": (ListCommand, "list_"),
+    "show": (ShowCommand, "show"),
     "run": (RunCommand, "run"),
     "simulate": (SimulateCommand, "simulate"),
     "check": (CheckCommand, "check"),
@@ -222,10 +259,13 @@ COMMANDS: Mapping[str, tuple[type[Any], str]] = {
     "evaluate": (EvaluateRequest, "evaluate"),
     "campaign": (CampaignRequest, "campaign"),
     "sweep": (SweepCommand, "sweep"),
+    "robustness": (RobustnessCommand, "robustness"),
     "leaderboard": (SiteRequest, "leaderboard"),
     "warmup": (WarmupCommand, "warmup"),
     "bound": (BoundCommand, "bound"),
+    "allan": (AllanCommand, "allan"),
     "reproduce": (ReproduceRequest, "reproduce"),
+    "claim": (ClaimCommand, "claim"),
     "reference": (ReferenceCommand, "reference"),
     "rescore": (RescoreRequest, "rescore"),
     "seal": (SealRequest, "seal"),
@@ -235,6 +275,15 @@ COMMANDS: Mapping[str, tuple[type[Any], str]] = {
     "submit": (SubmitRequest, "submit"),
     "tune": (TuneCommand, "tune"),
 }
+
+#: Heading of the help -> the commands below it.
+HEADINGS: Mapping[str, Sequence[str]] = {
+    "Every day": ("list", "show", "run", "evaluate", "check", "new-estimator", "simulate", "sweep", "campaign",
+                  "leaderboard"),
+    "Study and publish": ("tune", "train", "bench", "robustness", "bound", "allan", "reproduce", "claim", "rescore", "merge",
+                          "submit", "verify", "seal", "cite"),
+    "Maintain": ("standard", "reference", "warmup"),
+}  # fmt: skip
 
 #: Name of a group -> its help, and its commands.
 GROUPS: Mapping[str, tuple[str, Mapping[str, tuple[type[Any], str]]]] = {

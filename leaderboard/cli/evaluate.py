@@ -6,8 +6,6 @@ from dataclasses import replace
 
 from simnav.leaderboard.given import scenarios_of
 from simnav.leaderboard.ranking.failures import failure_table
-from simnav.leaderboard.ranking.ranking_table import ranking_tables
-from simnav.leaderboard.ranking.standing import standing_table
 from simnav.leaderboard.requests import EvaluateRequest
 from simnav.leaderboard.results.errors import RequestError
 from simnav.leaderboard.running import evaluate
@@ -24,10 +22,7 @@ def show(out: Output, request: EvaluateRequest) -> None:
     with out.progress("starting") as bar:
         report = evaluate.of(replace(request, progress=campaign_progress(bar)))
     out.document(report.to_dict())
-    out.print(*ranking_tables(report.ranking, report.estimators))
-    for stand in report.standings:
-        out.print(standing_table(stand))
-    out.print(*failure_table(report.results))
+    out.print(*report.shown(), *failure_table(report.results), *report.verdicts)
     for label in report.estimators:
         own = [r for r in report.results if r.estimator == label]
         if own and all(r.status == "unsuitable" for r in own):

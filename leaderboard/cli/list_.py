@@ -1,4 +1,4 @@
-"""``simnav list``: scenarios, estimators, kinds of instruments and kinds of faults."""
+"""``simnav list``: scenarios, estimators, kinds of instruments, kinds of faults, and IMUs by name."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from simnav import sensors
 from simnav.estimator import describe, names
 from simnav.leaderboard.ranking import tables
 from simnav.scenario.catalogue import headers
+from simnav.sensors.imu_models import GRADES, IMU_MODELS
 
 from .commands import ListCommand, Topic
 from .console import Output
@@ -20,21 +21,24 @@ if TYPE_CHECKING:
     from simnav.scenario.catalogue import Header
     from simnav.spec import Spec
 
-__all__ = ["estimators", "faults", "instruments", "scenarios", "show"]
+__all__ = ["estimators", "faults", "imus", "instruments", "scenarios", "show"]
 
 
 def show(out: Output, request: ListCommand) -> None:
-    """List scenarios, estimators, kinds of instruments or kinds of faults."""
+    """List scenarios, estimators, kinds of instruments, kinds of faults, or IMUs by name."""
     found: dict[str, Any] = {}
     if request.topic in (None, Topic.SCENARIOS):
         found["scenarios"] = scenarios()
-        out.print(_scenario_table(found["scenarios"]))
+        out.print(_scenario_lines(found["scenarios"]))
     if request.topic in (None, Topic.ESTIMATORS):
         found["estimators"] = estimators(places=out.json)
-        out.print(_estimator_table(found["estimators"]))
+        out.print(_estimator_lines(found["estimators"]))
     if request.topic in (Topic.INSTRUMENTS, Topic.FAULTS):
         found[request.topic] = instruments() if request.topic is Topic.INSTRUMENTS else faults()
-        out.print(_kind_table(request.topic.value.capitalize(), found[request.topic]))
+        out.print(_kind_lines(request.topic.value.capitalize(), found[request.topic]))
+    if request.topic is Topic.IMUS:
+        found["imus"] = imus()
+        out.print(_imu_table(found["imus"]))
     out.document(found)
 
 
@@ -83,6 +87,21 @@ class KindItem:
     keys: Mapping[str, Key]
 
 
+@dataclass(frozen=True)
+class ImuItem:
+    """An IMU by name; ``stands_for_grade`` says whether ``grade`` in a scenario means this one."""
+
+    name: str
+    manufacturer: str
+    grade: str
+    stands_for_grade: bool
+    datasheet: str
+    read_in: str
+    gyroscope: Mapping[str, float]
+    accelerometer: Mapping[str, float]
+    effects: Mapping[str, float]
+
+
 def scenarios() -> list[ScenarioItem]:
     """Every scenario of every pack, by track and group."""
 
@@ -116,6 +135,15 @@ def faults() -> list[KindItem]:
     return [_kind(spec, "") for spec in sensors.fault_specs()]
 
 
+def imus() -> list[ImuItem]:
+    """Every IMU that a scenario may name, with the figures of its datasheet."""
+    return [
+        ImuItem(m.name, m.manufacturer, m.grade, GRADES[m.grade] == m.name, m.datasheet, m.read_in, m.gyroscope,
+                m.accelerometer, m.effects)
+        for m in IMU_MODELS.values()
+    ]  # fmt: skip
+
+
 def _kind(spec: type[Spec], fallback: str) -> KindItem:
     field = spec.model_fields.get("kind")
     kind = str(field.default) if field is not None else spec.__name__.removesuffix("Spec").lower()
@@ -124,11 +152,14 @@ def _kind(spec: type[Spec], fallback: str) -> KindItem:
         for key, (name, info) in spec.toml_keys().items()
         if name != "kind"
     }
-    return KindItem(kind, (spec.__doc__ or fallback).strip().splitlines()[0], keys)
+    return KindItem(kind, (spec.__doc__ or fallback).strip().splitlines()[0].rstrip(":"), keys)
 
 
 #: Tracks and groups as they are listed; those of others follow, by name.
-_TRACKS = ("aided-ins", "no-imu", "underwater", "long", "generalisation", "generalisation-no-imu", "recorded", "papers")
+_TRACKS = (
+    "aided-ins", "no-imu", "underwater", "long", "generalisation", "generalisation-no-imu", "robustness", "recorded",
+    "papers",
+)  # fmt: skip
 _GROUPS = ("clean", "degraded GNSS", "outages", "gross errors", "wrong datasheet", "wrong start", "extremes")
 
 
@@ -142,26 +173,35 @@ def _place(header: Header) -> tuple[int, str, int, str, str, int]:
     return rank(track, _TRACKS), track, rank(group, _GROUPS), group, header.name, header.version
 
 
-def _scenario_table(found: list[ScenarioItem]) -> Table:
-    """A row a scenario; a track and a group are named where they begin."""
-    rows, before = [], ("", "")
-    for e in found:
-        track = e.track if e.track != before[0] else ""
-        group = e.group if track or e.group != before[1] else ""
-        version = f"v{e.id.rpartition('-v')[2]}"
-        rows.append([track, group, e.name, version, tables.duration(e.duration), e.title, ", ".join(e.tags)])
-        before = e.track, e.group
-    columns = ["track", "group", "name", "version", "duration", "title", "tags"]
-    return tables.table("Scenarios", columns, rows, numeric=["duration"])
+_MORE = "'simnav show NAME' has the rest."
 
 
-def _estimator_table(found: list[EstimatorItem]) -> Table:
-    rows = [[e.name + (" *" if e.reference else ""), e.summary, tables.parameters(e.parameters)] for e in found]
+def _scenario_lines(found: list[ScenarioItem]) -> tables.Lines:
+    rows = [[e.name, e.track, tables.duration(e.duration), e.title] for e in found]
+    return tables.Lines("Scenarios", ["name", "track", "duration", "title"], rows, numeric=["duration"], caption=_MORE)
+
+
+def _estimator_lines(found: list[EstimatorItem]) -> tables.Lines:
+    rows = [[e.name + (" *" if e.reference else ""), e.summary] for e in found]
     dim = [i for i, e in enumerate(found) if e.reference]
-    caption = "* reference: it is told the truth, and is not ranked" if dim else None
-    return tables.table("Estimators", ["name", "what it is", "parameters"], rows, dim=dim, caption=caption)
+    caption = f"{_MORE} * reference: it is told the truth, and is not ranked." if dim else _MORE
+    return tables.Lines("Estimators", ["name", "what it is"], rows, dim=dim, caption=caption)
 
 
-def _kind_table(title: str, found: list[KindItem]) -> Table:
-    rows = [[e.kind, e.summary, ", ".join(k + ("!" if v.required else "") for k, v in e.keys.items())] for e in found]
-    return tables.table(title, ["kind", "what it is", "keys in TOML (! required)"], rows)
+def _kind_lines(title: str, found: list[KindItem]) -> tables.Lines:
+    return tables.Lines(title, ["kind", "what it is"], [[e.kind, e.summary] for e in found], caption=_MORE)
+
+
+def _imu_table(found: list[ImuItem]) -> Table:
+    """A row an IMU, with the figures of its datasheet in their units."""
+
+    def figures(table: Mapping[str, float]) -> str:
+        return ", ".join(f"{key} = {value:.6g}" for key, value in table.items())
+
+    rows = [
+        [e.name, e.manufacturer, e.grade + (" *" if e.stands_for_grade else ""), figures(e.gyroscope),
+         figures(e.accelerometer), figures(e.effects), e.datasheet]
+        for e in found
+    ]  # fmt: skip
+    columns = ["model", "manufacturer", "grade", "gyroscope", "accelerometer", "effects", "datasheet"]
+    return tables.table("IMUs by name", columns, rows, caption="* this one is meant by the name of its grade")

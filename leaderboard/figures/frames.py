@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from .style import GREY, SHADE, Style, figure
+from .style import FAULT, GREY, SHADE, Style, figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -103,15 +103,29 @@ def time_unit(longest: float) -> tuple[str, float]:
     return ("min", 1.0 / 60.0) if longest > 600.0 else ("s", 1.0)
 
 
-def shade(ax: Axes, outages: Sequence[tuple[float, float, str]], factor: float, *, named: bool) -> None:
-    """Shade outages (start, end [s], name), and name them at the top."""
-    last = -math.inf
-    for start, end, name in sorted(outages):
-        ax.axvspan(start * factor, end * factor, color=SHADE, lw=0, zorder=0)
-        if named and name and start >= last:
-            ax.annotate(name, (start * factor, 1.0), xycoords=("data", "axes fraction"), xytext=(2, -2),
+def shade(
+    ax: Axes,
+    outages: Sequence[tuple[float, float, str]],
+    factor: float,
+    *,
+    named: bool,
+    faults: Sequence[tuple[float, float, str]] = (),
+) -> None:
+    """Shade outages and other faults (start, end [s], name), and name them at the top beside each other."""
+    ends: list[float] = []  # of the names on each line
+    drawn = [(span, SHADE) for span in sorted(outages)] + [(span, FAULT) for span in sorted(faults)]
+    for (start, end, name), colour in drawn:
+        ax.axvspan(start * factor, end * factor, color=colour, lw=0, zorder=0, alpha=1.0 if colour == SHADE else 0.7)
+        if not named or not name:
+            continue
+        line = next((k for k, last in enumerate(ends) if start >= last), len(ends))
+        if line < _NAME_LINES:
+            ends[line : line + 1] = [end]
+            ax.annotate(name, (start * factor, 1.0), xycoords=("data", "axes fraction"), xytext=(2, -2 - 8 * line),
                         textcoords="offset points", ha="left", va="top", fontsize=7.0, color=GREY)  # fmt: skip
-            last = end
+
+
+_NAME_LINES = 3  # of names above each other in a panel
 
 
 def decimal_log_ticks(axis: Any) -> None:

@@ -301,7 +301,9 @@ def run_chart(
     *,
     fixes: Mapping[str, Track] | None = None,
     outages: Sequence[tuple[float, float, str]] = (),
+    faults: Sequence[tuple[float, float, str]] = (),
     diagnostics: Mapping[str, Sequence[Curve]] | None = None,
+    bounds: Mapping[str, float] | None = None,
     title: str = "",
 ) -> Figure:
     """Chart beside the errors over time with their claimed three-sigma bounds; below both, diagnostics in two columns.
@@ -318,10 +320,12 @@ def run_chart(
         Colours and line styles of the estimators.
     fixes : mapping of str to Track, optional
         Instrument -> its position fixes.
-    outages : sequence of (start, end, name)
+    outages, faults : sequence of (start, end, name)
         Shaded [s].
     diagnostics : mapping of str to sequence of Curve, optional
         Label of the vertical axis -> curves.
+    bounds : mapping of str to float, optional
+        Label of a diagnostic's axis -> a line, below which it should be 95 % of the time.
     title : str
         Title of the figure.
     """
@@ -343,7 +347,7 @@ def run_chart(
         for (row, column), (label, curves) in zip(places, [*errors.items(), *below.items()]):
             ax = fig.add_subplot(grid[row, column], sharex=first)
             first = first or ax
-            shade(ax, outages, factor, named=row == 0)
+            shade(ax, outages, factor, named=row == 0, faults=faults)
             by_channel = _channel_styles(curves)
             for c in curves:
                 colour, line = by_channel.get(c.channel) or (style.colour(c.label), style.line(c.label))
@@ -362,6 +366,8 @@ def run_chart(
             if label in errors:
                 _frame_errors(ax, curves)
                 ax.axhline(0.0, color=GREY, lw=0.6, zorder=0.5)
+            if label in (bounds or {}):
+                ax.axhline((bounds or {})[label], color=GREY, lw=0.8, ls=(0, (4, 2)), zorder=0.5)
             ax.set(ylabel=label, xlim=(0.0, longest * factor))
             ax.tick_params(labelbottom=row == lowest[column])
             if row == lowest[column]:

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from simnav.recording import Recording
     from simnav.trial import Trial
 
-__all__ = ["fixes", "innovation_unit", "outage_spans", "relative_track", "run_figure", "true_track"]
+__all__ = ["fault_spans", "fixes", "innovation_unit", "outage_spans", "relative_track", "run_figure", "true_track"]
 
 _AXES = (
     ("North error [m]", 0, 1.0),
@@ -86,6 +86,17 @@ def outage_spans(recording: Recording, most: int = 12) -> list[tuple[float, floa
     if len(spans) > most:
         return []
     return [(a, b, f"no {', '.join(dict.fromkeys(names))}") for (a, b), names in sorted(spans.items()) if a < b]
+
+
+def fault_spans(recording: Recording, most: int = 12) -> list[tuple[float, float, str]]:
+    """Start, end [s] and name of the run's faults but for outages; none where there are too many to tell apart."""
+    found = []
+    for fault in recording.faults:
+        if effect_of(fault.kind) != "missing":
+            sources = [f"{n}:{c}" if c else n for n in fault.instruments for c in fault.channels or ("",)]
+            name = " ".join([fault.kind.replace("_", " "), ", ".join(sources)]).strip()
+            found.append((fault.start, min(fault.end, recording.duration), name))
+    return sorted(span for span in found if span[0] < span[1]) if len(found) <= most else []
 
 
 def _without(recording: Recording, name: str, channel: str, start: float, end: float) -> list[tuple[float, float]]:
@@ -153,9 +164,18 @@ def run_figure(recording: Recording, trials: Sequence[tuple[str, Trial]], refere
         style,
         fixes=fixes(recording),
         outages=outage_spans(recording),
+        faults=fault_spans(recording),
         diagnostics=_diagnostics(shown, recording),
+        bounds={_label(f"nis.{name}", _UNITS["nis"]): _nis_bound(name, recording) for name in recording.data.aids},
         title=f"{recording.scenario}, seed {recording.seed}{note}",
     )
+
+
+def _nis_bound(name: str, recording: Recording) -> float:
+    """The NIS of an instrument below which 95 % lie if all is as the filter assumes: of chi-square."""
+    from scipy.stats import chi2
+
+    return float(chi2.ppf(0.95, len(KINDS[recording.data.aids[name].kind].components)))
 
 
 def innovation_unit(kind: str) -> tuple[str, float] | None:

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 __all__ = [
+    "FAULT",
     "GREY",
     "INK",
     "PALETTE",
@@ -33,12 +34,13 @@ __all__ = [
 
 _MARKERS = ("o", "s", "D", "^", "v", "P", "X", "*")
 INK, GRID = INKS["light"]["ink"], INKS["light"]["grid"]
-GREY, SHADE, PAPER = "#66707d", "#eceff3", "#fefefe"
+GREY, SHADE, FAULT, PAPER = "#66707d", "#eceff3", "#fbead9", "#fefefe"
 _DARK = {
     INK: INKS["dark"]["ink"],
     GREY: INKS["dark"]["grey"],
     GRID: INKS["dark"]["grid"],
     SHADE: "#262d36",
+    FAULT: "#3a2a1c",
     PAPER: "#161b21",
 }
 TRUTH = INK
@@ -69,13 +71,14 @@ _RC: dict[Any, Any] = {
     "xtick.labelsize": 8.0,
     "ytick.labelsize": 8.0,
     "text.color": INK,
+    "pdf.fonttype": 42,  # letters stay letters, as journals ask for it
     "text.parse_math": False,  # names of estimators are not TeX
     "legend.fontsize": 8.0,
     "legend.frameon": False,
     "lines.linewidth": 1.5,
     "lines.solid_capstyle": "round",
     "figure.facecolor": "none",
-    "svg.fonttype": "path",
+    "svg.fonttype": "none",
     "svg.hashsalt": "simnav",
     "path.simplify_threshold": 0.5,
 }
@@ -123,10 +126,10 @@ class Style:
 
 def figure(width: float, height: float) -> Figure:
     """An empty figure in the common style; ``width`` and ``height`` in inches."""
-    from matplotlib.figure import Figure
+    from .notebook_figure import NotebookFigure
 
     with styled():
-        return Figure(figsize=(width, height), layout="constrained")
+        return NotebookFigure(figsize=(width, height), layout="constrained")
 
 
 def styled() -> Any:

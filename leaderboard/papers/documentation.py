@@ -2,7 +2,7 @@
 
 ``python -m simnav.leaderboard.papers.documentation [FOLDER]`` writes them; with a folder, the output of ``simnav
 reproduce PAPER --until-decided``, it stores the results of that folder first. Each page has a marked block for each of
-these: ``citation``, ``tables`` and ``contents``; the overview has ``overview``. The figures are in
+these: ``citation``, ``claims``, ``tables`` and ``contents``; the overview has ``overview``. The figures are in
 ``docs/papers/figures``. The text between the marks is replaced,
 and everything else is written by hand.
 """
@@ -16,6 +16,8 @@ from simnav.leaderboard.results.provenance import Provenance
 
 from . import PAPERS
 from . import paper as papers
+from .claims.section import claim_count, claim_figures, claim_sheets
+from .claims.stored import answers_of, computed_on
 from .contents import contents
 from .figures import Drawn, write_figures
 from .paper import KINDS_OF_ROWS, Figure, Paper
@@ -40,8 +42,6 @@ def update(folder: Path = FOLDER) -> None:
 
 def draw(folder: Path = FOLDER) -> None:
     """Draw the figures that need no run, and make the files small: they have few colours."""
-    from PIL import Image
-
     for key in PAPERS:
         place = folder / "figures" / key
         place.mkdir(parents=True, exist_ok=True)
@@ -49,7 +49,15 @@ def draw(folder: Path = FOLDER) -> None:
             old.unlink()
         for drawn in _figures(shipped_reproduction(papers.paper_of(key)), place):
             assert drawn.path is not None
-            Image.open(drawn.path).convert("RGB").quantize(64).save(drawn.path, optimize=True)
+            _shrink(drawn.path)
+        for figure in claim_figures(answers_of(key), place):
+            _shrink(figure.path)
+
+
+def _shrink(path: Path) -> None:
+    from PIL import Image
+
+    Image.open(path).convert("RGB").quantize(64).save(path, optimize=True)
 
 
 def _figures(found: Reproduction, place: Path) -> list[Drawn]:
@@ -88,18 +96,37 @@ def blocks(paper: Paper) -> dict[str, str]:
     ]  # fmt: skip
     for sheet in sheets(found):
         number = f"{sheet.number}: " if sheet.number else ""
-        head = [c.title for c in sheet.columns]
-        rule = ["--:" if c.numeric else "---" for c in sheet.columns]
-        lines = [_line(cells) for cells in (head, rule, *(row.cells for row in sheet.rows))]
-        notes = "\n".join(f"- {note}" for note in sheet.notes)
-        tables += [f"### {number}{sheet.title}", *_pictures(paper, sheet), "\n".join(lines), notes]
+        tables += [f"### {number}{sheet.title}", *_pictures(paper, sheet), *_markdown(sheet)]
     further = _images(paper, (f for f in paper.figures if f.draw in ("bars", "gains") and not f.number))
     tables += ["### Of all runs", *further] if further else []
     return {
         "citation": _citation(paper),
+        "claims": _claims(paper),
         "tables": "\n\n".join(text for text in tables if text),
         "contents": _contents(paper),
     }
+
+
+def _markdown(sheet: Sheet) -> tuple[str, str]:
+    """A table, and its notes."""
+    head = [c.title for c in sheet.columns]
+    rule = ["--:" if c.numeric else "---" for c in sheet.columns]
+    lines = [_line(cells) for cells in (head, rule, *(row.cells for row in sheet.rows))]
+    return "\n".join(lines), "\n".join(f"- {note}" for note in sheet.notes)
+
+
+def _claims(paper: Paper) -> str:
+    """The claims of a paper with their conditions, the gains, and a figure for each."""
+    answers = answers_of(paper.key)
+    if not answers:
+        return ""
+    first, values = claim_sheets(answers)
+    days = sorted({computed_on(a.claim) for a in answers})
+    images = [f"![{a.sentence}](figures/{paper.key}/claim-{a.claim}.png)" for a in answers if a.dials]
+    again = "`simnav claim NAME --holds-if CONDITION` computes an answer again, also with other values."
+    computed = f"Computed on {', '.join(days)}. {again}"
+    parts = [*_markdown(first), computed, *images, f"### {values.title}", *_markdown(values)]
+    return "\n\n".join(parts)
 
 
 def _pictures(paper: Paper, sheet: Sheet) -> list[str]:
@@ -120,8 +147,8 @@ def _versions(p: Provenance) -> str:
 
 
 def overview() -> str:
-    """A table of the papers with the verdicts on their rows."""
-    titles = ("paper", "comparison", *KINDS_OF_ROWS.values(), "a single run of ours")
+    """A table of the papers with the verdicts on their claims and rows."""
+    titles = ("paper", "comparison", "claims", *KINDS_OF_ROWS.values(), "a single run of ours")
     lines = [_line(titles), _line(("---",) * len(titles))]
     for key in PAPERS:
         paper = papers.paper_of(key)
@@ -129,7 +156,8 @@ def overview() -> str:
         counts = (verdicts(found, kind) or "none" for kind in KINDS_OF_ROWS)
         inside, known = found.single_runs
         single = f"{inside} of {known} that do not agree" if known else "–"
-        lines.append(_line((f"[{paper.short}]({key}.md)", paper.about, *counts, single)))
+        claims = claim_count(answers_of(key)) or "–"
+        lines.append(_line((f"[{paper.short}]({key}.md)", paper.about, claims, *counts, single)))
     return "\n".join(lines)
 
 

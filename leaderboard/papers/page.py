@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 __all__ = ["PaperPage", "pages_in", "write"]
 
-_FORMAT = 2  # of the document
+_FORMAT = 3  # of the document
 
 
 @dataclass(frozen=True)
@@ -59,6 +59,7 @@ class _Document:
     command: str
     full: str
     notes: list[str]
+    claims: list[Sheet]
     tables: list[Sheet]
     figures: list[_Figure]
     contents: list[Whereabouts]
@@ -116,7 +117,7 @@ class PaperPage:
             from .figures import write_figures
 
             drawn = write_figures(self.stored, folder / place, scores_only=True)
-            document = _document(self.stored, drawn)
+            document = _document(self.stored, drawn, folder / place)
         else:
             for figure in document.figures:
                 shutil.copyfile(self.folder / figure.file, folder / place / figure.file)
@@ -131,7 +132,7 @@ def write(found: Reproduction, drawn: Sequence[Drawn], folder: Path) -> Path:
     Path
         Path of the page.
     """
-    document = _document(found, drawn)
+    document = _document(found, drawn, folder)
     write_whole(folder / f"paper-{document.paper}.json", _json().dump_json(document, indent=1) + b"\n")
     for name in STATIC:
         shutil.copyfile(TEMPLATES / name, folder / name)
@@ -182,10 +183,17 @@ def _render(document: _Document, place: str, site: SiteFacts) -> str:
     return str(template.render(paper=document, place=place, page=f"paper-{document.paper}.html", site=site))
 
 
-def _document(found: Reproduction, drawn: Sequence[Drawn]) -> _Document:
+def _document(found: Reproduction, drawn: Sequence[Drawn], folder: Path | None = None) -> _Document:
+    """The contents of a page; figures of the claims are written into the folder, if one is given."""
     from importlib.metadata import version
 
+    from .claims.section import claim_count, claim_figures, claim_sheets
+    from .claims.stored import answers_of
+
     paper = found.paper
+    answers = answers_of(paper.key)
+    claims = claim_count(answers)
+    of_claims = [] if folder is None else claim_figures(answers, folder)
     return _Document(
         format=_FORMAT,
         paper=paper.key,
@@ -197,16 +205,22 @@ def _document(found: Reproduction, drawn: Sequence[Drawn]) -> _Document:
         version=version("simnav"),
         generated=datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
         runs=len(found.seeds),
-        summary=summary(found),
+        summary=f"claims: {claims}; {summary(found)}" if claims else summary(found),
         rules=RULES,
         command=f"simnav reproduce {paper.key}",
         full=f"simnav reproduce {paper.key} --until-decided",
         notes=list(paper.notes),
+        claims=claim_sheets(answers),
         tables=list(sheets(found)),
         figures=[
-            _Figure(d.figure.full_number, d.figure.title, d.path.name, d.caption, d.width, d.height, list(d.missing))
-            for d in drawn
-            if d.path is not None
+            *(_Figure("", c.title, c.path.name, c.caption, c.width, c.height, []) for c in of_claims),
+            *(
+                _Figure(
+                    d.figure.full_number, d.figure.title, d.path.name, d.caption, d.width, d.height, list(d.missing)
+                )
+                for d in drawn
+                if d.path is not None
+            ),
         ],
         contents=whereabouts(found, drawn),
     )

@@ -97,9 +97,12 @@ class ScenarioRanking:
         return any(r.provisional for r in self.rows if r.ranked)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class TrackRanking(TrackTable):
     """The ranking on one track, with its sentence and its figure; the attributes are those of `TrackTable`."""
+
+    def __repr__(self) -> str:
+        return f"<TrackRanking: {self.track}, {sum(r.ranked for r in self.rows)} ranked rows>"
 
     @property
     def sentence(self) -> str:
@@ -111,7 +114,7 @@ class TrackRanking(TrackTable):
         return ranking_figure(self)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Ranking:
     """The whole ranking. There are ranks within a track only.
 
@@ -125,6 +128,10 @@ class Ranking:
 
     tracks: tuple[TrackRanking, ...]
     scenarios: tuple[ScenarioRanking, ...]
+
+    def __repr__(self) -> str:
+        names = ", ".join(t.track for t in self.tracks)
+        return f"<Ranking: {len(self.scenarios)} scenarios in the tracks {names}>"
 
     def track(self, name: str) -> TrackRanking:
         """The ranking of one track.

@@ -60,6 +60,7 @@ from .remarks import (
     remarks,
     request_remarks,
     seed_remarks,
+    superseded_remarks,
 )
 from .runs import Runs, group
 from .scenario_runs import Cell, ScenarioRuns
@@ -76,6 +77,7 @@ from .statistics import (
     unorderable,
     weighted_quantile,
 )
+from .superseded import superseded_by
 from .tracks import Track, catalogued, tracks_of
 from .variants import families, surplus
 
@@ -265,6 +267,7 @@ def _track(
             *request_remarks([(len(t.seeds), requested.get(t.name, ())) for t in used]),
             *reference_remarks(references),
             *learned_remarks(found),
+            *superseded_remarks(found),
             *seed_remarks([t.seals for t in used]),
             *recorded_remarks(sum(t.recorded for t in used), len(used)),
         ), why, tuple(found),
@@ -381,6 +384,7 @@ def _rows(
             "update_median": _median([_median(x) for c in mine if len(x := c.runs.numbers("update_median"))]),
             "peak_memory": max(c.runs.peak_memory for c in mine),
             "learned": learned_by(r for c in mine for r in c.runs.results),
+            "superseded": superseded_by(n.partition("(")[0], (r for c in mine for r in c.runs.results)),
         })  # fmt: skip
     return rows, separation, why
 

@@ -11,7 +11,10 @@ from .statistics import FEWEST, Separation, smallest_p_value
 if TYPE_CHECKING:
     from .board import Reference, Row
 
-__all__ = ["learned_remarks", "recorded_remarks", "reference_remarks", "remarks", "request_remarks", "seed_remarks"]
+__all__ = [
+    "learned_remarks", "recorded_remarks", "reference_remarks", "remarks", "request_remarks", "seed_remarks",
+    "superseded_remarks",
+]  # fmt: skip
 
 #: From so many units on, equal rows are told apart on at most 5 % of boards; with ten, on up to so many per cent.
 #: Measured with the differences of real rows, see docs/statistics.md.
@@ -110,6 +113,12 @@ def learned_remarks(rows: Sequence[Row]) -> tuple[str, ...]:
         return ()
     more = f"; and {len(found) - _LEARNED} rows more" if len(found) > _LEARNED else ""
     return (f"Learned, as the rows say: {'; '.join(found[:_LEARNED])}{more}.",)
+
+
+def superseded_remarks(rows: Sequence[Row]) -> tuple[str, ...]:
+    """Which rows have results of an older version than the one that comes with simnav."""
+    found = [f"{r.estimator} ({r.superseded})" for r in rows if r.superseded]
+    return (f"Results of an older version: {', '.join(found)}.",) if found else ()
 
 
 def seed_remarks(scenarios: Sequence[Collection[str]]) -> tuple[str, ...]:

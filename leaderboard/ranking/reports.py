@@ -11,22 +11,25 @@ from simnav.leaderboard.results.export import table
 from simnav.leaderboard.results.frame import frame
 from simnav.leaderboard.results.plain import as_json
 from simnav.leaderboard.results.result import Result
+from simnav.leaderboard.results.shown import Shown
 
+from . import tables
 from .board import Ranking
 from .confinement import confined
 from .failures import failures
-from .standing import Standing
+from .ranking_table import ranking_tables
+from .standing import Standing, standing_table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from simnav.leaderboard.campaign.campaign import Summary
 
-__all__ = ["CampaignReport", "EvaluationReport"]
+__all__ = ["CampaignReport", "EvaluationReport", "StandardReport"]
 
 
-@dataclass(frozen=True, eq=False)
-class _Report:
+@dataclass(frozen=True, eq=False, repr=False)
+class _Report(Shown):
     """Results with their ranking.
 
     Attributes
@@ -40,6 +43,15 @@ class _Report:
     results: Sequence[Result]
     ranking: Ranking
 
+    def headline(self) -> str:
+        """How much was run."""
+        scenarios, labels = ({getattr(r, name) for r in self.results} for name in ("scenario", "estimator"))
+        return f"{len(self.results)} results of {len(labels)} estimators on {len(scenarios)} scenarios"
+
+    def shown(self) -> Sequence[tables.Fitted]:
+        """A table for each track."""
+        return ranking_tables(self.ranking)
+
     def to_frame(self) -> Any:
         """A row a run, a column a score (SI units, radians); see `simnav.leaderboard.results.frame.frame`."""
         return frame(table(self.results).to_pylist())
@@ -49,7 +61,12 @@ class _Report:
         return self.ranking.plot()
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
+class StandardReport(_Report):
+    """The result that comes with simnav."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
 class CampaignReport(_Report):
     """A campaign and all that is in its folder.
 
@@ -75,7 +92,7 @@ class CampaignReport(_Report):
         }
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class EvaluationReport(_Report):
     """Where estimators stand among others.
 
@@ -98,6 +115,21 @@ class EvaluationReport(_Report):
     seeds: Sequence[int]
     standings: tuple[Standing, ...]
     folder: Path | None
+
+    def headline(self) -> str:
+        """The verdict on each estimator and scenario."""
+        return " ".join(self.verdicts)
+
+    def shown(self) -> Sequence[tables.Fitted]:
+        """A table for each estimator and scenario; with several scenarios, first those of the tracks."""
+        tracks = ranking_tables(self.ranking, self.estimators) if len(self.scenarios) > 1 else []
+        return [*tracks, *map(standing_table, self.standings)]
+
+    @property
+    def verdicts(self) -> list[str]:
+        """A sentence on each estimator and scenario: its places, and its error beside the plain row's."""
+        plain = {s: t.plain for t in self.ranking.tracks for s in t.scenarios}
+        return [stand.verdict(plain.get(stand.scenario, "")) for stand in self.standings]
 
     def to_dict(self) -> dict[str, Any]:
         """What ``simnav evaluate --json`` prints."""

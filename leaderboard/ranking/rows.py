@@ -174,6 +174,8 @@ class Row:
         Largest of all runs [bytes].
     learned : str
         What it says that it learned from; empty where it learned nothing.
+    superseded : str
+        The version that its results are of, where simnav has a newer one; empty otherwise.
     """
 
     estimator: str
@@ -204,6 +206,7 @@ class Row:
     update_median: float = math.nan
     peak_memory: int = 0
     learned: str = ""
+    superseded: str = ""
 
     @property
     def ranked(self) -> bool:

@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 
 __all__ = ["Standing", "StandingRow", "standing", "standing_table"]
 
+_LEVEL = 0.05  # p-values below it are differences
+
 
 @dataclass(frozen=True)
 class StandingRow:
@@ -63,8 +65,10 @@ class Standing:
     scenario, estimator : str
         Versioned id of the scenario, and label of the estimator.
     place : int or None
-        Place by median error among the rows that are no references; None where the scenario does not suit the
-        estimator.
+        The best place among the rows that are no references that it may have: one more than there are rows that are
+        better with a p-value below 5 %. None where the scenario does not suit the estimator.
+    last : int or None
+        The last place that it may have: so many rows are not worse with such a p-value.
     of : int
         How many there are.
     rows : tuple of StandingRow
@@ -74,8 +78,36 @@ class Standing:
     scenario: str
     estimator: str
     place: int | None
+    last: int | None
     of: int
     rows: tuple[StandingRow, ...]
+
+    @property
+    def places(self) -> str:
+        """The places that it may have among all, in words."""
+        if self.place is None or self.last is None:
+            return "does not suit it"
+        if self.place == self.last:
+            return f"is {self.place} of {self.of}"
+        return f"may be {self.place} to {self.last} of {self.of}"
+
+    def verdict(self, plain: str = "") -> str:
+        """One sentence: its places, and its error beside that of the plain row where that was run.
+
+        Parameters
+        ----------
+        plain : str
+            Label of the plain row.
+        """
+        said = f"{self.estimator} {self.places} on {self.scenario}"
+        beside = next((r for r in self.rows if r.estimator == plain and r.ratio is not None), None)
+        if beside is None or beside.ratio is None or self.estimator == plain:
+            return f"{said}."
+        between = ""
+        if beside.ratio_low is not None and beside.ratio_high is not None and math.isfinite(beside.ratio_low):
+            between = f" (95 %: {tables.number(beside.ratio_low)} to {tables.number(beside.ratio_high)} times)"
+        chance = "" if _apart(beside) else "; the difference may be chance"
+        return f"{said}; its error is {tables.number(beside.ratio)} times that of {plain}{between}{chance}."
 
 
 def standing(by: Mapping[str, Runs], mine: str, scenario: str) -> Standing:
@@ -92,9 +124,17 @@ def standing(by: Mapping[str, Runs], mine: str, scenario: str) -> Standing:
     """
     found = (_row(runs, by.get(mine)) for runs in by.values() if runs.tried)
     rows = sorted(found, key=lambda r: math.inf if math.isnan(r.horizontal_rmse) else r.horizontal_rmse)
-    ranked = [r.estimator for r in rows if not r.reference]
-    place = ranked.index(mine) + 1 if mine in ranked else None
-    return Standing(scenario, mine, place, len(ranked), tuple(rows))
+    ranked = [r for r in rows if not r.reference]
+    if mine not in {r.estimator for r in ranked}:
+        return Standing(scenario, mine, None, None, len(ranked), tuple(rows))
+    apart = [r for r in ranked if _apart(r)]
+    better = sum(r.ratio is not None and r.ratio > 1.0 for r in apart)
+    return Standing(scenario, mine, 1 + better, len(ranked) - len(apart) + better, len(ranked), tuple(rows))
+
+
+def _apart(row: StandingRow) -> bool:
+    """Whether the one in question differs from a row by more than chance."""
+    return row.p_value is not None and row.p_value < _LEVEL
 
 
 def _row(runs: Runs, mine: Runs | None) -> StandingRow:
@@ -124,9 +164,8 @@ def standing_table(stand: Standing) -> tables.Fitted:
     mine = stand.estimator
     with_interval = " with its 95 % interval" if any(math.isfinite(r.low) for r in stand.rows) else ""
     columns = ["estimator", "failed", "horizontal RMSE [m]", f"{mine} / it", f"{mine} better in", "p"]
-    place = f"is {stand.place} of {stand.of}" if stand.place else "does not suit it"
     return tables.Fitted(
-        f"{stand.scenario}: {mine} {place}",
+        f"{stand.scenario}: {mine} {stand.places}",
         columns,
         rows,
         ["estimator", f"{mine} / it", "p", "horizontal RMSE [m]", "failed", f"{mine} better in"],

@@ -7,11 +7,12 @@ from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
 from . import tables
+from .stored_costs import cost_of
 
 if TYPE_CHECKING:
-    from .rows import Row, TrackTable
+    from .rows import Row, TrackRow, TrackTable
 
-__all__ = ["best_rows", "gain_text", "less", "sentence", "spread"]
+__all__ = ["best_rows", "gain_text", "less", "limits", "sentence", "spread"]
 
 _NAMED = 4  # rows that a sentence names
 #: From this ratio of errors on it is written as a multiple, and beyond the largest it is not written.
@@ -19,7 +20,7 @@ _TIMES, _MOST_TIMES = 2.0, 100
 _ERROR = " times the error"
 
 
-def best_rows(track: TrackTable) -> list[Row]:
+def best_rows(track: TrackTable) -> list[TrackRow]:
     """The rows that may be the best, in order of score; none where the rows cannot be ordered."""
     return [r for r in track.rows if r.ranked and r.may_be_best]
 
@@ -146,3 +147,32 @@ def sentence(track: TrackTable) -> str:
         said += f" {'has' if one else 'have'} {spread((r.score for r in best), '{:.2f}')} times the error of an oracle "
         said += "on the same runs"
     return f"{said}."
+
+
+def limits(track: TrackTable) -> str:
+    """A second sentence on the rows that may be the best: their cost, and where they are worse than the plain row.
+
+    Returns
+    -------
+    str
+        Empty where the track has no plain row, or none of these rows is another one.
+    """
+    best = [r for r in best_rows(track) if r.estimator != track.plain]
+    plain = next((r for r in track.rows if r.estimator == track.plain), None)
+    if plain is None or not best or track.insufficient:
+        return ""
+    said = []
+    costs = [c.value for r in best if (c := cost_of(r.estimator, track.plain, track.score)) is not None]
+    if costs:
+        said.append(f"they take {spread(costs, '{:.2g}')} times the processor time of `{track.plain}`")
+    beside = [
+        (x / own, r.estimator, s) for r in best for s, x in r.ratios.items() if (own := plain.ratios.get(s, 0.0)) > 0.0
+    ]
+    worst = max(beside, default=(0.0, "", ""))
+    if worst[0] > _WORSE:
+        said.append(f"the worst of them on one scenario is `{worst[1]}` on {worst[2]}, with {_less([worst[0]])}")
+    text = "; ".join(said)
+    return f"{text[0].upper()}{text[1:]}." if text else ""
+
+
+_WORSE = 1.05  # ratio from which on a row is said to be worse

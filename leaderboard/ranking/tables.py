@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from rich.console import Console, ConsoleOptions, RenderResult
     from rich.table import Table
 
-__all__ = ["Fitted", "duration", "interval", "number", "parameters", "percent", "size", "table"]
+__all__ = ["Fitted", "Lines", "duration", "interval", "number", "parameters", "percent", "size", "table"]
 
 MISSING = "–"
 
@@ -166,6 +166,53 @@ def table(
         style = "bold" if index in bold else "dim" if index in faint else ""
         result.add_row(*(Text(MISSING if c is None else str(c)) for c in row), style=style)
     return result
+
+
+@dataclass(frozen=True)
+class Lines:
+    """A list with one line for each entry: the last column is cut where the terminal ends, all others stay whole.
+
+    Parameters
+    ----------
+    title : str
+        Title above the list.
+    columns : sequence of str
+        Titles of the columns.
+    rows : sequence of sequences of str
+        Cells of each entry.
+    numeric, dim, caption
+        As in `table`.
+    """
+
+    title: str
+    columns: Sequence[str]
+    rows: Sequence[Sequence[str]]
+    numeric: Sequence[str] = ()
+    dim: Sequence[int] = ()
+    caption: str | None = None
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
+        widths = [max(map(len, (name, *cells))) for name, *cells in zip(self.columns[:-1], *self.heads, strict=True)]
+        room = max(options.max_width - _EDGES - sum(widths) - _BETWEEN * len(widths), _LEAST)
+        rows = [[*head, _cut(row[-1], room)] for head, row in zip(self.heads, self.rows, strict=True)]
+        yield table(self.title, self.columns, rows, numeric=self.numeric, dim=self.dim, caption=self.caption)
+
+    @property
+    def heads(self) -> list[Sequence[str]]:
+        """The cells of all columns but the last."""
+        return [row[:-1] for row in self.rows]
+
+
+_LEAST = 12  # characters of the last column of `Lines`, be the terminal ever so narrow
+
+
+def _cut(text: str, width: int) -> str:
+    """A text of at most so many characters.
+
+    >>> _cut("Open sea on a clean day", 12)
+    'Open sea on…'
+    """
+    return text if len(text) <= width else f"{text[: width - 1].rstrip()}…"
 
 
 _BETWEEN, _EDGES = 3, 2  # characters between two columns, and at both ends of a line

@@ -31,6 +31,7 @@ _TITLES = {
     "post-processing": "Post-processing",
     "generalisation": "Generalisation",
     "generalisation-no-imu": "Generalisation without an IMU",
+    "robustness": "Beyond the datasheets",
     "recorded": "Recorded voyages",
     "papers": "Scenarios of papers",
     "other": "Other scenarios",

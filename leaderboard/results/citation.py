@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from datetime import UTC, datetime
 
+from .errors import RequestError
 from .provenance import BENCHMARK, Provenance, benchmark_of, distinct
 
 __all__ = ["AUTHORS", "TITLE", "Citation", "citation"]
@@ -26,6 +27,8 @@ class Citation:
         Key of the BibTeX entry.
     year, version : str
         Year and version of the software.
+    author : str
+        Who made the results; of simnav itself its authors.
     note : str
         Version of the benchmark; of results also the commit, the days of the runs and how many runs there are.
     """
@@ -34,11 +37,13 @@ class Citation:
     year: str
     version: str
     note: str
+    author: str = AUTHORS
 
     @property
     def bibtex(self) -> str:
-        """A ``@software`` entry."""
-        fields = {"author": f"{{{AUTHORS}}}", "title": f"{{{TITLE}}}", "year": self.year,
+        """A ``@software`` entry; a group has braces of its own, persons are parted by "and"."""
+        author = f"{{{AUTHORS}}}" if self.author == AUTHORS else self.author
+        fields = {"author": author, "title": f"{{{TITLE}}}", "year": self.year,
                   "version": self.version, "note": self.note}  # fmt: skip
         lines = [f"  {name:<7} = {{{value}}}" for name, value in fields.items() if value]
         return f"@software{{{self.key},\n" + ",\n".join(lines) + "\n}"
@@ -47,20 +52,22 @@ class Citation:
     def text(self) -> str:
         """One line."""
         version = f", version {self.version}" if self.version else ""
-        return f"{AUTHORS} ({self.year}). {TITLE}{version}. {self.note}."
+        return f"{self.author} ({self.year}). {TITLE}{version}. {self.note}."
 
     def to_dict(self) -> dict[str, str]:
         """What ``simnav cite --json`` prints."""
         return {"key": self.key, "bibtex": self.bibtex, "text": self.text}
 
 
-def citation(provenances: Iterable[Provenance] | None = None) -> Citation:
+def citation(provenances: Iterable[Provenance] | None = None, author: str = "") -> Citation:
     """How to cite this version of simnav, or results.
 
     Parameters
     ----------
     provenances : iterable of Provenance, optional
         One for each result.
+    author : str
+        Who made the results. Default: the authors of simnav, whose software made them.
 
     Raises
     ------
@@ -70,7 +77,11 @@ def citation(provenances: Iterable[Provenance] | None = None) -> Citation:
     if provenances is None:
         from importlib.metadata import version
 
+        if author:
+            raise RequestError("an author is named for results only; simnav itself has its own")
         return Citation("simnav", f"{datetime.now(UTC).year}", version("simnav"), BENCHMARK)
+    if fault := _author_fault(author):
+        raise RequestError(f'author {author!r:.80}: {fault}; like "Ana Silva and Per Olsen"')
     every = list(provenances)
     known = distinct(every)
     benchmark = benchmark_of(every)
@@ -83,7 +94,16 @@ def citation(provenances: Iterable[Provenance] | None = None) -> Citation:
         note.append(f"computed on {days[0]}" if len(days) == 1 else f"computed from {days[0]} to {days[-1]}")
     versions = ", ".join(sorted({p.simnav for p in known if p.simnav}))
     year = days[-1][:4] if days else f"{datetime.now(UTC).year}"
-    return Citation(benchmark.replace(" ", "-") or "simnav", year, versions, "; ".join(note))
+    return Citation(benchmark.replace(" ", "-") or "simnav", year, versions, "; ".join(note), author or AUTHORS)
+
+
+def _author_fault(author: str) -> str:
+    """Why a text cannot stand as an author in BibTeX; empty if it can."""
+    if not author:
+        return ""
+    if not author.strip() or not author.isprintable():
+        return "it is a line of printable characters"
+    return "it has no braces, backslashes or quotes" if set(author) & set('{}\\"') else ""
 
 
 def _commit(provenance: Provenance) -> str:

@@ -210,7 +210,13 @@ def table(results: Sequence[Result]) -> pa.Table:
     origins = [_provenance(by_id[key]) for key in index]
     for name in _provenance(Provenance()):
         columns[name] = pa.array([o[name] for o in origins], kinds.get(name, text)).take(number)
-    return pa.table(columns)
+    units = {name: score.unit for name, score in SCORES.items()} | _UNITS
+    fields = [pa.field(n, c.type, metadata={"unit": units[n]} if n in units else None) for n, c in columns.items()]
+    return pa.table(list(columns.values()), schema=pa.schema(fields))
+
+
+#: Units of columns that are no scores; they and those of the scores are metadata of the columns of a Parquet file.
+_UNITS = {"seconds": "s", "time_limit_s": "s", "peak_memory": "byte", "memory_limit_bytes": "byte"}
 
 
 def _provenance(provenance: Provenance) -> dict[str, Any]:

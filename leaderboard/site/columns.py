@@ -126,7 +126,8 @@ SCORES_SHOWN = (
 
 #: Terms of the pages, besides the columns.
 _GLOSSARY: tuple[tuple[str, str], ...] = (
-    ("Estimator", "A method that turns measurements into position, velocity and attitude. Each has a row."),
+    ("Estimator", "A program that turns measurements into position, velocity and attitude."),
+    ("Row", "An estimator with its parameters, as it was run."),
     ("Scenario", "A simulated or recorded voyage with its instruments and faults."),
     ("Seed", "The number that fixes everything random of a run. All estimators run on the same seeds."),
     ("Track", "Scenarios that the same estimators can do. There are ranks within a track only."),

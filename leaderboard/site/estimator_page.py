@@ -17,6 +17,7 @@ from . import charts, curves
 from .background import Background
 from .columns import SCORES_SHOWN, Column, column_dicts
 from .content import PLAIN, Fact
+from .datasheets import profile_charts, version_of
 from .losses import losses
 from .rounding import short, shorts
 from .scenario_page import inside_chart, track_from
@@ -165,7 +166,10 @@ def estimator_data(
             "columns": column_dicts((*_COLUMNS, *shown)),
             "rows": rows,
         },
-        "charts": [c.to_dict() for c in _profile(label, ranking, scenarios)],
+        "charts": [
+            c.to_dict()
+            for c in (*_profile(label, ranking, scenarios), *profile_charts(label, version_of(label, runs.values())))
+        ],
         "rows": {label: {"reference": entry.reference}},
         "first": [label],
         "worst": None if worst is None or single is None else _worst_page(label, *worst, single, scenarios),

@@ -7,11 +7,14 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from simnav.leaderboard.ranking.confinement import confined
-from simnav.leaderboard.ranking.ranking_table import score_caption, score_title
+from simnav.leaderboard.ranking.ranking_table import ratio, score_caption, score_title
 from simnav.leaderboard.ranking.stored_costs import NOT_MEASURED, CostMultiple, cost_of, not_measured
+from simnav.leaderboard.ranking.summary import limits
 
 from .charts import accuracy_and_cost, columns, detection, spread, spread_data
 from .columns import Column, column_dicts
+from .datasheets import COLUMN, cells
+from .heatmap import heatmap
 from .rounding import short
 
 if TYPE_CHECKING:
@@ -172,13 +175,15 @@ def board_row(
         notes.append("provisional")
     if row.learned:
         notes.append("learned")
+    if row.superseded:
+        notes.append("older version")
     if same:
         notes.append(f"same result: {', '.join(same)}")
     return {
         "name": {"text": row.estimator, "page": entry.page, "note": ", ".join(notes)},
         "ranks": {"text": row.ranks.replace("-", "–") or None, "sort": row.rank_low},
         "best": row.may_be_best,
-        "score": {"value": short(row.score), "help": row.why or row.learned or None},
+        "score": {"value": short(row.score), "help": row.why or row.superseded or row.learned or None},
         "bar": {"value": short(row.score), "low": short(row.low), "high": short(row.high)},
         "interval": _ends(row.low, row.high),
         "over_scenarios": _ends(row.scenarios_low, row.scenarios_high),
@@ -269,12 +274,15 @@ def _track(
         )
         for s in track.scenarios
     ]
+    wrong = cells(track, runs)
+    more = [COLUMN, *more] if wrong else more
     every = all(r.provisional for r in track.rows if r.ranked)
     rows = [
         board_row(
             row, estimators[row.estimator], cost_of(row.estimator, track.plain, track.score), others, provisional=every
         )
         | {f"s:{s}": {"value": short(v), "page": scenarios[s].page} for s, v in row.ratios.items()}
+        | ({COLUMN.key: wrong.get(row.estimator)} if wrong else {})
         for row, others in _once(track.rows)
     ]
     scored = [r for r in track.rows if r.ranked and math.isfinite(r.score)]
@@ -282,7 +290,7 @@ def _track(
         "key": track.track,
         "title": track.title,
         "best": any(r.may_be_best for r in track.rows),
-        "sentence": track.sentence.replace("`", ""),
+        "sentence": f"{track.sentence} {limits(track)}".strip().replace("`", ""),
         "remarks": list(track.remarks),
         "provisional": track.provisional,
         "facts": f"{_count(len(track.scenarios), 'scenario')}, {_count(len(scored), 'ranked estimator')}, "
@@ -294,6 +302,7 @@ def _track(
             "columns": board_columns(title, explanation, bar_scale(scored), more),
             "rows": rows,
         },
+        "map": None if (drawn := heatmap(track, scored, scenarios)) is None else drawn.to_dict(),
         "charts": [c.to_dict() for c in _charts(track, scored, title, estimators, runs)],
         "scenarios": [
             {"id": s, "name": scenarios[s].name, "title": scenarios[s].title, "page": scenarios[s].page}
@@ -333,6 +342,9 @@ def _charts(
     measured = {r.estimator: cost_of(r.estimator, track.plain, track.score) for r in rows if r.score > 0.0}
     costed = [(r, cost) for r in rows if (cost := measured.get(r.estimator)) is not None]
     made = []
+    end = bar_scale(rows)[1]
+    far = [(r, cost) for r, cost in costed if r.score > end]
+    costed = [pair for pair in costed if pair not in far]
     if len(costed) > 1:
         data = {
             "rows": {
@@ -346,7 +358,9 @@ def _charts(
             }
         }
         plain_name = " or ".join(dict.fromkeys(c.plain for _, c in costed))
-        missing = not_measured(name for name, cost in measured.items() if cost is None)
+        beyond = ", ".join(f"{r.estimator} ({ratio(r.score)})" for r, _ in far)
+        unknown = not_measured(name for name, cost in measured.items() if cost is None)
+        missing = " ".join(filter(None, [f"Above the chart: {beyond}." if far else "", unknown]))
         made.append(accuracy_and_cost(f"{track.track}-cost", f"Score ({title})", plain_name, data, missing))
     nees = _medians_by_scenario(track, rows, runs, "nees_horizontal")
     if nees["middles"]["row"]:

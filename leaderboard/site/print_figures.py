@@ -16,7 +16,7 @@ __all__ = ["filled", "write_figure"]
 
 _PALETTE = tuple(light for light, _ in PALETTE)
 _INKS = {
-    **{f"${name}": colour for name, colour in INKS["light"].items() if name != "grid"},
+    **{f"${name}": colour for name, colour in INKS["light"].items()},
     "$strong": _PALETTE[0],
     "$second": _PALETTE[1],
     "$scheme": "blues",

@@ -12,9 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
-from simnav.estimator import EstimatorError
-from simnav.estimator.registry import registered
-from simnav.leaderboard.campaign.request import comes_with_simnav
+from simnav.leaderboard.ranking.superseded import version_of
 from simnav.leaderboard.results import store
 from simnav.leaderboard.results.catalogued import catalogued_scenario
 from simnav.leaderboard.results.provenance import BENCHMARK
@@ -114,7 +112,7 @@ def changes(results: Iterable[Result]) -> dict[tuple[str, str], Change]:
         if scenario not in scenarios:
             scenarios[scenario] = _is_there(scenario)
         if label not in versions:
-            versions[label] = _version(label.partition("(")[0])
+            versions[label] = version_of(label.partition("(")[0])
         if not scenarios[scenario]:
             found[scenario, label] = "gone"
         elif result.simulator_version != SIMULATOR_VERSION:
@@ -130,12 +128,3 @@ def _is_there(scenario: str) -> bool:
         return catalogued_scenario(scenario).id == scenario
     except (ValueError, OSError):
         return False
-
-
-def _version(name: str) -> int | None:
-    """The version of an estimator of simnav; None for all others."""
-    try:
-        cls = registered(name)
-    except EstimatorError:
-        return None
-    return cls.version if comes_with_simnav(cls) else None

@@ -29,7 +29,7 @@ from simnav.scenario import load
 from . import shipped
 from .currency import changes, outdated
 from .history import append
-from .readme import PICTURE, draw, replaced, tables
+from .readme import draw, replaced, tables
 
 __all__ = ["Published", "begin", "missing", "publish", "run"]
 
@@ -197,7 +197,7 @@ def publish(
     edition = 0 if lacking else append(history, ranking, results)
     if readme is not None:
         write_whole(readme, text)
-        draw(ranking, readme.parent / PICTURE)
+        draw(ranking, readme.parent)
     size = sum(p.stat().st_size for p in folder.rglob("*") if p.is_file())
     return Published(folder, edition, results, ranking, size, readme, _remarks(results, without))
 

@@ -9,24 +9,28 @@ from pathlib import Path
 
 from simnav.estimator import EstimatorError, describe
 from simnav.estimator.registry import registered
+from simnav.leaderboard.ranking.beside_plain import beside_plain, map_figure
 from simnav.leaderboard.ranking.board import Ranking, TrackRanking, TrackRow
 from simnav.leaderboard.ranking.ranking_figure import ranking_figure
 from simnav.leaderboard.ranking.ranking_table import gain_cell, ratio
-from simnav.leaderboard.ranking.summary import best_rows, gain_text, sentence, spread
+from simnav.leaderboard.ranking.summary import best_rows, gain_text, limits, sentence, spread
 from simnav.leaderboard.ranking.tables import MISSING
 from simnav.leaderboard.results.errors import RequestError
 from simnav.leaderboard.results.provenance import distinct
 from simnav.leaderboard.results.result import Result
 
-__all__ = ["BEGIN", "END", "PICTURE", "draw", "marked", "replaced", "tables"]
+__all__ = ["BEGIN", "END", "MAP", "PICTURE", "draw", "marked", "replaced", "tables"]
 
 #: Picture of the board, from the folder of the README.
 PICTURE = "docs/figures/board.png"
+#: Map of the main track, likewise.
+MAP = "docs/figures/map.png"
 
 BEGIN, END = "<!-- standard result: begin -->", "<!-- standard result: end -->"
 _MAIN = "aided-ins"
 _ROWS = 12  # of the table of the main track
 _DRAWN = 24  # of the picture
+_FINDINGS = ("no-imu", "underwater")  # tracks whose sentences stand beside that of the main track
 _BEST = 4  # rows that a cell names
 
 
@@ -42,32 +46,32 @@ def tables(ranking: Ranking, results: Sequence[Result], of: int | None = None) -
     of : int, optional
         How many results there should be: with fewer, the tables are called preliminary.
     """
-    known = distinct(r.provenance for r in results)
-    commits = (
-        ", ".join(sorted({f"`{p.commit[:12]}`{' with changes' if p.dirty else ''}" for p in known if p.commit}))
-        or "a version without a commit"
-    )
-    days = sorted({p.date for p in known if p.date})
-    when = f", computed from {days[0]} to {days[-1]}" if len(days) > 1 else f", computed on {days[0]}" if days else ""
-    benchmark = max((p.benchmark for p in known), default="") or "a benchmark without a version"
     tracks = [t for t in ranking.tracks if any(r.ranked for r in t.rows)]
     preliminary = of is not None and len(results) < of
-    few = f"**Preliminary: {len(results)} of {of} results.** " if preliminary else ""
-    parts = [
-        f"{few}{sum(r.tried for r in results)} runs of {benchmark} with commit {commits}{when}. All rows of a track "
-        "are judged on the same seeds. A score is the geometric mean of the horizontal error over that of an oracle on "
-        "the same run; the oracle knows the true noise and every fault. Recorded voyages have no oracle: there the "
-        "plain filter on the same run is the divisor. Smaller is better."
-    ]
+    parts = [f"**Preliminary: {len(results)} of {of} results.**"] if preliminary else []
+    main = _main(ranking)
+    if main is not None:
+        parts.append(f"{sentence(main)} {limits(main)}".strip())
+        if beside_plain(main, main.rows):
+            parts.append(f"![Error of the best rows beside the plain row's on each scenario]({MAP})")
+    if others := [f"- {sentence(t)}" for t in tracks if t is not main and t.track in _FINDINGS]:
+        parts.append("\n".join(others))
+    parts.append(
+        f"{sum(r.tried for r in results)} runs, all rows of a track on the same seeds. A score is the geometric mean "
+        "of the horizontal error over that of an oracle on the same run; the oracle knows the true noise and every "
+        "fault. Recorded voyages have no oracle: there the plain filter on the same run is the divisor. Smaller is "
+        "better."
+    )
+    older = sorted({f"`{r.estimator}` ({r.superseded})" for t in tracks for r in t.rows if r.superseded})
+    if older:
+        parts.append(f"Results of an older version, until the next edition: {', '.join(older)}.")
     if tracks:
         parts.append("\n".join([
             "| track | scenarios | seeds | complete rows | may be the best (95 %) | error beside the plain row's "
             "| 95 % over seeds | 95 % over scenarios | × oracle |",
             "|---|---|---|---|---|---|---|---|---|", *map(_track, tracks),
         ]))  # fmt: skip
-    main = _main(ranking)
     if main is not None:
-        parts.append(sentence(main))
         parts.append(f"![Scores of the track {main.title} with their 95 % intervals]({PICTURE})")
         ranked = [r for r in main.rows if r.ranked]
         parts.append(
@@ -75,13 +79,27 @@ def tables(ranking: Ranking, results: Sequence[Result], of: int | None = None) -
             f"of {len(ranked)} complete rows. Rows that share ranks cannot be told apart."
         )
         parts.append("\n".join([
-            f"| rank | estimator | method | × oracle, 95 % interval | × `{main.plain}`, 95 % interval | scenarios won "
-            "| failed runs |",
+            f"| rank | estimator | description | × oracle, 95 % interval | × `{main.plain}`, 95 % interval "
+            "| scenarios won | failed runs |",
             "|---|---|---|---|---|---|---|",
-            *(f"| {r.ranks or MISSING} | `{r.estimator}` | {_method(r)} | {ratio(r.score)}{_interval(r)} "
+            *(f"| {r.ranks or MISSING} | `{r.estimator}` | {_description(r)} | {ratio(r.score)}{_interval(r)} "
               f"| {gain_cell(r)} | {_won(r)} | {r.failed} of {r.runs} |" for r in ranked[:_ROWS]),
         ]))  # fmt: skip
+    parts.append(_origin(results))
     return "\n\n".join(parts)
+
+
+def _origin(results: Sequence[Result]) -> str:
+    """Benchmark, commits and days of results, as a sentence."""
+    known = distinct(r.provenance for r in results)
+    commits = (
+        ", ".join(sorted({f"`{p.commit[:12]}`{' with changes' if p.dirty else ''}" for p in known if p.commit}))
+        or "a version without a commit"
+    )
+    days = sorted({p.date for p in known if p.date})
+    when = f", from {days[0]} to {days[-1]}" if len(days) > 1 else f", on {days[0]}" if days else ""
+    benchmark = max((p.benchmark for p in known), default="") or "a benchmark without a version"
+    return f"Computed with {benchmark}, commit {commits}{when}."
 
 
 def _won(row: TrackRow) -> str:
@@ -94,18 +112,31 @@ def _main(ranking: Ranking) -> TrackRanking | None:
     return next((t for t in tracks if t.track == _MAIN), tracks[0] if tracks else None)
 
 
-def draw(ranking: Ranking, path: Path) -> Path | None:
-    """Draw the picture of the README: the best rows of the main track, and the oracles; None without a ranked row."""
+def draw(ranking: Ranking, home: Path) -> list[Path]:
+    """Draw the pictures of the README: the best rows of the main track with the oracles, and the map of the track.
+
+    Parameters
+    ----------
+    ranking : Ranking
+        The board.
+    home : Path
+        Folder of the README.
+    """
     from simnav.leaderboard.figures.style import save
 
     main = _main(ranking)
     if main is None:
-        return None
-    path.parent.mkdir(parents=True, exist_ok=True)
-    return save(ranking_figure(main, most=_DRAWN), path, formats=("png",))[0]
+        return []
+    drawn = {PICTURE: ranking_figure(main, most=_DRAWN), MAP: map_figure(main, most=_DRAWN)}
+    made = []
+    for name, figure in drawn.items():
+        if figure is not None:
+            (home / name).parent.mkdir(parents=True, exist_ok=True)
+            made += save(figure, home / name, formats=("png",))
+    return made
 
 
-def _method(row: TrackRow) -> str:
+def _description(row: TrackRow) -> str:
     """What a row is, in a few words; empty for one that is not registered by this name."""
     try:
         summary = describe(registered(row.estimator).name).summary

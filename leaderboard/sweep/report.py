@@ -53,7 +53,7 @@ class SweepPoint:
     failed: int
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Sweep:
     """Errors against a dial, or two.
 
@@ -88,6 +88,10 @@ class Sweep:
     results: Sequence[Result]
     settings: tuple[Setting, ...]
     summary: Summary
+
+    def __repr__(self) -> str:
+        dials = " and ".join(axis_label(d) for d in self.dials)
+        return f"<Sweep: {self.scenario} over {dials}, {len(self.settings)} settings, {', '.join(self.estimators)}>"
 
     @cached_property
     def _errors(self) -> dict[tuple[str, tuple[float, ...]], dict[int, float]]:

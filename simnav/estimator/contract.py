@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from simnav.estimator.needs import Needs
 from simnav.plugins import PluginError
-from simnav.types import Estimate, InitialState, Instruments, Measurements, NavigationStates
+from simnav.types import Array, Estimate, InitialState, Instruments, Measurements, NavigationStates
 
 if TYPE_CHECKING:
     from simnav.recording import Recording
@@ -98,6 +98,30 @@ class Estimator(ABC):
 
     def smooth(self) -> NavigationStates | None:
         """Return the smoothed trajectory at the ends of all steps, after the last update; None without smoothing."""
+        return None
+
+    def earlier(self, lags: Sequence[float]) -> Array | None:
+        """Return the states of earlier times, from all measurements so far; None if the estimator does not look back.
+
+        It is called after each update of a run with ``lags`` (`simnav.estimator.looking_back`), always with the same
+        lags. The window of a graph holds such states, and a filter computes them by a fixed-lag smoother.
+
+        Parameters
+        ----------
+        lags : sequence of float
+            Times before the end of the step [s], multiples of the step.
+
+        Returns
+        -------
+        (k, 9) array or None
+            One row for each lag: latitude, longitude [rad], height [m]; velocity north-east-down [m/s]; roll, pitch,
+            yaw [rad]. NaN in components that are not estimated, and in rows of times before the first step.
+
+        Raises
+        ------
+        ValueError
+            If a lag is longer than the estimator can look back; one sentence.
+        """
         return None
 
     def reveal(self, recording: Recording) -> None:  # noqa: B027 (a hook: most estimators are told nothing)

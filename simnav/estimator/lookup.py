@@ -14,6 +14,7 @@ from typing import Any
 
 from simnav.estimator.contract import Estimator, EstimatorError
 from simnav.estimator.files import class_in_file
+from simnav.estimator.looking_back import LAGS, LookingBack, lags_of
 from simnav.estimator.parameters import (
     Parameter,
     constructors_of,
@@ -133,7 +134,7 @@ def make(name_or_path: str, **parameters: Any) -> Estimator:
     **parameters
         Of its constructor; former names are read, too (`Estimator.formerly`). A string is converted to what the
         annotation, or else the default, asks for: numbers, ``true``/``false``, ``none``, a choice, or several values
-        parted by commas.
+        parted by commas. Every estimator also takes ``lags`` (`simnav.estimator.looking_back`).
 
     Raises
     ------
@@ -142,6 +143,9 @@ def make(name_or_path: str, **parameters: Any) -> Estimator:
     """
     cls = find(name_or_path)
     known = {p.name: p for p in parameters_of(cls)}
+    if LAGS in parameters and LAGS not in known:
+        lags = lags_of(parameters[LAGS])
+        return LookingBack(make(name_or_path, **{k: v for k, v in parameters.items() if k != LAGS}), lags)
     hints: dict[str, Any] = {}
     constructors = constructors_of(cls)
     for constructor in reversed(constructors):

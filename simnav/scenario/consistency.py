@@ -48,6 +48,7 @@ def check(s: Description) -> None:
         _check_world(s)
     else:
         _check_log(s, s.log)
+    _check_sources(s)
     _check_faults(s)
 
 
@@ -150,6 +151,20 @@ def _check_log(s: Description, log: RecordedSpec) -> None:
     if (log.imu is None) != (s.imu is None):
         there, missing = ("log.imu", "instruments.imu") if s.imu is None else ("instruments.imu", "log.imu")
         raise ValueError(f"[{there}] needs [{missing}] beside it")
+
+
+def _check_sources(s: Description) -> None:
+    """Check that an instrument that reads others finds them."""
+    for name, spec in s.aids.items():
+        for source, kind in spec.sources().items():
+            if source not in s.aids or s.aids[source].kind != kind:
+                there = [n for n, other in s.aids.items() if other.kind == kind]
+                right = f"one of that kind is {there[0]!r}" if there else f"add a table of kind = {kind!r}"
+                raise ValueError(
+                    f"instruments.{name}: it reads {source!r} of kind {kind!r}, which there is not; {right}"
+                )
+            if s.log is not None:
+                raise ValueError(f"instruments.{name}: it reads {source!r}, which a recorded run ([log]) does not have")
 
 
 def _check_faults(s: Description) -> None:

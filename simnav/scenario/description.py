@@ -9,6 +9,7 @@ from typing import Annotated, Literal, Self
 import numpy as np
 from pydantic import Field, field_validator, model_validator
 
+import simnav.log.own_track  # noqa: F401 (it registers vessels)
 from simnav.log.spec import RecordedSpec
 from simnav.scenario.catalogue import NAME, gym_id
 from simnav.sensors import AidSpec, AnyFault, AnyInstrument, ImuSpec

@@ -13,6 +13,7 @@ from simnav.plugins import PluginError, load_plugin
 from simnav.scenario.catalogue import Header, headers
 from simnav.scenario.scenario import Scenario
 from simnav.spec import SpecError, closest
+from simnav.world import VESSELS
 
 __all__ = ["load", "names", "parse"]
 
@@ -47,6 +48,8 @@ def parse(text: str, *, source: str = "<toml>", folder: Path | None = None) -> S
         raise SpecError(f"{source}: {_key_of(text, _NESTED)}: lists or tables are nested too deeply") from None
     if "plugins" in table:
         table["plugins"] = _load_plugins(table["plugins"], source, folder or Path.cwd())
+    if isinstance(table.get("vessel"), dict):
+        table["vessel"] = _with_whole_paths(table["vessel"], folder or Path.cwd())
     try:
         return Scenario.from_toml(table, source=source)
     except RecursionError:
@@ -73,6 +76,14 @@ def _load_plugins(names: Any, source: str, folder: Path) -> list[str]:
         except PluginError as error:
             raise SpecError(f"{source}: plugins = {name!r}: {error}") from None
     return paths
+
+
+def _with_whole_paths(table: dict[str, Any], folder: Path) -> dict[str, Any]:
+    """The table of a vessel whose files are named by their whole paths."""
+    kind = table.get("kind")
+    cls = VESSELS.get(kind) if isinstance(kind, str) else None
+    given = {k: table[k] for k in (() if cls is None else cls.files) if isinstance(table.get(k), str)}
+    return {**table, **{key: str((folder / Path(name).expanduser()).resolve()) for key, name in given.items()}}
 
 
 def names() -> list[str]:

@@ -7,6 +7,7 @@ import json
 import pickle
 import sys
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any, Self, SupportsIndex
 
 from pydantic import PrivateAttr, model_validator
@@ -136,13 +137,16 @@ class Scenario(Description):
     def content_hash(self) -> str:
         """Hexadecimal digest of everything that decides the numbers of a run, defaults included.
 
-        Title, description, source, tags, track, group and dials are not included, nor are the files of a log.
+        Title, description, source, tags, track, group and dials are not included, nor are the files of a log. The
+        files of a vessel are included by their content, not by their paths.
         Distributions are included as they are written.
         """
         words = {"title", "description", "source", "tags", "track", "group", "plugins", "dials"}
         if not self.surroundings:
             words.add("surroundings")
         content = self.model_dump(mode="python", exclude=words)
+        for name in self.craft.files:
+            content["vessel"][name] = _digest(getattr(self.craft, name))
         if self._template is not None:
             content["distributions"] = _canonical(self._template.table, words)
         # Not sorted: the order of the instruments is the order in which simultaneous measurements are handed over.
@@ -168,6 +172,14 @@ class Scenario(Description):
     def _check(self) -> Self:
         check(self)
         return self
+
+
+def _digest(path: str) -> str:
+    """Hexadecimal digest of a file; SpecError if it cannot be read."""
+    try:
+        return hashlib.blake2b(Path(path).read_bytes(), digest_size=16).hexdigest()
+    except OSError as error:
+        raise SpecError(f"vessel: the file {path!r} cannot be read: {error.strerror}") from None
 
 
 def _listed(draws: Draws) -> str:

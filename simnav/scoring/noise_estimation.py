@@ -47,7 +47,7 @@ def noise_estimation(trial: Trial, recording: Recording) -> dict[str, float]:
     return scores
 
 
-def sigma_errors(trial: Trial, stream: AidStream, axis: str) -> tuple[Array, Array]:
+def sigma_errors(trial: Trial, stream: AidStream, axis: str, later: int = 0) -> tuple[Array, Array]:
     """Estimated minus true sigma of one component of an instrument, measurement by measurement.
 
     Parameters
@@ -58,6 +58,8 @@ def sigma_errors(trial: Trial, stream: AidStream, axis: str) -> tuple[Array, Arr
         Measurements of the instrument, with their true sigmas.
     axis : str
         Name of the component, as in ``KINDS[kind].errors``.
+    later : int
+        Number of steps after a measurement at which the estimate of its noise is read.
 
     Returns
     -------
@@ -72,7 +74,7 @@ def sigma_errors(trial: Trial, stream: AidStream, axis: str) -> tuple[Array, Arr
     names = KINDS[stream.kind].errors
     if estimate is None or axis not in names or estimate.ndim != 1 or not len(trial):
         return np.empty(0), np.empty(0)
-    epoch = np.searchsorted(trial.time, stream.time - _TOLERANCE)
+    epoch = np.searchsorted(trial.time, stream.time - _TOLERANCE) + later
     inside = epoch < len(trial)
     true = stream.sigma[inside, names.index(axis)]
     return stream.time[inside], np.asarray(estimate[epoch[inside]] - true)

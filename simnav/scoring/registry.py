@@ -15,9 +15,9 @@ entry-point group ``simnav.scores``.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import cached_property, update_wrapper
-from typing import Any, Literal, TypeAlias, TypeVar, get_args
+from typing import Any, Literal, Protocol, TypeAlias, TypeVar, get_args
 
 from simnav.plugins import PluginError, Registry
 from simnav.recording import Recording
@@ -25,7 +25,16 @@ from simnav.scoring.navigation_error import errors, held_errors, horizontal, smo
 from simnav.trial import Trial
 from simnav.types import Array
 
-__all__ = ["SCORES", "Better", "Score", "ScoringInput", "register_score"]
+__all__ = [
+    "SCORES",
+    "Better",
+    "Score",
+    "ScoreFamily",
+    "ScoringInput",
+    "names_of_families",
+    "register_family",
+    "register_score",
+]
 
 Better: TypeAlias = Literal["lower", "higher", "one", "nominal"]
 
@@ -168,14 +177,44 @@ def add(score: Score) -> None:
     _REGISTRY.add(score.name, score)
 
 
+class ScoreFamily(Protocol):
+    """Scores that are made when they are named, such as those of any lag (`simnav.scoring.lagged`)."""
+
+    def score(self, name: str) -> Score | None:
+        """The score of a name; None if the family has none of this name."""
+        ...
+
+    def names(self, trial: Trial) -> Iterable[str]:
+        """The names of those that a trial has."""
+        ...
+
+
+_FAMILIES: list[ScoreFamily] = []
+
+
+def register_family(family: type[ScoreFamily]) -> type[ScoreFamily]:
+    """Register a family of scores (decorator of a class whose constructor takes nothing)."""
+    _FAMILIES.append(family())
+    return family
+
+
+def names_of_families(trial: Trial) -> list[str]:
+    """The scores of families that a trial has; they are not in the iteration over `SCORES`."""
+    return [name for family in _FAMILIES for name in family.names(trial)]
+
+
 class _Table(Mapping[str, Score]):
-    """All registered scores, by name."""
+    """All registered scores, by name; those of families are found, too, but not listed."""
 
     def __getitem__(self, name: str) -> Score:
         score = _REGISTRY.get(name)
-        if score is None:
-            raise KeyError(name)
-        return score
+        if score is not None:
+            return score
+        for family in _FAMILIES:
+            score = family.score(name)
+            if score is not None:
+                return score
+        raise KeyError(name)
 
     def __iter__(self) -> Iterator[str]:
         return iter(_REGISTRY.items())

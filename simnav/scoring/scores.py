@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from simnav.recording import Recording
-from simnav.scoring.registry import SCORES, Score, ScoringInput
+from simnav.scoring.registry import SCORES, Score, ScoringInput, names_of_families
 from simnav.trial import Trial
 from simnav.types import Array
 
@@ -34,7 +34,7 @@ def score(trial: Trial, recording: Recording, names: Iterable[str] | None = None
     recording : Recording
         The recording of the trial.
     names : iterable of str, optional
-        Names of scores, keys of `SCORES`; by default all.
+        Names of scores, keys of `SCORES`; by default all, and those of the trial's lags (`simnav.scoring.lagged`).
 
     Returns
     -------
@@ -55,6 +55,8 @@ def score(trial: Trial, recording: Recording, names: Iterable[str] | None = None
     """
     given = _SharedInput(trial, recording)
     chosen = dict(SCORES) if names is None else {name: SCORES[name] for name in names}
+    if names is None:
+        chosen |= {name: SCORES[name] for name in names_of_families(trial)}
     return {name: _value(one, given) for name, one in chosen.items()}
 
 

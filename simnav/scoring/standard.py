@@ -11,7 +11,18 @@ from simnav.scoring import detection
 from simnav.scoring import noise_estimation
 from simnav.scoring import smoothed
 from simnav.scoring import cost
+from simnav.scoring import lagged
 
 # isort: on
 
-__all__ = ["accuracy", "consistency", "cost", "detection", "integrity", "noise_estimation", "outages", "smoothed"]
+__all__ = [
+    "accuracy",
+    "consistency",
+    "cost",
+    "detection",
+    "integrity",
+    "lagged",
+    "noise_estimation",
+    "outages",
+    "smoothed",
+]

@@ -14,9 +14,12 @@ from simnav.kinds import INSTRUMENTS
 from simnav.sensors.channels import ChannelInstrument
 from simnav.sensors.compass import Gyrocompass, MagneticCompass
 from simnav.sensors.depth import Depth
+from simnav.sensors.derived import DerivedInstrument
 from simnav.sensors.dvl import Dvl
 from simnav.sensors.faults import AnyFault, FaultLayer, FaultSpec, build_layers, fault_specs, labels, register_fault
 from simnav.sensors.gnss import GnssPosition, GnssVelocity
+from simnav.sensors.gnss_raw import GnssRaw
+from simnav.sensors.gnss_receiver import GnssReceiver, GnssReceiverVelocity
 from simnav.sensors.imu import Imu, ImuSpec
 from simnav.sensors.instrument import AidSpec, Instrument, register_instrument
 from simnav.sensors.speed_log import SpeedLog
@@ -29,10 +32,14 @@ __all__ = [
     "AnyInstrument",
     "ChannelInstrument",
     "Depth",
+    "DerivedInstrument",
     "Dvl",
     "FaultLayer",
     "FaultSpec",
     "GnssPosition",
+    "GnssRaw",
+    "GnssReceiver",
+    "GnssReceiverVelocity",
     "GnssVelocity",
     "Gyrocompass",
     "Imu",

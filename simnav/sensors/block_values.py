@@ -114,6 +114,12 @@ def check_blocks(spec: Declares, source: str) -> None:
         raise SpecError(f"{source}: {error}") from None
     if blocks and spec.definition.observation is None:
         raise SpecError(f"{source} brings blocks of states; its equation should be a function that uses them")
+    fields = [field for field in vars(spec) if field.startswith("bias")]
+    if fields and any(block.name == "bias" for block in blocks):
+        raise SpecError(
+            f"{source}: its block of states 'bias' has the name of the error of its field {fields[0]!r}, for which "
+            "estimators have states, too; give the block another name"
+        )
     for block in spec.ideal().blocks():
         if block.varies:
             raise SpecError(

@@ -9,6 +9,9 @@ small angles), b the turn-on bias, g the in-run bias (first-order Gauss-Markov),
 noise (angle or velocity random walk). Then the output saturates at the range, and its increment y dt is quantized; the
 quantization residual is added to the next increment.
 
+What depends on specific force, vibration and temperature, the bandwidth and the delay come before this model, and only
+where they are named (`simnav.sensors.imu_effects`).
+
 Each process has its own random stream; a process with sigma zero draws nothing. g and r change on a grid of at most
 T/100 (or 1 s), with the correlation time T, and are constant between the grid points (`HeldGaussMarkov`), because they
 change much more slowly than the sample rate.
@@ -16,16 +19,19 @@ change much more slowly than the sample rate.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from math import inf, sqrt
-from typing import Literal, Self, TypeAlias
+from typing import Any, ClassVar, Literal, Self, TypeAlias
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
 from simnav.compiled import kernel
+from simnav.sensors.imu_effects import Effects, ImuEffects
+from simnav.sensors.imu_models import GRADES, Grade, ImuModel, imu_model
 from simnav.sensors.instrument import figures_of, times_datasheet
 from simnav.sensors.processes import HeldGaussMarkov, quantize_scalar, ready
-from simnav.spec import NonNegative, Positive, Spec, Vector, closest, quantity
+from simnav.spec import NonNegative, Positive, Spec, SpecError, Vector, closest, quantity
 from simnav.streams import stream
 from simnav.types import Array, ImuDatasheet, ImuSamples, TriadDatasheet
 
@@ -45,13 +51,16 @@ class TriadSpec(Spec):
     not receive them.
     """
 
+    #: The figures that may differ from the datasheet (``times_datasheet``).
+    errors: ClassVar[tuple[str, ...]] = _ERRORS
+
     bias: float
     bias_instability: float
     correlation_time: Positive = quantity("s", inf)
     random_walk: float
     rate_random_walk: float
-    scale: NonNegative = quantity("ppm", 0.0)
-    misalignment: NonNegative = quantity("deg", 0.0)
+    scale: NonNegative = quantity("ppm", 0.0, also=("percent",))
+    misalignment: NonNegative = quantity("deg", 0.0, also=("mrad",))
     quantization: float
     range: float
     fixed_bias: Vector
@@ -62,7 +71,7 @@ class TriadSpec(Spec):
 
     @model_validator(mode="after")
     def _known_figures(self) -> Self:
-        valid = figures_of(type(self), _ERRORS)
+        valid = figures_of(type(self), self.errors)
         for name in self.times_datasheet:
             if name not in valid:
                 raise ValueError(f"times_datasheet.{name}: there is no such figure{closest(name, valid)}")
@@ -101,9 +110,9 @@ class TriadSpec(Spec):
 class GyroscopeSpec(TriadSpec):
     """Three gyroscopes; rad/s in memory. With infinite correlation time, bias_instability is in deg/h per sqrt(s)."""
 
-    bias: NonNegative = quantity("deg_h", 0.0)
-    bias_instability: NonNegative = quantity("deg_h", 0.0)
-    random_walk: NonNegative = quantity("deg_sqrt_h", 0.0)
+    bias: NonNegative = quantity("deg_h", 0.0, also=("deg_s",))
+    bias_instability: NonNegative = quantity("deg_h", 0.0, also=("deg_s",))
+    random_walk: NonNegative = quantity("deg_sqrt_h", 0.0, also=("deg_s_sqrt_hz",))
     rate_random_walk: NonNegative = quantity("deg_h_sqrt_h", 0.0)
     quantization: NonNegative = quantity("arcsec", 0.0)
     range: Positive = quantity("deg_s", inf)
@@ -113,29 +122,80 @@ class GyroscopeSpec(TriadSpec):
 class AccelerometerSpec(TriadSpec):
     """Three accelerometers; m/s^2 in memory. With infinite correlation time, bias_instability is in ug per sqrt(s)."""
 
-    bias: NonNegative = quantity("ug", 0.0)
-    bias_instability: NonNegative = quantity("ug", 0.0)
-    random_walk: NonNegative = quantity("ug_sqrt_hz", 0.0)
+    bias: NonNegative = quantity("ug", 0.0, also=("mg", "m_s2", "mm_s2"))
+    bias_instability: NonNegative = quantity("ug", 0.0, also=("mg", "m_s2", "mm_s2"))
+    random_walk: NonNegative = quantity(
+        "ug_sqrt_hz", 0.0, also=("mg_sqrt_hz", "m_s_sqrt_h", "mm_s_sqrt_h", "ft_s_sqrt_h")
+    )
     rate_random_walk: NonNegative = quantity("ug_sqrt_s", 0.0)
     quantization: NonNegative = quantity("m_s", 0.0)
-    range: Positive = quantity("g", inf)
+    range: Positive = quantity("g", inf, also=("m_s2",))
     fixed_bias: Vector = quantity("ug", _ZERO)
 
 
 class ImuSpec(Spec):
     """An inertial measurement unit.
 
+    With ``model`` or ``grade`` its figures are those of a manufacturer (`simnav.sensors.imu_models`). Figures that are
+    given beside it replace them one by one.
+
     Examples
     --------
     >>> imu = ImuSpec.from_toml({"rate_hz": 100, "gyroscope": {"random_walk_deg_sqrt_h": 0.01}})
     >>> round(imu.gyroscope.random_walk * 1e6, 3)
     2.909
+    >>> imu = ImuSpec.from_toml({"rate_hz": 100, "model": "STIM300", "accelerometer": {"bias_mg": 0.5}})
+    >>> round(imu.gyroscope.random_walk * 1e6, 3), round(imu.accelerometer.bias, 6)
+    (43.633, 0.004903)
     """
 
     kind: Literal["imu"] = "imu"
     rate: Positive = quantity("hz")
+    model: str | None = Field(None, description="an IMU by its name")
+    grade: Grade | None = Field(None, description="the IMU that stands for a grade")
     gyroscope: GyroscopeSpec = GyroscopeSpec()
     accelerometer: AccelerometerSpec = AccelerometerSpec()
+    effects: ImuEffects | None = Field(None, description="errors by specific force, vibration and temperature")
+
+    @classmethod
+    def from_toml(cls, table: Mapping[str, Any], *, source: str = "<toml>", path: str = "") -> Self:
+        """See `Spec.from_toml`. The figures of ``model`` or ``grade`` are added to the table."""
+        if isinstance(table, Mapping) and ("model" in table or "grade" in table):
+            try:
+                figures = _named(table.get("model"), table.get("grade")).to_toml()
+            except SpecError as error:
+                raise SpecError(f"{source}: {path or 'the file'}: {error}") from None
+            parts: tuple[tuple[str, type[Spec]], ...] = (
+                ("gyroscope", GyroscopeSpec), ("accelerometer", AccelerometerSpec), ("effects", ImuEffects),
+            )  # fmt: skip
+            for name, spec in parts:
+                given = table.get(name, {})
+                if name in figures and isinstance(given, Mapping):
+                    table = {**table, name: spec.replaced(figures[name], given)}
+        return super().from_toml(table, source=source, path=path)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _with_figures(cls, data: Any) -> Any:
+        """In Python: the figures of ``model`` or ``grade``, where no others are given."""
+        if not isinstance(data, dict) or (data.get("model") is None and data.get("grade") is None):
+            return data
+        figures = _named(data.get("model"), data.get("grade")).to_toml()
+        made: dict[str, Spec] = {
+            "gyroscope": GyroscopeSpec.from_toml(figures["gyroscope"]),
+            "accelerometer": AccelerometerSpec.from_toml(figures["accelerometer"]),
+        }
+        if "effects" in figures:
+            made["effects"] = ImuEffects.from_toml(figures["effects"])
+        return {**made, **data}
+
+    @model_serializer(mode="wrap")
+    def _without_names(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """The name of an IMU decides nothing beside its figures. Digests of scenarios count what is there."""
+        table: dict[str, Any] = handler(self)
+        for name in ("model", "grade") if self.effects is not None else ("model", "grade", "effects"):
+            table.pop(name, None)
+        return table
 
     def datasheet(self) -> ImuDatasheet:
         """The datasheet that an estimator receives."""
@@ -151,7 +211,7 @@ class ImuSpec(Spec):
     def ideal(self) -> ImuSpec:
         """The same instrument without errors."""
         triads = {"gyroscope": self.gyroscope.ideal(), "accelerometer": self.accelerometer.ideal()}
-        return self.model_copy(update=triads)
+        return self.model_copy(update={**triads, "effects": None})
 
     def build(self, seed: int) -> Imu:
         """Make the instrument of one run.
@@ -162,6 +222,20 @@ class ImuSpec(Spec):
             Seed of the run.
         """
         return Imu(self, seed)
+
+
+def _named(model: Any, grade: Any) -> ImuModel:
+    """The IMU of a model or of a grade. SpecError if there is none, or both are given."""
+    if model is not None and grade is not None:
+        raise SpecError("give a model or a grade, not both")
+    key, name = ("grade", grade) if model is None else ("model", model)
+    if not isinstance(name, str):
+        raise SpecError(f"{key} = {name!r} should be a name in quotes")
+    if key == "grade" and name not in GRADES:
+        raise SpecError(f"grade = {name!r} is unknown{closest(name, list(GRADES))}")
+    if key == "model" and name in GRADES:
+        raise SpecError(f"model = {name!r} is a grade; say grade = {name!r}")
+    return imu_model(name)
 
 
 #: A bias that is constant between the rows of a (k, 3) table: the table, the number of its first row, and the number of
@@ -296,6 +370,8 @@ class Imu:
         self.spec = spec
         self.gyroscope = _Triad(spec.gyroscope, "gyroscope", spec.rate, seed)
         self.accelerometer = _Triad(spec.accelerometer, "accelerometer", spec.rate, seed)
+        named = spec.effects is not None and bool(spec.effects.names)
+        self.effects = Effects(spec.effects, spec.rate, seed) if named and spec.effects is not None else None
 
     def sense(self, ideal: ImuSamples, *, overwrite: bool = False) -> ImuSamples:
         """Add the errors to the ideal samples of the next block.
@@ -315,6 +391,8 @@ class Imu:
         """
         if len(ideal) == 0:
             return ideal
+        if self.effects is not None:
+            ideal = self.effects.apply(ideal)
         time, interval = ready(ideal.time), ready(ideal.interval)
         return ImuSamples(
             ideal.time,

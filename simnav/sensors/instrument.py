@@ -29,7 +29,7 @@ from pydantic import BeforeValidator, Field, model_validator
 
 from simnav.blocks import StateBlock
 from simnav.kinds import INSTRUMENTS, Kind
-from simnav.plugins import PluginError
+from simnav.plugins import PluginError, registered_kind, with_named_errors
 from simnav.recording import AidStream
 from simnav.sensors.block_values import BlockValues, check_blocks
 from simnav.sensors.errors import InstrumentError, label_of, raised
@@ -43,7 +43,6 @@ from simnav.spec import (
     SpecError,
     Vector,
     closest,
-    hidden_attribute,
     quantity,
     unit_of,
 )
@@ -196,6 +195,14 @@ class AidSpec(Spec):
         """
         return ()
 
+    def sources(self) -> Mapping[str, str]:
+        """The kind of each instrument, by its name in the scenario, whose readings this one reads; none, unless a
+        subclass says so.
+
+        With sources `build` returns a `simnav.sensors.DerivedInstrument`. A source reads no other instrument itself.
+        """
+        return {}
+
     @model_validator(mode="after")
     def _proper_channels(self) -> Self:
         channels = self.channels()
@@ -295,16 +302,11 @@ def register_instrument(kind: Kind, *, example: Mapping[str, Any]) -> Callable[[
     """
 
     def wrap(cls: type[S]) -> type[S]:
-        if not (isinstance(cls, type) and issubclass(cls, AidSpec)):
-            raise PluginError(f"@register_instrument: {cls!r} is not a subclass of simnav.sensors.AidSpec")
-        name = cls.model_fields["kind"].default
-        if not isinstance(name, str):
-            raise PluginError(f"{cls.__qualname__}: declare its kind, like kind: Literal['my_kind'] = 'my_kind'")
+        name = registered_kind(
+            cls, AidSpec, decorator="register_instrument", sort="instrument", example="my_instrument"
+        )
         if name in _RESERVED:
             raise PluginError(f"kind {name!r} of instrument {cls.__qualname__}: the name means something else")
-        hidden = hidden_attribute(cls, AidSpec)
-        if hidden is not None:
-            raise PluginError(f"kind {name!r}: the field {hidden!r} of {cls.__qualname__} hides AidSpec.{hidden}")
         for field, info in AidSpec.model_fields.items():
             unit = unit_of(info)
             if unit_of(cls.model_fields[field]) != unit:
@@ -348,24 +350,20 @@ def register_instrument(kind: Kind, *, example: Mapping[str, Any]) -> Callable[[
                     f"{source} has no channels, but its kind has side information or a sigma of a reading, which only "
                     "readings of channels have"
                 )
-        cls.build = _named(cls.build)  # type: ignore[method-assign]
+        cls.build = _checked(cls.build)  # type: ignore[method-assign]
         return cls
 
     return wrap
 
 
-def _named(build: Callable[..., Any]) -> Callable[..., Instrument]:
-    """Wrap ``build`` of a specification, so that its errors name the instrument."""
+def _checked(build: Callable[..., Any]) -> Callable[..., Instrument]:
+    """Wrap ``build`` of a specification, so that its errors name the instrument, and that it gives what it should."""
+    named = with_named_errors(build, InstrumentError, _label, (InstrumentError, MemoryError))
 
     @wraps(build)
-    def named(self: AidSpec, name: str, seed: int) -> Instrument:
+    def checked(self: AidSpec, name: str, seed: int) -> Instrument:
+        made = named(self, name, seed)
         label = partial(label_of, name, self.kind, type(self))  # late: it reads the source of the class
-        try:
-            made = build(self, name, seed)
-        except (InstrumentError, MemoryError):
-            raise
-        except Exception as error:
-            raise raised(label(), type(self), error) from error
         if not isinstance(made, Instrument):
             raise InstrumentError(f"{label()}: build() returned {type(made).__name__}, where an Instrument is wanted")
         if made.channels != self.channels():
@@ -375,7 +373,11 @@ def _named(build: Callable[..., Any]) -> Callable[..., Instrument]:
             )
         return made
 
-    return named
+    return checked
+
+
+def _label(spec: AidSpec, name: str, seed: int) -> str:
+    return f"instrument {name!r} of kind {spec.kind!r}"
 
 
 class Instrument(ABC):

@@ -12,8 +12,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from simnav.recording import Block, ImuLabels, Recording
+from simnav.recording import AidStream, Block, ImuLabels, Recording
 from simnav.scenario import Scenario
+from simnav.sensors import DerivedInstrument
 from simnav.sensors.faults import build_layers, labels
 from simnav.spec import SpecError
 from simnav.types import Array, InitialState, NavigationStates
@@ -175,13 +176,18 @@ class Simulator:
                 imu_labels = ImuLabels(np.zeros(len(imu), dtype=np.uint32), np.zeros((len(imu), 6)))
             for layer in self.layers:
                 imu, imu_labels = layer.apply_imu(imu, imu_labels)
-        aids = {}
-        for name, instrument in self.aids.items():
-            stream = instrument.sense(block.taps[name])
+        aids: dict[str, AidStream] = {}
+        # Those that read others are the last; a stream does not depend on the order.
+        for name in sorted(self.aids, key=lambda name: isinstance(self.aids[name], DerivedInstrument)):
+            instrument, tap = self.aids[name], block.taps[name]
+            if isinstance(instrument, DerivedInstrument):
+                stream = instrument.derived(tap.time, aids, self.instruments)
+            else:
+                stream = instrument.sense(tap)
             for layer in self.layers:
                 stream = layer.laid_over(stream)
             aids[name] = stream
-        return Block(start, until, imu, imu_labels, aids, block.taps[_STEPS])
+        return Block(start, until, imu, imu_labels, {name: aids[name] for name in self.aids}, block.taps[_STEPS])
 
     def _taps(self, start: float, until: float) -> dict[str, Array]:
         taps = {n: sample_times(s.rate, s.phase, start, until) for n, s in self.scenario.aids.items()}

@@ -95,6 +95,7 @@ class SteppedRuns:
             isinstance(world, World)
             and all(isinstance(a, CompiledInstrument) and a.in_kernel for a in aids.values())
             and all(layer.operation is not None for layer in simulator.layers)
+            and (simulator.imu is None or simulator.imu.effects is None)
         )
         self._compiled[b] = known
         state = simulator.initial_truth

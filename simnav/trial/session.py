@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from simnav.estimator import Estimator, NeedsError, UnsuitableScenario, lacking
+from simnav.estimator.looking_back import inner_of
 from simnav.recording import Recording
 from simnav.trial.log import DivergedError, TrialLog
 from simnav.trial.trial import Trial
@@ -231,7 +232,7 @@ def describe_failure(error: BaseException, estimator: Estimator, skip: int) -> s
     """
     frames: Sequence[traceback.FrameSummary] = traceback.extract_tb(error.__traceback__)[skip:]
     try:
-        own = Path(inspect.getfile(type(estimator))).name
+        own = Path(inspect.getfile(type(inner_of(estimator)))).name
     except (OSError, TypeError):
         own = ""
     inside = [f for f in frames if Path(f.filename).name == own] or list(frames)

@@ -27,7 +27,7 @@ from simnav.types import Array, NavigationStates
 __all__ = ["Trial"]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Trial:
     """The answers of an estimator on one recording, up to the end or to its failure: T epochs.
 
@@ -72,6 +72,9 @@ class Trial:
     smoothed: NavigationStates | None = None
     reset_seconds: float = 0.0
     smooth_seconds: float = 0.0
+
+    def __repr__(self) -> str:
+        return f"<Trial: {self.estimator}, {self.status}, {len(self.time)} epochs>"
 
     def __len__(self) -> int:
         return len(self.time)

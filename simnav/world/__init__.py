@@ -6,6 +6,8 @@ from typing import Annotated
 
 from simnav.spec import OneOf
 from simnav.world.current import Current
+from simnav.world.given_track import GivenTrack, Limits, Poses
+from simnav.world.given_waypoints import GivenVessel, GivenWaypoints
 from simnav.world.hulls import Ship, Uuv
 from simnav.world.manoeuvres import (
     Accelerate,
@@ -18,6 +20,7 @@ from simnav.world.manoeuvres import (
     Waypoints,
     ZigZag,
 )
+from simnav.world.obstacles import Obstacle, Obstacles
 from simnav.world.sea import Sea
 from simnav.world.start import Start
 from simnav.world.surroundings import (
@@ -45,10 +48,17 @@ __all__ = [
     "Current",
     "Dive",
     "FlatBottom",
+    "GivenTrack",
+    "GivenVessel",
+    "GivenWaypoints",
     "Hold",
     "KinematicVessel",
     "LawnMower",
+    "Limits",
     "Manoeuvre",
+    "Obstacle",
+    "Obstacles",
+    "Poses",
     "SampledTrajectory",
     "Sea",
     "Ship",

@@ -38,11 +38,15 @@ class Vessel(Spec):
         Whether the vessel follows manoeuvres.
     steered : bool
         Whether the trajectory has `simnav.world.trajectory.Steered.steer_by`, which a closed loop needs.
+    files : tuple of str
+        Names of the fields that are paths of files. A path in a scenario file is relative to the folder of that file.
+        The content of these files is a part of the content of the scenario.
     """
 
     starts: ClassVar[bool] = True
     obeys: ClassVar[bool] = True
     steered: ClassVar[bool] = False
+    files: ClassVar[tuple[str, ...]] = ()
 
     kind: str
 

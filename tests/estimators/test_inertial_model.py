@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from simnav.estimators.models.base import gauss_markov
 from simnav.estimators.models.inertial import InertialModel
 from simnav.estimators.models.propagation import HELD_VELOCITY, propagate_covariance
 from simnav.geometry import earth, rotation
@@ -236,22 +235,6 @@ def test_absurd_imu_samples_are_held_over(recording_of, bad: float):
     assert model.held == pytest.approx(1.0, abs=0.05)
     assert np.isfinite(P).all()
     assert np.linalg.norm(model.velocity) < 10.0
-
-
-def test_two_biases_in_one_state():
-    """Same value and slope of the autocovariance at lag 0, and never above the sum of the two."""
-    b, s, tau = 0.7, 0.4, 200.0
-    one = gauss_markov(b, s, tau)
-    assert one.variance == pytest.approx(b * b + s * s)
-    assert one.noise == pytest.approx(2.0 * one.variance * one.decay)  # stationary
-    lag = np.array([0.0, 1e-3, 10.0, 100.0, 1000.0])
-    ours, both = one.variance * np.exp(-one.decay * lag), b * b + s * s * np.exp(-lag / tau)
-    assert (ours[0] - ours[1]) == pytest.approx(both[0] - both[1], rel=1e-3)
-    assert np.all(ours[2:] < both[2:])
-    assert gauss_markov(0.0, s, tau) == pytest.approx((s * s, 1 / tau, 2 * s * s / tau, 0.0))
-    assert gauss_markov(b, 0.0, tau) == (b * b, 0.0, 0.0, 0.0)
-    assert gauss_markov(b, s, np.inf) == (b * b, 0.0, s * s, 0.0)
-    assert gauss_markov(b, s, 0.5) == (b * b, 0.0, 0.0, s * s)
 
 
 def test_body_rate_is_that_of_the_present_not_of_half_a_sample_ago(recording_of):

@@ -130,6 +130,10 @@ CALLS: dict[str, tuple[list[str], Callable[[], Any]]] = {
         ["bound", "open-sea", "-n", "1"],
         lambda: {**simnav.bound("open-sea", runs=1).to_dict(), "csv": None},
     ),
+    "allan": (
+        ["allan", "open-sea", "--duration", "100", "--seed", "2"],
+        lambda: {**simnav.allan("open-sea", duration=100.0, seed=2).to_dict(), "plot": None, "csv": None},
+    ),
     "cite": (["cite"], lambda: simnav.cite().to_dict()),
     "sweep": (
         ["sweep", "pond.toml", "--dial", RATE + "=1,2", "-e", "gnss-only", "-n", "1", "--workers", "1", "-o", "swept"],
@@ -140,7 +144,7 @@ CALLS: dict[str, tuple[list[str], Callable[[], Any]]] = {
 
 #: Commands whose calls are compared where their own tests are: they take minutes, or need what another one makes.
 ELSEWHERE = {"merge", "reference", "reproduce", "rescore", "seal", "submit", "tune", "verify"}
-ELSEWHERE |= {"standard run", "standard check", "standard audit", "standard publish", "train anfis"}
+ELSEWHERE |= {"show", "standard run", "standard check", "standard audit", "standard publish", "train anfis"}
 
 
 def commands() -> dict[str, Callable[..., Any]]:
@@ -183,10 +187,11 @@ def test_every_command_is_compared() -> None:
     assert set(commands()) == set(CALLS) | ELSEWHERE
 
 
-#: The call of a command, where its name is another one; None where the maintainers of simnav alone need it.
+#: The call of a command, where its name is another one; None where the maintainers of simnav alone need it, or where
+#: Python has the objects themselves (``show``).
 OTHER_NAMES: dict[str, Callable[..., Any] | None] = {
     "list": simnav.names, "simulate": simnav.record, "leaderboard": simnav.site, "new-estimator": write_estimator,
-    "warmup": warmup, "reference": None, "train anfis": None, "standard run": simnav.run_standard,
+    "warmup": warmup, "reference": None, "show": None, "train anfis": None, "standard run": simnav.run_standard,
     "standard check": simnav.check_standard, "standard audit": simnav.audit_standard,
     "standard publish": simnav.publish_standard,
 }  # fmt: skip
@@ -199,6 +204,7 @@ OF_THE_RESULT = {
     "sweep": {"plot"},
     "bench": {"every", "output"},  # of all rows: simnav.costs
     "bound": {"csv"},
+    "allan": {"plot", "csv"},
     "verify": {"present", "tolerance"},  # of a bundle: simnav.verify_bundle
     "cite": {"text"},
     "tune": {"output", "plot", "parameters"},  # parameters that are held are a pair with the estimator

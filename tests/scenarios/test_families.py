@@ -76,3 +76,31 @@ def test_faults_meet_and_come_again(name: str):
     assert overlap
     assert most >= 3
     assert episodes >= 3
+
+
+def test_voyages_with_poor_imus_have_no_wrong_measurement():
+    family = load("training-poor-imu")
+    runs = [family.drawn(seed) for seed in range(60)]
+    assert {f.kind for run in runs for f in run.faults} == {"imu_gap", "imu_disturbance", "outage"}
+    assert all(1.0 <= run.draws["draw.worse"] <= 20.0 for run in runs)
+    for run in runs:
+        true = run.actual_sheet()
+        said = run.instruments_sheet()
+        assert true.imu.gyroscope.random_walk == pytest.approx(
+            said.imu.gyroscope.random_walk * run.draws["draw.worse"], rel=1e-9
+        )
+        assert all(np.array_equal(true[name].sigma, said[name].sigma) for name in said)
+        assert any(sheet.kind in ("gnss_position", "terrain_fix") for sheet in said.values())
+    faulty = [load("training-poor-imu-faults").drawn(seed) for seed in range(60)]
+    assert {"bias_step", "multipath", "false_zero"} <= {f.kind for run in faulty for f in run.faults}
+
+
+def test_gaps_of_poor_imus_are_short():
+    labels = [record(load("training-poor-imu"), seed) for seed in (1, 3)]
+    lengths = []
+    for run in labels:
+        bit = [f.kind for f in run.faults].index("imu_gap")
+        within = np.flatnonzero(np.diff(np.r_[0, run.data.imu_labels.faults >> bit & 1, 0]))
+        lengths += np.diff(within)[::2].tolist()
+    assert len(lengths) > 20
+    assert np.mean(np.array(lengths) <= 25) > 0.97  # a quarter of a second at 100 Hz

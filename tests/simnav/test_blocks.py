@@ -164,6 +164,15 @@ def test_a_mistake_in_the_declaration_is_named_when_it_is_registered(clean_regis
     broken = type("Broken", (Iron,), {"blocks": lambda self: (StateBlock("iron", 1, "furlong", self.iron),)})
     with pytest.raises(PluginError, match="the example of kind 'iron': block 'iron': units = 'furlong' should"):
         register_instrument(kind, example=example)(broken)
+
+    class Biased(Iron):
+        bias: NonNegative = quantity("m", 0.0)
+
+        def blocks(self):
+            return (StateBlock("bias", 1, "m", self.iron),)
+
+    with pytest.raises(PluginError, match="its block of states 'bias' has the name of the error of its field 'bias'"):
+        register_instrument(kind, example=example)(Biased)
     with pytest.raises(PluginError, match="kind 'iron' brings blocks of states; its equation should be a function"):
         register_instrument(replace(kind, equation=None), example=example)(Iron)
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from simnav.estimator import Estimator, EstimatorError, UnsuitableScenario
+from simnav.estimator.looking_back import inner_of
 from simnav.leaderboard.campaign.fingerprint import own_code
 from simnav.leaderboard.campaign.training_runs import declared_ranges
 from simnav.leaderboard.results.errors import named
@@ -76,8 +77,8 @@ class _Session:
         """Import and construct the estimator; of a file or a session that is the first time that its code runs."""
         try:
             self._estimator = _entrant(body).make()
-            cls = type(self._estimator)
-            facts = {"name": cls.name or cls.__name__, "needs": self._estimator.needs}
+            made = inner_of(self._estimator)
+            facts = {"name": made.name or type(made).__name__, "needs": self._estimator.needs}
         except MemoryError:
             return _failure("out-of-memory", "more memory was wanted")
         except BaseException as error:  # SystemExit and KeyboardInterrupt, too: it is not the user who asks

@@ -59,8 +59,8 @@
 
   /** Put what depends on the theme and on the rows into a specification; a legend where no switches name the rows. */
   const fill = (item, rows, legend) => {
-    const { ink, grey, shade } = inks[theme()];
-    const words = { $ink: ink, $grey: grey, $shade: shade, $strong: palettes[theme()][0], $second: palettes[theme()][1], $scheme: theme() === "dark" ? "tealblues" : "blues" };
+    const { ink, grey, grid, shade } = inks[theme()];
+    const words = { $ink: ink, $grey: grey, $grid: grid, $shade: shade, $strong: palettes[theme()][0], $second: palettes[theme()][1], $scheme: theme() === "dark" ? "tealblues" : "blues" };
     const scales = {
       $colours: () => ({ domain: rows, range: rows.map((r) => style(r, rows).colour) }),
       $dashes: () => ({ domain: rows, range: rows.map((r) => style(r, rows).dash) }),

@@ -14,6 +14,7 @@
     drawn.add(key);
     const panel = document.getElementById(`track-${key}`), track = file ? await simnav.read(file) : { key, ...rest };
     simnav.table(at("table", panel), track.table);
+    if (track.map) simnav.chart(at("map", panel), track.map);
     const charts = at("charts", panel);
     for (const chart of track.charts) simnav.chart(charts, chart);
     if (!track.charts.length) charts.closest("section").remove();

@@ -13,6 +13,8 @@ from simnav.recording import FaultLabel
 from simnav.sensors.faults.additive import AdditiveLayer, BiasStep, GrossError, Multipath, NoiseStep, Ramp
 from simnav.sensors.faults.fault import FAULTS, Effect, FaultError, FaultSpec, Names, effect_of, register_fault
 from simnav.sensors.faults.imu_disturbance import ImuDisturbance
+from simnav.sensors.faults.imu_faults import ImuBiasStep, ImuClipping, ImuDropout
+from simnav.sensors.faults.imu_gap import ImuGap
 from simnav.sensors.faults.layer import Activity, FaultLayer
 from simnav.sensors.faults.replacing import FalseZero, Frozen, Outage, ReplacingLayer
 from simnav.sensors.faults.sizes import Size, size_by_component, size_range
@@ -31,7 +33,11 @@ __all__ = [
     "FaultSpec",
     "Frozen",
     "GrossError",
+    "ImuBiasStep",
+    "ImuClipping",
     "ImuDisturbance",
+    "ImuDropout",
+    "ImuGap",
     "Multipath",
     "Names",
     "NoiseStep",

@@ -8,19 +8,17 @@ consecutive. A fault with a start and an end, or with random intervals, has one 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from functools import wraps
+from collections.abc import Mapping
 from math import inf
-from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, Self, TypeVar, get_args
 
 from pydantic import BeforeValidator, SerializerFunctionWrapHandler, model_serializer, model_validator
 from pydantic.fields import FieldInfo
 
-from simnav.plugins import PluginError, Registry, exception_of, place_of
+from simnav.plugins import PluginError, Registry, registered_kind, with_named_errors
 from simnav.recording import FaultLabel
 from simnav.sensors.faults.sizes import QUANTITIES, QUANTITY_OF, axes_of, size_by_component
-from simnav.spec import NonNegative, Positive, Spec, SpecError, closest, hidden_attribute, quantity, unit_of
+from simnav.spec import NonNegative, Positive, Spec, SpecError, closest, quantity, unit_of
 from simnav.types import KINDS, Array
 
 __all__ = ["FAULTS", "Effect", "FaultError", "FaultSpec", "Names", "effect_of", "register_fault"]
@@ -191,7 +189,8 @@ class FaultSpec(Spec):
         """
         for name in self.instruments:
             if name == "imu":
-                raise SpecError(f"fault {self.kind!r}: on the IMU there is 'imu_disturbance' only")
+                own = ", ".join(repr(kind) for kind, cls in FAULTS.items().items() if cls.effect == "imu")
+                raise SpecError(f"fault {self.kind!r}: on the IMU there is {own} only")
             if name not in instruments and name not in instruments.values():
                 valid = sorted({*instruments, *instruments.values()})
                 raise SpecError(f"fault {self.kind!r}: there is no instrument {name!r}{closest(name, valid)}")
@@ -320,43 +319,22 @@ def register_fault(cls: type[F]) -> type[F]:
         If the class is not a subclass of `FaultSpec`, another class has its name, or its effect or one of its fields is
         not valid.
     """
-    if not (isinstance(cls, type) and issubclass(cls, FaultSpec)):
-        raise PluginError(f"@register_fault: {cls!r} is not a subclass of simnav.sensors.faults.FaultSpec")
-    name = cls.model_fields["kind"].default
-    if not isinstance(name, str):
-        raise PluginError(f"{cls.__qualname__}: declare its kind, like kind: Literal['my_fault'] = 'my_fault'")
+    name = registered_kind(cls, FaultSpec, decorator="register_fault", sort="fault", example="my_fault")
     if cls.effect not in get_args(Effect):
         raise PluginError(f"fault {name!r}: effect = {cls.effect!r} should be one of: {', '.join(get_args(Effect))}")
-    hidden = hidden_attribute(cls, FaultSpec)
-    if hidden is not None:
-        raise PluginError(f"fault {name!r}: the field {hidden!r} of {cls.__qualname__} hides FaultSpec.{hidden}")
     for stem in cls.stems:
         for q in QUANTITIES:
             if f"{stem}_{q}" not in cls.model_fields:
                 raise PluginError(f"fault {name!r}: a stem needs a field for every quantity; there is no {stem}_{q}")
     FAULTS.add(name, cls)
     for method in ("build", "check"):
-        setattr(cls, method, _named(getattr(cls, method)))
+        named = with_named_errors(getattr(cls, method), FaultError, _label, (SpecError, MemoryError))
+        setattr(cls, method, named)
     return cls
 
 
-def _named(method: Callable[..., Any]) -> Callable[..., Any]:
-    """A method of a specification, whose errors name the fault."""
-
-    @wraps(method)
-    def named(self: FaultSpec, *args: Any, **rest: Any) -> Any:
-        try:
-            return method(self, *args, **rest)
-        except (SpecError, MemoryError):
-            raise
-        except Exception as error:
-            cls = type(self)
-            file = Path(place_of(cls)[0]).name
-            raise FaultError(
-                f"fault {self.kind!r} ({cls.__qualname__} in {file}): {exception_of(cls, error)}"
-            ) from error
-
-    return named
+def _label(spec: FaultSpec, *_: Any, **__: Any) -> str:
+    return f"fault {spec.kind!r}"
 
 
 def effect_of(kind: str) -> Effect:

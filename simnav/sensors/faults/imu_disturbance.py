@@ -16,7 +16,7 @@ from simnav.sensors.instrument import ZERO, SigmaTriple, Triple
 from simnav.spec import SpecError, quantity
 from simnav.types import Array, ImuSamples
 
-__all__ = ["ImuDisturbance"]
+__all__ = ["ConstantDisturbance", "ImuDisturbance"]
 
 
 @register_fault
@@ -59,14 +59,22 @@ class ImuDisturbance(FaultSpec):
         return _ImuDisturbance(self, index, seed, self.key_of_streams(index, occurrence))
 
 
-class _ImuDisturbance(FaultLayer):
+class ConstantDisturbance(FaultLayer):
+    """A constant error on the output of the IMU.
+
+    Parameters
+    ----------
+    spec, index, seed, key
+        See `FaultLayer`.
+    constant : (6,) array
+        Errors of angular rate [rad/s] and specific force [m/s^2].
+    """
+
     operation = DISTURBS_IMU
 
-    def __init__(self, spec: ImuDisturbance, index: int, seed: int, key: str):
+    def __init__(self, spec: FaultSpec, index: int, seed: int, key: str, constant: Array):
         super().__init__(spec, index, seed, key)
-        self._constant = np.array(spec.angular_rate + spec.specific_force)
-        self._sigma = np.array(spec.angular_rate_noise + spec.specific_force_noise)
-        self._noise = self.rng("noise")
+        self._constant = constant
 
     def ahead_imu(self, time: Array) -> tuple[NDArray[np.bool_], Array]:
         """See `FaultLayer.ahead_imu`."""
@@ -79,12 +87,10 @@ class _ImuDisturbance(FaultLayer):
         return active, error
 
     def _error(self, n: int) -> Array:
-        error = self._constant[None].repeat(n, axis=0)
-        if self._sigma.any():
-            error += self._sigma * self._noise.standard_normal(error.shape)
-        return error
+        return self._constant[None].repeat(n, axis=0)
 
     def apply_imu(self, samples: ImuSamples, labels: ImuLabels | None) -> tuple[ImuSamples, ImuLabels | None]:
+        """See `FaultLayer.apply_imu`."""
         n = len(samples)
         if labels is None:
             labels = ImuLabels(np.zeros(n, np.uint32), np.zeros((n, 6)))
@@ -103,3 +109,16 @@ class _ImuDisturbance(FaultLayer):
             ImuSamples(samples.time, samples.interval, angular_rate, specific_force),
             ImuLabels(faults, fault_error),
         )
+
+
+class _ImuDisturbance(ConstantDisturbance):
+    def __init__(self, spec: ImuDisturbance, index: int, seed: int, key: str):
+        super().__init__(spec, index, seed, key, np.array(spec.angular_rate + spec.specific_force))
+        self._sigma = np.array(spec.angular_rate_noise + spec.specific_force_noise)
+        self._noise = self.rng("noise")
+
+    def _error(self, n: int) -> Array:
+        error = super()._error(n)
+        if self._sigma.any():
+            error += self._sigma * self._noise.standard_normal(error.shape)
+        return error

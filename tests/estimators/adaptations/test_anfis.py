@@ -13,6 +13,7 @@ import pytest
 from simnav.estimator import make
 from simnav.estimators.adaptations.anfis import Anfis, Features, Motion
 from simnav.estimators.adaptations.anfis_file import FEATURES, Parameters, ParametersError, shipped
+from simnav.estimators.adaptations.anfis_level import Level
 from simnav.estimators.adaptations.base import Innovation
 from simnav.estimators.adaptations.sugeno import Sugeno
 from simnav.estimators.models.inertial import InertialModel
@@ -312,3 +313,37 @@ def test_files_that_are_none(tmp_path: Path):
         make("anfis-fgo-motion", file=str(shipped("innovation")))
     with pytest.raises(ValueError, match=r"features.*innovation"):
         make("anfis-fgo", features="tea")
+
+
+def test_a_learned_level_is_the_datasheet_until_it_is_contradicted():
+    """Fixes of twice the datasheet's sigma: the level is found. With the datasheet's sigma it stays at 1."""
+    rng = np.random.default_rng(4)
+    for factor, low, high in ((1.0, 1.0, 1.0), (3.0, 6.0, 12.0)):
+        level = Level()
+        for t in range(200):
+            residual = rng.normal(0.0, [0.5, 0.5]) + rng.normal(0.0, [2.0 * factor] * 2)
+            fix = Measurement(float(t), "gnss", "gnss_position", np.zeros(3))
+            level.observe(Innovation(fix, residual, 0.25 * np.eye(2), 4.0 * np.eye(2)))
+        assert low <= level.value <= high
+
+
+def test_few_gross_errors_are_no_level():
+    rng = np.random.default_rng(5)
+    level = Level()
+    for t in range(200):
+        residual = rng.normal(0.0, 2.0, 2) + (30.0 if t % 10 == 0 else 0.0)
+        fix = Measurement(float(t), "gnss", "gnss_position", np.zeros(3))
+        level.observe(Innovation(fix, residual, 0.01 * np.eye(2), 4.0 * np.eye(2)))
+    assert level.value == 1.0
+
+
+def test_a_wrong_datasheet_costs_nothing_with_a_learned_level():
+    """On a training seed, with fixes three times as noisy as their datasheet: better than no adaptation."""
+    scenario = load("ship-turn").with_values({"instruments.gnss.times_datasheet": {"sigma": 3.0}})
+    recording = record(scenario, FIRST_TRAINING_SEED)
+    rows = {"plain": make("ship-ekf"), "as trained": make("anfis-ekf"), "learned": make("anfis-ekf", level="learned")}
+    found = {
+        name: score(run_trial(row, recording), recording, ["horizontal_rmse"])["horizontal_rmse"]
+        for name, row in rows.items()
+    }
+    assert found["learned"] < found["plain"] < found["as trained"]

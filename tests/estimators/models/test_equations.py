@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-import pytest
 
 from simnav import estimators, kinds
 from simnav.estimators.models.equations import EQUATIONS, Equation, equation_of, equation_of_kind
@@ -30,15 +29,6 @@ def sheet(kind: str) -> Datasheet:
         "it", kind, 1.0, np.array(0.1), scale=0.01, misalignment=np.array([0.1, 0.2, 0.3]),
         lever_arm=np.array([2.0, 1.0, 0.5]),
     )  # fmt: skip
-
-
-@pytest.mark.parametrize(
-    ("kind", "sigmas"), [("dvl", (0.01, 0.1, 0.2, 0.3)), ("speed_log", (0.01,)), ("depth", ()), ("gnss_position", ())]
-)
-def test_scale_and_misalignment_are_states_of_logs(kind, sigmas):
-    assert equation_of(sheet(kind)).scale_sigmas(sheet(kind)) == sigmas
-    plain = Datasheet("it", kind, 1.0, np.array(0.1))
-    assert equation_of(plain).scale_sigmas(plain) == ()
 
 
 def test_the_noise_of_the_gyroscopes_is_that_of_the_velocity_of_the_lever_arm():

@@ -170,6 +170,12 @@ def test_realised_errors_are_found(recording_of, run_over):
     assert sigma[6] < 0.002
     assert sigma[7] < 0.01
     assert (slice(15, 18), slice(18, 21), 21) == (MISALIGNMENT, LEVER_ARM, SCALE)
+    assert estimator.model.blocks.of("dvl") == [
+        MISALIGNMENT,
+        LEVER_ARM,
+        slice(SCALE, SCALE + 1),
+        slice(DELAY, DELAY + 1),
+    ]
 
 
 def test_it_needs_a_dvl_and_has_23_states_whatever_else_there_is(recording_of):

@@ -1,4 +1,4 @@
-"""The two-filter smoother equals Rauch-Tung-Striebel's to rounding; seeded as printed it is over-confident."""
+"""The two-filter smoother equals Rauch-Tung-Striebel's to rounding; seeded as printed it is optimistic."""
 
 from __future__ import annotations
 

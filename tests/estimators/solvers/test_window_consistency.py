@@ -1,6 +1,6 @@
 """The graphs agree with each other and with the filters, and promise what they hold.
 
-Over 50 seeds of a matched clean scenario: marginalisation must not make the window over-confident, and on Gaussian data
+Over 50 seeds of a matched clean scenario: marginalisation must not make the window optimistic, and on Gaussian data
 it must not cost accuracy. Its window is short here, so that what it says is for the most part what left the window.
 """
 

@@ -580,3 +580,66 @@ def test_nobody_is_asked_where_there_is_no_log():
         f.iteration = 1
         assert weighting.weigh(f) is True
         assert f.weight.max() == 1e-3
+
+
+def lone(
+    epochs: int, norms: dict[float, float], fix_until: float = 1.0, fold: float = 0.0
+) -> list[tuple[Factors, bool]]:
+    """What is asked, epoch by epoch, if the DVL fails from second 1 on, and fixes pass until a time.
+
+    ``norms`` are the norms of the DVL's readings by their times where the motion is loosened; ``fold`` is how long
+    after its node each reading was taken [s]. The result has the factors of each epoch when they were final, and
+    whether the motion was tested.
+    """
+    weighting = Isolated(SHEETS)
+    found = []
+    for epoch in range(1, epochs + 1):
+        nodes = np.arange(1.0, epoch + 1.0)
+        fixed = nodes[nodes <= fix_until]
+        time = np.concatenate([nodes + fold, fixed])
+        order = np.argsort(time, kind="stable")
+        kind = np.concatenate([np.ones(epoch, int), np.zeros(len(fixed), int)])[order]
+        size = np.where(kind == 1, 40.0, 0.5)
+        f = factors(along(size), ("gnss", "dvl"), kind, motion=np.zeros((epoch, 15)))
+        f.time[:], f.motion_time[:] = time[order], nodes
+        tested = False
+        for k in range(6):
+            f.iteration = k
+            settled = weighting.weigh(f)
+            loose = f.motion_weight <= 1e-6
+            if loose.any():
+                tested = True
+                f.norm[:] = [norms.get(t, s) for t, s in zip(f.time.tolist(), size.tolist(), strict=True)]
+                f.motion_norm[loose] = 1e3
+                shown = loose.copy()
+            elif not settled:
+                f.norm[:], f.motion_norm[:] = size, 0.0
+            if settled:
+                break
+        found.append((replace(f, motion_norm=shown if tested else np.zeros(epoch)), tested))
+    return found
+
+
+def test_a_lone_log_is_believed_against_the_motion():
+    seen = lone(9, {float(t): 1.0 for t in range(1, 10)})
+    assert [tested for _, tested in seen[:7]] == [False] * 6 + [True]  # until then fixes may still come
+    assert seen[6][0].weight.min() == 1.0
+
+
+def test_a_log_is_not_alone_while_fixes_come():
+    assert not any(tested for _, tested in lone(9, {}, fix_until=9.0))
+
+
+def test_a_lone_log_that_contradicts_itself_is_asked_again_by_its_newest_readings():
+    """What a wrong motion folded onto a node never agrees; later readings do."""
+    seen = lone(12, {float(t): 1.0 for t in range(8, 13)})
+    asked_at = [k + 1 for k, (_, tested) in enumerate(seen) if tested]
+    assert asked_at[:2] == [7, 10]
+    last = seen[9][0]
+    assert np.array_equal(last.weight[last.instrument == 1] == 1.0, np.arange(1, 11) >= 8)
+
+
+def test_the_motion_to_the_node_of_a_folded_reading_is_loosened():
+    plain, folded = (lone(7, {t + f: 1.0 for t in range(1, 8)}, fold=f)[6][0].motion_norm for f in (0.0, 0.4))
+    assert np.array_equal(plain, folded)
+    assert plain.all()

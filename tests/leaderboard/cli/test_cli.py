@@ -13,6 +13,7 @@ import pytest
 from typer.testing import CliRunner
 
 from simnav.leaderboard import cli
+from simnav.leaderboard.cli.commands import COMMANDS, GROUPS, HEADINGS
 from tests.cases import POND
 
 SCENARIO = (
@@ -95,7 +96,7 @@ def test_version():
     assert call("--version").stdout.startswith("simnav 0.")
 
 
-@pytest.mark.parametrize("topic", ["scenarios", "estimators", "instruments", "faults"])
+@pytest.mark.parametrize("topic", ["scenarios", "estimators", "instruments", "faults", "imus"])
 def test_list_shows_the_same_to_people_and_machines(topic):
     entries = document("list", topic)[topic]
     assert entries
@@ -108,6 +109,45 @@ def test_list_without_a_topic_shows_scenarios_and_estimators():
     found = document("list")
     assert {"open-sea", "coastal-voyage"} <= {s["name"] for s in found["scenarios"]}
     assert {e["name"]: e["reference"] for e in found["estimators"]}["oracle"] is True
+
+
+@pytest.mark.parametrize("topic", ["scenarios", "estimators", "instruments", "faults"])
+@pytest.mark.parametrize("width", ["80", "120"])
+def test_a_list_has_one_line_for_each_and_the_whole_name_first(topic, width, monkeypatch):
+    monkeypatch.setenv("COLUMNS", width)
+    entries = document("list", topic)[topic]
+    lines = [line for line in call("list", topic).stdout.splitlines() if line.strip()]
+    names = [e.get("name", e.get("kind")) for e in entries]
+    below = lines[3:]  # the title, the columns, a line below them
+    assert [line.split()[0] for line in below[: len(names)]] == names
+    assert "'simnav show NAME' has the rest." in " ".join(below[len(names) :])
+    assert max(map(len, lines)) <= int(width)
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("harbour-multipath", ["Scenario harbour-multipath-v2", "gyrocompass", "false zero"]),
+        ("harbour-multipath-v2", ["Scenario harbour-multipath-v2"]),
+        ("sw-fgo", ["Sliding-window factor graph", "window", "imu; aid", "fgo-simplified"]),
+        ("fgo", ["Estimator sw-fgo"]),
+        ("dvl", ["Instrument dvl", "sigma_m_s"]),
+        ("outage", ["Fault outage", "start_s"]),
+    ],
+)
+def test_show_tells_all_about_a_name(name, said):
+    shown = call("show", name).stdout
+    assert [text for text in said if text not in shown] == []
+    assert document("show", name)
+
+
+def test_show_of_an_unknown_name_names_those_that_are_near():
+    assert "called 'sw-fog'; did you mean sw-fgo" in complaint_of(call("show", "sw-fog", code=2))
+
+
+def test_every_command_stands_under_one_heading_of_the_help():
+    named = [name for names in HEADINGS.values() for name in names]
+    assert sorted(named) == sorted([*COMMANDS, *GROUPS])
 
 
 def test_list_names_the_keys_of_instruments_and_faults():
@@ -148,9 +188,9 @@ def test_run_scores_and_plots(here):
         assert 0.1 < e["scores"]["horizontal_rmse"] < 50.0
     assert found["scores"]["horizontal_rmse"]["unit"] == "m"
     drawn = Path(found["plot"]).read_text()
-    assert "<!-- North error [m] -->" in drawn
-    assert "<!-- gnss_position fixes -->" in drawn
-    assert "<!-- no gnss_position -->" in drawn  # the outage
+    assert ">North error [m]</text>" in drawn
+    assert ">gnss_position fixes</text>" in drawn
+    assert ">no gnss_position</text>" in drawn  # the outage
 
 
 def test_run_is_the_same_again_but_for_the_times(here):
@@ -301,7 +341,7 @@ def test_evaluate_shows_where_an_estimator_stands(here):
     assert found["estimator"] == "mine"
     assert found["seeds"] == [0, 1, 2]
     (stand,) = found["comparisons"]
-    assert (stand["place"], stand["of"]) == (2, 2)
+    assert (stand["place"], stand["last"], stand["of"]) == (1, 2, 2)  # three seeds decide nothing
     other = next(r for r in stand["rows"] if r["estimator"] == "gnss-only")
     runs = [document("run", "pond.toml", "-e", "mine.py,gnss-only", "--seed", k)["estimators"] for k in range(3)]
     ratios = [mine["scores"]["horizontal_rmse"] / gnss["scores"]["horizontal_rmse"] for mine, gnss in runs]
@@ -309,7 +349,8 @@ def test_evaluate_shows_where_an_estimator_stands(here):
     assert other["better"] == pytest.approx(np.mean(np.array(ratios) < 1.0))
     assert sorted(p.name for p in here.iterdir()) == ["mine.py", "pond.toml"]  # results are not left behind
     shown = call(*words).stdout
-    assert "mine is 2 of 2" in shown
+    assert "mine may be 1 to 2 of 2" in shown
+    assert shown.strip().splitlines()[-1].startswith("mine may be 1 to 2 of 2 on pond-v1")
 
 
 def test_evaluate_of_a_broken_estimator_is_a_failure(here):

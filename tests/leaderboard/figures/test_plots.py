@@ -11,6 +11,7 @@ import pytest
 
 from simnav.leaderboard.figures import plots as figures
 from simnav.leaderboard.figures.plots import Band, Curve, Dot, Track
+from simnav.leaderboard.figures.ratio_map import ratio_map
 from simnav.leaderboard.figures.style import PALETTE, Style, save
 
 TIME = np.linspace(1.0, 1200.0, 240)
@@ -185,6 +186,15 @@ def test_run_chart_shows_errors_bounds_and_diagnostics(style, truth):
     assert fig.axes[2].get_ylabel() == "weight"
 
 
+def test_a_map_has_a_cell_for_each_ratio():
+    cells = {("ekf", "calm"): 1.0, ("ekf", "rough"): 1.0, ("iae", "calm"): 0.25, ("iae", "rough"): 8.0}
+    axes = ratio_map(cells, "Error × ekf", "A track").axes[0]
+    (drawn,) = axes.collections
+    np.testing.assert_array_equal(drawn.get_array().reshape(2, 2), [[1.0, 1.0], [0.25, 8.0]])
+    assert [t.get_text() for t in axes.get_yticklabels()] == ["ekf", "iae"]
+    assert [t.get_text() for t in axes.get_xticklabels()] == ["calm", "rough"]
+
+
 def test_saved_svg_is_valid_has_its_labels_and_follows_the_theme(style, tmp_path):
     fig = figures.error_cdf([band("ekf", 1.0)], style, label="Horizontal error [m]", title="Distribution")
     svg, png = save(fig, tmp_path / "figure")
@@ -192,7 +202,7 @@ def test_saved_svg_is_valid_has_its_labels_and_follows_the_theme(style, tmp_path
     content = svg.read_text()
     ET.fromstring(content)
     for text in ("Horizontal error [m]", "Distribution", "ekf"):
-        assert f"<!-- {text} -->" in content  # matplotlib's comment beside outlined text
+        assert f">{text}</text>" in content  # letters stay letters
     assert "prefers-color-scheme:dark" in content
     assert re.search(r'style="[^"]*stroke: ' + style.colour("ekf"), content)
     assert not re.search(r'(href|src)="https?://', content)

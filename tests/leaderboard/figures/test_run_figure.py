@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 
 from simnav.estimator import make
 from simnav.leaderboard.cli.application import app
-from simnav.leaderboard.figures.run_figure import fixes, innovation_unit, outage_spans, run_figure
+from simnav.leaderboard.figures.run_figure import fault_spans, fixes, innovation_unit, outage_spans, run_figure
 from simnav.scenario import load
 from simnav.sensors.faults import Outage
 from simnav.source import record
@@ -73,6 +73,19 @@ def test_a_fix_that_is_no_latitude_and_longitude_is_not_drawn_as_one(plugins, tm
         (tmp_path / name).write_text((plugins / name).read_text().replace('role="range"', 'role="fix"'))
     recording = record(load(tmp_path / "lagoon.toml").model_copy(update={"duration": 5.0, "faults": ()}), 1)
     assert fixes(recording) == {}
+
+
+def test_faults_are_shaded_and_the_nis_has_its_bound():
+    recording = record(load("harbour-multipath"), 1)
+    spans = fault_spans(recording)
+    assert [name for _, _, name in spans] == ["multipath gnss", "frozen gnss", "false zero dvl"]
+    figure = run_figure(recording, [("ekf", run_trial(make("ekf"), recording))])
+    first = next(a for a in figure.axes if a.get_ylabel().startswith("North error"))
+    assert {t.get_text() for t in first.texts} == {name for _, _, name in spans}
+    assert len(first.patches) == len(spans)
+    (axes,) = (a for a in figure.axes if a.get_ylabel() == "nis\ngnss [-]")
+    levels = [line.get_ydata()[0] for line in axes.lines if len(line.get_ydata()) == 2]
+    assert levels == [pytest.approx(7.815, abs=1e-3)]  # of chi-square with three degrees of freedom
 
 
 def test_an_outage_is_where_nothing_came(plugins):

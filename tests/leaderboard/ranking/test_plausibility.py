@@ -7,11 +7,13 @@ from typing import Any
 
 import pytest
 
+from simnav.estimator.registry import registered
 from simnav.leaderboard.ranking import reference
 from simnav.leaderboard.ranking.board import Reference
 from simnav.leaderboard.ranking.ranking import rank
 from simnav.leaderboard.results.provenance import Provenance
 from simnav.leaderboard.results.result import Result
+from simnav.leaderboard.standard.readme import tables
 
 #: Horizontal errors [m] of the plain filter, the plain smoother and an honest row, by recording.
 PLAIN = {"dive 1": 7.0, "dive 2": 2.0, "dive 3": 1.5}
@@ -98,6 +100,17 @@ def test_the_board_says_what_is_known_of_seeds_and_references() -> None:
     assert "1 of 1 scenarios is recorded: logs and references can be downloaded by anybody" in said
     sealed = [replace(r, provenance=Provenance(seal="5ce1")) for r in runs("ekf", 1.0) + runs("mine", 0.9)]
     assert "Seeds are sealed (5ce1)" in " ".join(rank(sealed).tracks[0].remarks)
+
+
+def test_the_board_says_which_results_are_of_an_older_version(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(registered("ekf"), "version", 3)
+    found = [replace(r, estimator_version=2) for r in runs("ekf", 1.0)] + runs("mine", 0.9) + runs("ukf", 1.1)
+    track = rank(found).tracks[0]
+    assert {r.estimator: r.superseded for r in track.rows if r.superseded} == {"ekf": "version 2; simnav has version 3"}
+    assert "Results of an older version: ekf (version 2; simnav has version 3)." in track.remarks
+    assert "Results of an older version, until the next edition: `ekf` (version 2; simnav has version 3)." in tables(
+        rank(found), found
+    )
 
 
 def test_the_board_says_what_a_row_learned_from() -> None:

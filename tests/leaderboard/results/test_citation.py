@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from simnav.leaderboard.results.citation import TITLE, citation
+from simnav.leaderboard.results.citation import AUTHORS, TITLE, citation
 from simnav.leaderboard.results.errors import RequestError
 from simnav.leaderboard.results.provenance import BENCHMARK, Provenance
 
@@ -22,6 +22,16 @@ def test_simnav_itself():
     assert f"version = {{{version('simnav')}}}" in found.bibtex
     assert found.bibtex.count("{") == found.bibtex.count("}")
     assert BENCHMARK in found.text
+
+
+def test_results_are_cited_with_the_author_who_made_them():
+    assert citation([MADE], "Ana Silva").bibtex.splitlines()[1] == "  author  = {Ana Silva},"
+    assert citation([MADE]).author == AUTHORS
+    for wrong, said in (("a}b", "no braces"), ("two\nlines", "printable"), (" ", "printable")):
+        with pytest.raises(RequestError, match=said):
+            citation([MADE], wrong)
+    with pytest.raises(RequestError, match="for results only"):
+        citation(None, "Ana Silva")
 
 
 def test_results_are_cited_with_their_commit_days_and_number():

@@ -33,6 +33,10 @@ def test_every_format_of_results_is_written(tmp_path: Path):
     assert (row["seed"], row["parameters"], row["horizontal_rmse"]) == (3, '{"gain": 0.5}', 2.5)
     assert row["drift"] is None
     assert [row] == table([ONE]).to_pylist()
+    fields = pq.read_schema(tmp_path / "results.parquet")
+    units = {name: (fields.field(name).metadata or {}).get(b"unit") for name in fields.names}
+    assert (units["horizontal_rmse"], units["heading_rmse"], units["seconds"]) == (b"m", b"rad", b"s")
+    assert units["reason"] is None
 
 
 def test_a_text_that_a_spreadsheet_would_compute_is_quoted(tmp_path: Path):

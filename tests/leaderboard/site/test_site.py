@@ -18,12 +18,15 @@ from simnav.estimator import find, names
 from simnav.leaderboard.campaign.request import comes_with_simnav
 from simnav.leaderboard.ranking.board import TrackRow
 from simnav.leaderboard.ranking.ranking import rank
+from simnav.leaderboard.ranking.runs import group
 from simnav.leaderboard.ranking.stored_costs import cost_of
 from simnav.leaderboard.results.errors import RequestError
 from simnav.leaderboard.results.export import SCHEMA_VERSION
+from simnav.leaderboard.results.result import Result
 from simnav.leaderboard.site import charts, site, sweeps
+from simnav.leaderboard.site.entries import entries
 from simnav.leaderboard.site.facts import estimator_facts
-from simnav.leaderboard.site.overview import bar_scale
+from simnav.leaderboard.site.overview import bar_scale, overview
 from simnav.leaderboard.site.scenario_page import ScenarioData
 from simnav.scoring import SCORES
 from tests.leaderboard.site.conftest import made_up_sweep
@@ -180,6 +183,38 @@ def test_costs_are_multiples_of_the_plain_row_and_what_is_not_measured_is_named(
     assert hostile not in points["row"]
     assert "Cost not measured: " in chart["caption"]
     assert "Processor time (× ekf)" in json.dumps(chart["spec"], ensure_ascii=False)
+
+
+def test_the_map_has_the_error_of_each_row_beside_the_plain_row_s_on_each_scenario(folder):
+    one, track = tracks_of(folder)
+    assert one["map"] is None  # of a single scenario
+    cells = track["map"]["data"]["cells"]
+    found = {(r, s): x for r, s, x in zip(cells["row"], cells["scenario"], cells["ratio"], strict=True)}
+    rows = {r["name"]["text"]: r for r in track["table"]["rows"]}
+    names = {s["id"]: s["name"] for s in track["scenarios"]}
+    for row in {row for row, _ in found}:
+        for identity, name in names.items():
+            mine, plain = (rows[r][f"s:{identity}"]["value"] for r in (row, "ekf"))
+            assert found[row, name] == pytest.approx(mine / plain, rel=0.02)
+    assert {found["ekf", name] for name in names.values()} == {1.0}
+    assert cells["row"][0] == min({row for row, _ in found}, key=lambda r: rows[r]["score"]["value"])
+    assert track["map"]["data"]["scenarios"]["page"] == [s["page"] for s in track["scenarios"]]
+
+
+def test_a_row_far_behind_is_named_below_the_chart_of_costs_and_flattens_none():
+    labels = ["ekf", "ukf", "sw-fgo", "ckf", "iekf", "inekf", "iae", "imm", "student-t", "mckf", "inertial"]
+    errors = {n: 1.0 + 0.1 * i for i, n in enumerate(labels)} | {"inertial": 900.0}
+    results = [
+        Result("made-up-one-v1", k, n, {}, False, "ok", "", {"horizontal_rmse": error})
+        for n, error in errors.items()
+        for k in range(6)
+    ]
+    ranking = rank(results)
+    (track,) = overview(ranking, *entries(group(results), ranking), group(results))
+    chart = next(c for c in track["charts"] if c["name"].endswith("-cost"))
+    assert "inertial" not in chart["data"]["rows"]["row"]
+    assert len(chart["data"]["rows"]["row"]) == len(labels) - 1
+    assert "Above the chart: inertial (" in chart["caption"]
 
 
 def test_one_row_far_behind_does_not_decide_the_scale_of_the_bars():

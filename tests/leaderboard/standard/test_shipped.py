@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
+import simnav
 from simnav.leaderboard import standard
 from simnav.leaderboard.profiles import read_profile
 from simnav.leaderboard.ranking.board import Ranking
@@ -36,9 +38,13 @@ def ranking(results: list[Result]) -> Ranking:
     return rank(results)
 
 
-def test_its_versions_are_those_of_today() -> None:
+def test_its_versions_are_those_of_today_or_the_readme_says_which_are_older() -> None:
+    """A row may be better than its results until the next edition; a scenario or the simulator may not."""
     found = outdated(standard.RESULTS)
-    assert not found, "\n".join([*found.sentences(), "'simnav standard run' does it, then 'simnav standard publish'"])
+    rest = replace(found, rows=())
+    assert not rest, "\n".join([*rest.sentences(), "'simnav standard run' does it, then 'simnav standard publish'"])
+    text = readme.marked(ROOT / "README.md")
+    assert [row for row in found.rows if f"`{row}` (version " not in text] == []
 
 
 def test_the_readme_and_the_history_are_made_from_it(results: list[Result], ranking: Ranking) -> None:
@@ -53,6 +59,10 @@ def test_the_readme_and_the_history_are_made_from_it(results: list[Result], rank
     assert [(x.track, x.row, x.ranks) for x in lines] == [
         (x.track, x.row, x.ranks) for x in history.lines_of(ranking, results, last)
     ]
+
+
+def test_it_is_one_call_away(results: list[Result]) -> None:
+    assert len(simnav.standard().results) == len(results)
 
 
 def test_no_track_of_its_overview_is_too_large(results: list[Result], ranking: Ranking) -> None:

@@ -133,7 +133,7 @@ def test_an_edit_changes_nothing_and_a_raised_version_runs_that_row_only(
     early = publish(tmp_path, tmp_path / "work", preliminary=True)
     assert early.edition == 0
     assert not (tmp_path / "history.csv").exists()
-    assert readme.marked(tmp_path / "README.md").startswith("**Preliminary: 2 of 4 results.** 2 runs of")
+    assert readme.marked(tmp_path / "README.md").startswith("**Preliminary: 2 of 4 results.**\n")
     done = run(home, tmp_path / "work")
     assert (done.summary.skipped, done.summary.computed, done.summary.left) == (2, 2, 0)
     made = publish(home, tmp_path / "work")

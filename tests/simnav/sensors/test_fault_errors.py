@@ -148,7 +148,7 @@ def test_a_field_that_hides_a_method(plugins):
         register_fault(type("Swell", (FaultSpec,), {**fault(size=quantity("m", 1.0)), "__module__": __name__}))
     fields = {"__annotations__": {"kind": str, "sigma": float, "figure": float}, "kind": "thing",
               "sigma": quantity("m", 1.0), "figure": 1.0, "__module__": __name__}  # fmt: skip
-    with pytest.raises(PluginError, match=r"kind 'thing': the field 'figure' of Thing hides AidSpec\.figure"):
+    with pytest.raises(PluginError, match=r"instrument 'thing': the field 'figure' of Thing hides AidSpec\.figure"):
         register_instrument(KINDS["depth"], example={})(type("Thing", (AidSpec,), fields))
 
 

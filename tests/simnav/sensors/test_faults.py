@@ -263,6 +263,51 @@ def test_imu_disturbance_noise_and_bits():
     assert np.array_equal(np.unique(marks.faults), [2, 6])
 
 
+def moving_imu(n=100) -> ImuSamples:
+    """Samples of which no two are alike."""
+    return ImuSamples(
+        0.01 * np.arange(1, n + 1),
+        np.full(n, 0.01),
+        np.arange(3.0 * n).reshape(n, 3),
+        -np.arange(3.0 * n).reshape(n, 3),
+    )
+
+
+def test_imu_gap_repeats_the_sample_before_it():
+    before = moving_imu()
+    after, marks = layer({"kind": "imu_gap", "intervals_s": [[0.2, 0.25], [0.6, 0.61]]}).apply_imu(before, None)
+    gap = np.isin(np.arange(100), [19, 20, 21, 22, 23])
+    single = np.arange(100) == 59
+    for name in ("angular_rate", "specific_force"):
+        value, was = getattr(after, name), getattr(before, name)
+        assert np.all(value[gap] == was[18])
+        assert np.all(value[single] == was[58])
+        assert np.array_equal(value[~gap & ~single], was[~gap & ~single])
+    assert np.array_equal(marks.faults, gap + 2 * single)
+    error = np.hstack([after.angular_rate - before.angular_rate, after.specific_force - before.specific_force])
+    assert np.array_equal(marks.fault_error, error)
+    assert np.array_equal(before.angular_rate, moving_imu().angular_rate)
+
+
+def test_imu_gap_at_the_very_start_repeats_its_first_sample():
+    after, _ = layer({"kind": "imu_gap", "end_s": 0.05}).apply_imu(moving_imu(), None)
+    assert np.all(after.angular_rate[:4] == moving_imu().angular_rate[0])
+    assert np.all(after.angular_rate[4] == moving_imu().angular_rate[4])
+
+
+@pytest.mark.parametrize("edges", [(0, 50, 100), (0, 1, 20, 21, 22, 60, 100)])
+def test_imu_gap_in_pieces_gives_the_same(edges):
+    table = {"kind": "imu_gap", "mean_active_s": 0.05, "mean_gap_s": 0.1}
+    samples = moving_imu()
+    whole, marks = layer(table).apply_imu(samples, None)
+    one = layer(table)
+    parts = [one.apply_imu(samples[a:b], None) for a, b in pairwise(edges)]
+    assert 20 < np.count_nonzero(marks.faults) < 80
+    assert np.array_equal(np.concatenate([p.specific_force for p, _ in parts]), whole.specific_force)
+    assert np.array_equal(np.concatenate([m.faults for _, m in parts]), marks.faults)
+    assert np.array_equal(np.concatenate([m.fault_error for _, m in parts]), marks.fault_error)
+
+
 # --- how they compose
 
 
@@ -429,6 +474,7 @@ def test_faults_that_do_not_fit_the_instruments(table, message):
         ({"kind": "multipath", "instruments": "gnss", "sigma_m": 5}, "correlation_time_s"),
         ({"kind": "bias_step", "instruments": "gnss", "offset": 5}, "unknown key 'faults\\[0\\].offset'"),
         ({"kind": "imu_disturbance"}, "specific_force_m_s2"),
+        ({"kind": "imu_gap", "instruments": "gnss"}, "on 'imu' and nothing else"),
         ({"kind": "imu_disturbance", "instruments": "dvl", "specific_force_m_s2": 1}, "on 'imu' and nothing else"),
     ],
 )
@@ -439,8 +485,8 @@ def test_faults_that_make_no_sense(table, message):
     assert "\n" not in str(caught.value)
 
 
-def test_imu_disturbance_needs_an_imu():
-    fault = {"kind": "imu_disturbance", "specific_force_m_s2": 0.5}
+@pytest.mark.parametrize("fault", [{"kind": "imu_disturbance", "specific_force_m_s2": 0.5}, {"kind": "imu_gap"}])
+def test_faults_of_the_imu_need_an_imu(fault):
     check_faults(faults(fault), INSTRUMENTS)
     with pytest.raises(SpecError, match="no IMU"):
         check_faults(faults(fault), INSTRUMENTS, imu=False)

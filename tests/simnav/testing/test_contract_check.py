@@ -62,6 +62,16 @@ class YawInDegrees(Good):
         return Estimate(measurements.time, self.position, attitude=np.degrees(self.start.attitude))
 
 
+class YawFarOff(Good):
+    def update(self, measurements):
+        return Estimate(measurements.time, self.position, attitude=np.add(self.start.attitude, [0.0, 0.0, 0.69]))
+
+
+class AtRest(Good):
+    def update(self, measurements):
+        return Estimate(measurements.time, self.position, np.zeros(3))
+
+
 class Knots(Good):
     def update(self, measurements):
         return Estimate(measurements.time, self.position, self.start.velocity * 100.0)
@@ -191,7 +201,9 @@ def test_a_good_one_passes():
         (BadCovariance, "output", "negative variance"),
         (Silent, "output", "estimates nothing"),
         (Degrees, "units", "latitude, longitude [rad]"),
-        (YawInDegrees, "units", "yaw 40"),
+        (YawInDegrees, "units", "yaw is 40.3 rad after a second"),
+        (YawFarOff, "units", "yaw is 1.39 rad after a second; the initial state has 0.703 rad"),
+        (AtRest, "units", "velocity north is 0 m/s after a second; the initial state has 3.76 m/s"),
         (Knots, "units", "velocity"),
         (Random, "determinism", "position differs at 1 s"),
         (RandomFlags, "determinism", "flagged differs at"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -10,12 +11,19 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from simnav.kinds import EQUATIONS, KINDS
+from simnav.leaderboard.campaign.recorder import record_here
+from simnav.leaderboard.campaign.request import EstimatorRequest
 from simnav.leaderboard.figures.run_figure import run_figure
+from simnav.leaderboard.ranking.ranking_table import consistency
+from simnav.leaderboard.ranking.rows import Consistency
 from simnav.leaderboard.results.errors import RequestError, mistakes, printable
 from simnav.leaderboard.results.frame import frame
+from simnav.leaderboard.results.shown import Shown
 from simnav.scoring import SCORES, protection_levels, score, stanford
+from simnav.scoring.consistency import badge
+from simnav.scoring.lagged import seconds_of
 
-from .request import EstimatorRequest
+from .ranking import tables
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -25,14 +33,14 @@ if TYPE_CHECKING:
     from simnav.scoring import Stanford
     from simnav.trial import Trial
 
-__all__ = ["EstimatorRun", "RunReport", "record", "run_once"]
+__all__ = ["EstimatorRun", "RunReport", "run_once"]
 
 
 #: Diagnostics that an estimator gives for each instrument that it uses.
 _OF_INSTRUMENTS = ("innovation.", "residual.")
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class EstimatorRun:
     """What one estimator did.
 
@@ -63,9 +71,13 @@ class EstimatorRun:
     scores: Mapping[str, float]
     trial: Trial
 
+    def __repr__(self) -> str:
+        error = self.scores.get("horizontal_rmse", math.nan)
+        return f"<EstimatorRun: {self.estimator}, {self.status}, horizontal RMSE {tables.number(error)} m>"
 
-@dataclass(frozen=True, eq=False)
-class RunReport:
+
+@dataclass(frozen=True, eq=False, repr=False)
+class RunReport(Shown):
     """One run of several estimators.
 
     Attributes
@@ -81,6 +93,17 @@ class RunReport:
     recording: Recording
     simulation_seconds: float
     estimators: tuple[EstimatorRun, ...]
+
+    def headline(self) -> str:
+        """The run, and who took part."""
+        labels = ", ".join(e.estimator for e in self.estimators)
+        return f"{self.recording.scenario}, seed {self.recording.seed}: {labels}"
+
+    def shown(self) -> Sequence[tables.Fitted]:
+        """The table of the scores; with lags, that of outputs that are late, too."""
+        found = run_table(self.recording, self.estimators)
+        late = any("_lag_" in name for e in self.estimators for name in e.scores)
+        return [found, lag_table(self.estimators)] if late else [found]
 
     def unseen(self, run: EstimatorRun) -> dict[str, str]:
         """Name and kind of the instruments of which an estimator shows no innovation and no residual.
@@ -142,14 +165,6 @@ class RunReport:
         }
 
 
-def record(scenario: Scenario, seed: int) -> Recording:
-    """The recording of a run; RequestError where a log's files are not there or cannot be used."""
-    from simnav.source import record
-
-    with mistakes(ValueError, FileNotFoundError):
-        return record(scenario, seed)
-
-
 def run_once(
     scenario: Scenario,
     requests: Sequence[EstimatorRequest],
@@ -162,7 +177,7 @@ def run_once(
     with mistakes(ValueError):
         estimators = [request.make() for request in requests]
     started = time.perf_counter()
-    recording = record(scenario, seed)
+    recording = record_here(scenario, seed)
     simulated = time.perf_counter() - started
     report = progress or (lambda *_, **__: None)
     runs = []
@@ -176,3 +191,64 @@ def run_once(
                                  printable(trial.reason), seconds, scores, trial))  # fmt: skip
     report(len(requests), len(requests))
     return RunReport(recording, simulated, tuple(runs))
+
+
+def _covariance(scores: Mapping[str, float]) -> str:
+    """What the truth of this run says of the covariance: the verdict, and the NEES that it is from."""
+    nees = scores.get("nees_horizontal", math.nan)
+    return consistency(Consistency(badge(np.array([nees])), nees))
+
+
+def lag_table(estimators: Sequence[EstimatorRun]) -> tables.Fitted:
+    """Horizontal RMSE against the delay of the output: a row an estimator, a column a lag."""
+    base = "horizontal_rmse"
+    names = {n for e in estimators for n in e.scores if n.startswith(f"{base}_lag_")}
+    lags = sorted(names, key=lambda name: seconds_of(name.rpartition("_")[2]))
+    columns = ["estimator", "newest", *(f"{seconds_of(n.rpartition('_')[2]):g} s late" for n in lags)]
+    cells = [[e.estimator, *(tables.number(e.scores.get(s)) for s in (base, *lags))] for e in estimators]
+    return tables.Fitted("Horizontal RMSE [m] of an output that is late", columns, cells, columns, numeric=columns[1:])
+
+
+def run_table(recording: Recording, estimators: Sequence[EstimatorRun]) -> tables.Fitted:
+    """Scores of the estimators, the best horizontal RMSE first."""
+
+    def order(k: int) -> tuple[bool, float]:
+        value = estimators[k].scores.get("horizontal_rmse", math.inf)
+        return estimators[k].status != "ok", value if math.isfinite(value) else math.inf
+
+    ordered = [estimators[k] for k in sorted(range(len(estimators)), key=order)]
+    plain = ("horizontal_rmse", "r95", "horizontal_max", "vertical_rmse", "velocity_horizontal_rmse")
+    smoothed = any(math.isfinite(e.scores.get("smoothed_horizontal_rmse", math.nan)) for e in ordered)
+    cells = [
+        [e.estimator + (" *" if e.reference else ""), e.status,
+         *(tables.number(e.scores.get(s)) for s in plain),
+         tables.number(math.degrees(e.scores.get("heading_rmse", math.nan))),
+         _covariance(e.scores), tables.percent(e.scores.get("coverage_95")),
+         tables.duration(e.scores.get("update_median")),
+         tables.number(e.scores.get("smoothed_horizontal_rmse")) if smoothed else ""]
+        for e in ordered
+    ]  # fmt: skip
+    columns = ["estimator", "status", "horizontal RMSE [m]", "R95 [m]", "max [m]", "vertical RMSE [m]",
+               "velocity RMSE [m/s]", "heading RMSE [deg]", "NEES/dof", "95 % coverage", "per epoch",
+               "smoothed [m]"]  # fmt: skip
+    note = f"; {recording.note}" if recording.note else ""
+    reference = [i for i, e in enumerate(ordered) if e.reference]
+    return tables.Fitted(
+        f"{recording.scenario}, seed {recording.seed}, {tables.duration(recording.duration)}{note}",
+        columns,
+        cells,
+        [
+            "estimator",
+            "horizontal RMSE [m]",
+            "status",
+            "smoothed [m]",
+            "R95 [m]",
+            "NEES/dof",
+            "max [m]",
+            "heading RMSE [deg]",
+            "per epoch",
+        ],
+        numeric=columns[2:],
+        dim=reference,
+        caption="* reference: it is told the truth" if reference else None,
+    )

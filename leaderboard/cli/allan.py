@@ -1,0 +1,68 @@
+"""``simnav allan``: the Allan deviation of an IMU."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from simnav.leaderboard.figures.style import save_as
+from simnav.leaderboard.inspection import allan
+from simnav.leaderboard.ranking import tables
+from simnav.leaderboard.results.errors import mistakes
+
+from .commands import AllanCommand
+from .console import Output
+from .options import absolute, require_figure
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from simnav.leaderboard.allan import AllanReport
+
+__all__ = ["show"]
+
+
+def show(out: Output, request: AllanCommand) -> None:
+    """Show the Allan deviation of an IMU and its noise coefficients, beside its datasheet."""
+    require_figure("--plot", request.plot)
+    report = allan.of(request)
+    drawn = None if request.plot is None else save_as(report.plot(), absolute(request.plot))
+    written = None if request.csv is None else _write(report, absolute(request.csv))
+    files = {"plot": None if drawn is None else str(drawn), "csv": None if written is None else str(written)}
+    out.document({**report.to_dict(), **files})
+    out.print(_table(report))
+    out.print("in brackets: datasheet; lowest: of the Allan deviation, at its averaging time")
+    for name, file in files.items():
+        if file is not None:
+            out.print(f"{'figure' if name == 'plot' else 'table'}: {file}")
+
+
+def _table(report: AllanReport) -> Table:
+    """A row for each axis."""
+    rows = []
+    for row in report.rows():
+        cells = [row["axis"].replace("_", " ")]
+        for name in ("random_walk", "lowest"):
+            told = row[f"{name}_datasheet"]
+            beside = "" if told is None else f" ({tables.number(told)})"
+            at = f" at {tables.number(row['lowest_at_s'])} s" if name == "lowest" else ""
+            cells.append(f"{tables.number(row[name])}{beside} {row[f'{name}_unit']}{at}")
+        cells.append(f"{tables.number(row['bias_instability'])} {row['lowest_unit']}")
+        cells.append(f"{tables.number(row['rate_random_walk'])} {row['rate_random_walk_unit']}")
+        rows.append(cells)
+    title = (
+        f"{report.title}: Allan deviation, {report.origin}, {report.duration / 3600.0:.3g} h at {report.rate:.4g} Hz"
+    )
+    return tables.table(title, ["axis", "white noise", "lowest", "bias instability", "random walk"], rows)
+
+
+def _write(report: AllanReport, path: Path) -> Path:
+    """All averaging times as CSV."""
+    columns = report.columns()
+    with mistakes(OSError):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        values = np.column_stack(list(columns.values()))
+        np.savetxt(path, values, delimiter=",", header=",".join(columns), comments="", fmt="%.9g")
+    return path

@@ -1,0 +1,93 @@
+"""Gain against the value of a dial, one panel a dial, with intervals, the judged values, and the claim as a line."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from simnav.leaderboard.figures.style import GREY, INK, PALETTE, PAPER, SHADE, figure, styled
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from .answer import Answer, DialAnswer, Point
+
+__all__ = ["gain_figure"]
+
+_FLOOR = -1.0  # a gain below -100 % is drawn at the edge
+
+
+def gain_figure(answer: Answer) -> Figure:
+    """Draw an answer.
+
+    Parameters
+    ----------
+    answer : Answer
+        With at least one dial, or with our settings only.
+    """
+    dials = answer.dials
+    with styled():
+        fig = figure(1.0 + 3.6 * max(len(dials), 1), 3.5)
+        axes = fig.subplots(1, max(len(dials), 1), sharey=True, squeeze=False)[0]
+        for ax, dial in zip(axes, dials, strict=False):
+            _panel(ax, answer, dial)
+        for ax in axes:
+            ax.axhline(100.0 * answer.gain, color=INK, lw=1.0)
+            ax.axhspan(100.0 * (1.0 - answer.limit), ax.get_ylim()[1], color=SHADE, zorder=0.1, lw=0)
+            ax.axhline(0.0, color=GREY, lw=0.6)
+        axes[0].set_ylabel("gain [%]")
+        axes[0].annotate("claim", (0.01, 100.0 * answer.gain), xycoords=("axes fraction", "data"), xytext=(0, 2),
+                         textcoords="offset points", fontsize=7.5, color=INK)  # fmt: skip
+        fig.suptitle(f"{answer.sentence[0].upper()}{answer.sentence[1:]}", x=0.01, ha="left", fontsize=9.5,
+                     fontweight="bold", wrap=True)  # fmt: skip
+        _legend(fig)
+    return fig
+
+
+def _panel(ax: Axes, answer: Answer, dial: DialAnswer) -> None:
+    names = [p.value for p in dial.points]
+    places = list(range(len(names)))
+    colour = PALETTE[0][0]
+    for x, point in zip(places, dial.points, strict=True):
+        _bar(ax, x, point, colour, "o", 0.0)
+    if dial.judged is not None:
+        _bar(ax, names.index(dial.judged.value), dial.judged, PALETTE[1][0], "s", 0.14)
+    if dial.ours in names:
+        _bar(ax, names.index(dial.ours), answer.ours, PALETTE[1][0], "s", 0.14)
+    texts = [v if isinstance(v, str) else f"{v:g}" for v in names]
+    ax.set_xticks(places, [t.replace(", ", ",\n") for t in texts])
+    ax.set_xlim(-0.5, len(names) - 0.5)
+    title = f"{dial.title} [{dial.unit}]" if dial.unit else dial.title.rstrip(",")
+    words, lines = title.split(), [""]
+    for word in words:
+        if len(lines[-1]) + len(word) > 44:
+            lines.append("")
+        lines[-1] = f"{lines[-1]} {word}".strip()
+    ax.set_xlabel("\n".join(lines))
+
+
+def _bar(ax: Axes, x: float, point: Point, colour: str, marker: str, shift: float) -> None:
+    """A gain with its interval."""
+    gain = point.gain
+    if not math.isfinite(gain.value):
+        return
+    value = max(gain.value, _FLOOR)
+    if math.isfinite(gain.low):
+        ends = [100.0 * max(e, _FLOOR) for e in (gain.low, gain.high)]
+        ax.plot([x + shift] * 2, ends, color=colour, lw=2.4, zorder=3)
+    if gain.value < _FLOOR:
+        marker = "v"
+    ax.plot(x + shift, 100.0 * value, marker, color=colour, ms=5.5, mec=PAPER, mew=0.6, zorder=4)
+
+
+def _legend(fig: Figure) -> None:
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
+
+    keys: list[Line2D | Patch] = [
+        Line2D([], [], color=PALETTE[0][0], marker="o", ms=5.5, lw=2.4, label="seeds of the search"),
+        Line2D([], [], color=PALETTE[1][0], marker="s", ms=5.5, lw=2.4, label="seeds of the judgement"),
+        Patch(facecolor=SHADE, label="the claim holds"),
+    ]
+    fig.legend(handles=keys, loc="outside lower center", ncols=len(keys))

@@ -1,0 +1,225 @@
+"""How estimators do when a datasheet is wrong: the profiles that come with simnav, and how boards show them.
+
+The error of an estimator is compared with that of the plain row, which is told the same wrong datasheet, on the same
+seeds. The profiles of rows that come with simnav are in ``robustness.json`` beside the standard result, which
+``simnav robustness --output FILE`` writes. A board joins them to its rows when it is shown; the ranking does not
+use them. A profile names the version of its row, and is not shown beside results of another version.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, fields
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+from simnav.leaderboard.results.errors import RequestError, sentence
+from simnav.leaderboard.results.files import write_whole
+from simnav.leaderboard.results.provenance import Provenance, here
+
+from .plain_row import plain_rows
+
+__all__ = ["FILE", "Profile", "ProfilePoint", "Profiles", "profile_of", "profiles_of", "read", "save", "stored"]
+
+FILE = Path(__file__).parents[1] / "standard" / "robustness.json"
+FORMAT = 1
+
+_DIGITS = 4
+_WANTED = "'simnav robustness --output FILE' writes such a file"
+
+
+@dataclass(frozen=True)
+class ProfilePoint:
+    """One wrong datasheet.
+
+    Attributes
+    ----------
+    instrument : str
+        Name of the instrument whose datasheet is wrong.
+    factor : float
+        All figures of its datasheet are so many times the true ones.
+    ratio : float
+        Geometric mean over the seeds of the error over that of the plain row with the same datasheet. A failed run
+        counts as `simnav.leaderboard.ranking.statistics.FAILURE`.
+    failed : int
+        Number of failed runs.
+    """
+
+    instrument: str
+    factor: float
+    ratio: float
+    failed: int
+
+
+@dataclass(frozen=True)
+class Profile:
+    """The robustness profile of an estimator on one scenario.
+
+    Attributes
+    ----------
+    estimator, plain : str
+        Labels of the estimator and of the plain row.
+    version, plain_version : int
+        Declared versions of both.
+    scenario : str
+        Versioned id of the scenario.
+    runs : int
+        Number of seeds of each point.
+    points : tuple of ProfilePoint
+        For each instrument one for each factor; those of the factor 1 are the same run.
+    """
+
+    estimator: str
+    version: int
+    plain: str
+    plain_version: int
+    scenario: str
+    runs: int
+    points: tuple[ProfilePoint, ...]
+
+    @property
+    def worst(self) -> ProfilePoint:
+        """The point with the largest ratio under a wrong datasheet."""
+        return max((p for p in self.points if p.factor != 1.0), key=lambda p: p.ratio)
+
+
+@dataclass(frozen=True)
+class Profiles:
+    """Profiles of several estimators.
+
+    Attributes
+    ----------
+    measured : Provenance
+        Machine, versions and day.
+    rows : tuple of Profile
+        In the order of the file.
+    """
+
+    measured: Provenance
+    rows: tuple[Profile, ...]
+
+
+def save(rows: Iterable[Profile], path: Path, measured: Provenance | None = None) -> Path:
+    """Write profiles; an older file is replaced.
+
+    Parameters
+    ----------
+    rows : iterable of Profile
+        The profiles.
+    path : Path
+        The file.
+    measured : Provenance, optional
+        Machine, versions and day of the measurement; default: those of now.
+
+    Raises
+    ------
+    OSError
+        If writing fails.
+    """
+    lines = []
+    for row in rows:
+        head = {f.name: getattr(row, f.name) for f in fields(row) if f.name != "points"}
+        points = [
+            [p.instrument, float(f"{p.factor:.{_DIGITS}g}"), float(f"{p.ratio:.{_DIGITS}g}"), p.failed]
+            for p in row.points
+        ]
+        lines.append("  " + json.dumps(head | {"points": points}, allow_nan=False))
+    known = {k: v for k, v in (measured or here()).to_dict().items() if v not in ("", None) and k != "id"}
+    head_of_file = json.dumps({"format": FORMAT, "measured": known}, indent=1)
+    text = head_of_file[: head_of_file.rindex("}")].rstrip() + ',\n "rows": [\n' + ",\n".join(lines) + "\n ]\n}\n"
+    return write_whole(path, text)
+
+
+def read(path: Path) -> Profiles:
+    """Read a file of profiles.
+
+    Raises
+    ------
+    RequestError
+        If the file is missing or is no file of profiles: one sentence with the file, the field and the value.
+    """
+    try:
+        content = json.loads(path.read_bytes())
+        if not isinstance(content, Mapping) or content.get("format") != FORMAT:
+            found = content.get("format") if isinstance(content, Mapping) else content
+            raise ValueError(f"format is {found!r}, and this version reads {FORMAT}")
+        if not isinstance(content.get("rows"), list) or not isinstance(content.get("measured"), Mapping):
+            raise ValueError("'rows' should be a list, and 'measured' an object with machine, versions and day")
+        known = {f.name for f in fields(Provenance)}
+        measured = Provenance(**{k: v for k, v in content["measured"].items() if k in known})
+        rows = tuple(_profile(f"rows[{k}]", entry) for k, entry in enumerate(content["rows"]))
+        pairs = set[tuple[str, str]]()
+        for k, row in enumerate(rows):
+            if (row.estimator, row.plain) in pairs:
+                raise ValueError(f"rows[{k}]: there are two profiles of {row.estimator} beside {row.plain}")
+            pairs.add((row.estimator, row.plain))
+        return Profiles(measured, rows)
+    except (OSError, ValueError, TypeError) as error:
+        raise RequestError(f"{path} is no file of robustness profiles: {sentence(error)}; {_WANTED}") from error
+
+
+def _profile(where: str, entry: Any) -> Profile:
+    """A profile of the file; ValueError with the field that is wrong."""
+    if not isinstance(entry, Mapping):
+        raise ValueError(f"{where} is {entry!r}, and should be an object")
+    for name in ("estimator", "plain", "scenario"):
+        if not isinstance(entry.get(name), str) or not entry[name]:
+            raise ValueError(f"{where}.{name} is {entry.get(name)!r}, and should be a text")
+    for name in ("version", "plain_version", "runs"):
+        x = entry.get(name)
+        if isinstance(x, bool) or not isinstance(x, int) or x < 1:
+            raise ValueError(f"{where}.{name} is {x!r}, and should be a whole number from 1")
+    points = entry.get("points")
+    if not isinstance(points, list):
+        raise ValueError(f"{where}.points is {points!r:.40}, and should be a list")
+    made = tuple(_point(f"{where}.points[{k}]", p) for k, p in enumerate(points))
+    if not any(p.factor != 1.0 for p in made):
+        raise ValueError(f"{where}.points has no wrong datasheet, a factor other than 1")
+    names = ("estimator", "version", "plain", "plain_version", "scenario", "runs")
+    return Profile(**{name: entry[name] for name in names}, points=made)
+
+
+def _point(where: str, entry: Any) -> ProfilePoint:
+    """A point of the file; ValueError with what is wrong."""
+    if not isinstance(entry, list) or len(entry) != 4 or not isinstance(entry[0], str) or not entry[0]:
+        raise ValueError(f"{where} is {entry!r:.80}, and should be [instrument, factor, ratio, failed runs]")
+    for name, x in zip(("factor", "ratio"), entry[1:3], strict=True):
+        if isinstance(x, bool) or not isinstance(x, (int, float)) or not 0.0 < x < math.inf:
+            raise ValueError(f"{where}: the {name} is {x!r}, and should be a finite number above 0")
+    failed = entry[3]
+    if isinstance(failed, bool) or not isinstance(failed, int) or failed < 0:
+        raise ValueError(f"{where}: the number of failed runs is {failed!r}, and should be 0 or more")
+    return ProfilePoint(entry[0], float(entry[1]), float(entry[2]), failed)
+
+
+@lru_cache(maxsize=4)
+def stored(path: Path = FILE) -> tuple[Profile, ...]:
+    """The profiles that come with simnav; none if there is no such file. See `read`."""
+    return read(path).rows if path.is_file() else ()
+
+
+def profiles_of(estimator: str, version: int | None) -> list[Profile]:
+    """The stored profiles of a row, one for each plain row; none if they are of another version of the row."""
+    return [p for p in stored() if p.estimator == estimator and p.version == version]
+
+
+def profile_of(estimator: str, version: int | None, plain: str, score: str) -> Profile | None:
+    """What a board shows of a row: the stored profile, or None.
+
+    Parameters
+    ----------
+    estimator : str
+        Label of the row.
+    version : int or None
+        Declared version of the row whose results the board shows.
+    plain : str
+        The plain row of the board; of several, as ``ekf or ship-ekf``, the first that the row was compared with;
+        without one (empty), those of the score.
+    score : str
+        Key of `simnav.scoring.SCORES` that the board ranks.
+    """
+    mine = {p.plain: p for p in profiles_of(estimator, version)}
+    return next((mine[p] for p in (plain.split(" or ") if plain else plain_rows(score)) if p in mine), None)

@@ -1,0 +1,44 @@
+"""Whether the results of a row are of an older version of its estimator than the one that comes with simnav."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from simnav.estimator import EstimatorError
+from simnav.estimator.registry import registered
+from simnav.leaderboard.campaign.request import comes_with_simnav
+from simnav.leaderboard.results.result import Result
+
+__all__ = ["superseded_by", "version_of"]
+
+
+def version_of(name: str) -> int | None:
+    """The version of an estimator that comes with simnav; None for all others.
+
+    Examples
+    --------
+    >>> version_of("nobody") is None
+    True
+    """
+    try:
+        cls = registered(name)
+    except EstimatorError:
+        return None
+    return cls.version if comes_with_simnav(cls) else None
+
+
+def superseded_by(name: str, results: Iterable[Result]) -> str:
+    """In words, which version some results of an estimator are of, if simnav has a newer one; empty otherwise.
+
+    Parameters
+    ----------
+    name : str
+        Name of the estimator, without parameters.
+    results : iterable of Result
+        Its results.
+    """
+    today = version_of(name)
+    older = sorted({r.estimator_version for r in results if today is not None and r.estimator_version < today})
+    if not older:
+        return ""
+    return f"version {' and '.join(map(str, older))}; simnav has version {today}"

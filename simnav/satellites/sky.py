@@ -1,0 +1,197 @@
+"""The satellites as an antenna sees them: where each was when it sent what arrives now, and the delays on the way.
+
+An antenna at r(t) receives at t what a satellite sent at t - tau. In the Earth-fixed frame of the reception the
+satellite is at ``s = R_z(omega_E tau) s(t - tau)``, its **apparent position**, and ``c tau = |s - r|``. The **apparent
+velocity** is the derivative of the apparent position by the time of reception, so the rate of the range is the
+component of apparent velocity minus antenna velocity along the line of sight, without further terms.
+
+Source: P. D. Groves, *Principles of GNSS, Inertial, and Multisensor Integrated Navigation Systems*, 2nd ed., Artech
+House 2013, sections 8.5.2 and 8.5.3.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import datetime, timedelta
+from math import asin, atan2, cos, sin, sqrt
+
+import numpy as np
+
+from simnav.compiled import Array, Integers, kernel
+from simnav.geometry.earth import ROTATION_RATE
+from simnav.geometry.ecef import ecef_from_geodetic_scalar
+from simnav.satellites.atmosphere import (
+    HUMIDITY,
+    ionosphere_scalar,
+    mapping_coefficients,
+    mapping_scalar,
+    zenith_delay_scalar,
+)
+from simnav.satellites.ephemeris import Ephemerides, nearest
+from simnav.satellites.orbit import SPEED_OF_LIGHT, satellite_scalar
+from simnav.satellites.time_scales import gps_time
+
+__all__ = ["Sight", "Sky"]
+
+#: Columns of what a kernel writes about a satellite.
+_COLUMNS = 15
+_TYPICAL_DELAY = 0.08  # of a signal [s]
+
+
+@dataclass(frozen=True, eq=False)
+class Sight:
+    """What c satellites look like from an antenna at n times. NaN where a satellite has no valid ephemeris.
+
+    Attributes
+    ----------
+    position, velocity : (n, c, 3) array
+        Apparent position [m] and velocity [m/s], Earth-fixed frame of the time of reception.
+    range, range_rate : (n, c) array
+        Distance from the antenna [m] and its rate [m/s].
+    elevation, azimuth : (n, c) array
+        Direction from the antenna: above the horizon, and from north to east [rad].
+    clock, drift : (n, c) array
+        Error of the satellite's clock when the signal was sent [s], and its drift [s/s].
+    ionosphere, troposphere : (n, c) array
+        Delays by Klobuchar's and Saastamoinen's model [m]; NaN below the horizon.
+    mapping : (n, c) array
+        Wet mapping function [-]; likewise.
+    """
+
+    position: Array
+    velocity: Array
+    range: Array
+    range_rate: Array
+    elevation: Array
+    azimuth: Array
+    clock: Array
+    drift: Array
+    ionosphere: Array
+    troposphere: Array
+    mapping: Array
+
+
+class Sky:
+    """Some satellites during a run.
+
+    Parameters
+    ----------
+    ephemerides : Ephemerides
+        Broadcast ephemerides.
+    satellites : sequence of str
+        Names of c satellites.
+    epoch : datetime
+        GPS time at which the run begins.
+
+    Attributes
+    ----------
+    satellites : tuple of str
+        Their names.
+    """
+
+    def __init__(self, ephemerides: Ephemerides, satellites: Sequence[str], epoch: datetime):
+        self.satellites = tuple(satellites)
+        self._table = ephemerides.table(self.satellites)
+        self._begin = gps_time(epoch).since(ephemerides.week)
+        midnight = epoch.replace(hour=0, minute=0, second=0, microsecond=0)
+        year = epoch.replace(month=1, day=1, hour=0, minute=0, second=0, microsecond=0)
+        self._second_of_day = (epoch - midnight) / timedelta(seconds=1)
+        self._day_of_year = 1.0 + (epoch - year) / timedelta(days=1)
+        coefficients = ephemerides.klobuchar
+        self._klobuchar = np.zeros(8) if coefficients is None else np.ascontiguousarray(coefficients)
+        self._has_ionosphere = coefficients is not None
+
+    def sight(self, time: Array, position: Array, velocity: Array) -> Sight:
+        """What the satellites look like.
+
+        Parameters
+        ----------
+        time : (n,) array
+            Times since the begin of the run [s].
+        position, velocity : (n, 3) array
+            Of the antenna: latitude, longitude [rad], height [m]; north-east-down [m/s].
+        """
+        time, position, velocity = (np.ascontiguousarray(a, dtype=np.float64) for a in (time, position, velocity))
+        out = np.empty((len(time), len(self.satellites), _COLUMNS))
+        begin = np.array([self._begin, self._second_of_day, self._day_of_year])
+        _look((*self._table, self._klobuchar, begin), time, position, velocity, out)
+        if not self._has_ionosphere:
+            out[..., 12] = np.where(np.isnan(out[..., 12]), np.nan, 0.0)
+        return Sight(out[..., 0:3], out[..., 3:6], *(out[..., k] for k in range(6, _COLUMNS)))
+
+
+@kernel()
+def _apparent(q: Array, time: float, antenna: tuple[float, float, float], out: Array) -> float:
+    """Write apparent position, velocity without the change of the delay, and clock into a row; return tau [s].
+
+    The delay is found along a straight orbit first. Its error is then under a picosecond, so one more evaluation of the
+    orbit is exact to rounding.
+    """
+    tau = _TYPICAL_DELAY
+    x, y, z, vx, vy, vz, _, _ = satellite_scalar(q, time - tau)
+    for _ in range(4):
+        earlier = _TYPICAL_DELAY - tau
+        s, c = sin(ROTATION_RATE * tau), cos(ROTATION_RATE * tau)
+        ax, ay, az = x + vx * earlier, y + vy * earlier, z + vz * earlier
+        dx, dy, dz = c * ax + s * ay - antenna[0], c * ay - s * ax - antenna[1], az - antenna[2]
+        tau = sqrt(dx * dx + dy * dy + dz * dz) / SPEED_OF_LIGHT
+    x, y, z, vx, vy, vz, clock, drift = satellite_scalar(q, time - tau)
+    s, c = sin(ROTATION_RATE * tau), cos(ROTATION_RATE * tau)
+    out[0], out[1], out[2] = c * x + s * y, c * y - s * x, z
+    out[3], out[4], out[5] = c * vx + s * vy, c * vy - s * vx, vz
+    out[10], out[11] = clock, drift
+    dx, dy, dz = out[0] - antenna[0], out[1] - antenna[1], out[2] - antenna[2]
+    return sqrt(dx * dx + dy * dy + dz * dz) / SPEED_OF_LIGHT
+
+
+@kernel("void(Tuple((f8[:, ::1], i8[::1], f8[::1], f8[::1], f8[::1])), f8[::1], f8[:, ::1], f8[:, ::1], f8[:, :, ::1])")
+def _look(
+    sky: tuple[Array, Integers, Array, Array, Array], time: Array, position: Array, velocity: Array, out: Array
+) -> None:
+    """Overwrite ``out`` with the columns of `Sight`, in its order, for n times and c satellites.
+
+    ``sky`` holds the table of `Ephemerides.table`, Klobuchar's coefficients, and of the begin of the run: seconds since
+    the begin of the table's week, second of the day, day of the year.
+    """
+    numbers, first, reach, klobuchar, begin = sky
+    for i in range(out.shape[0]):
+        latitude, longitude, height = position[i, 0], position[i, 1], position[i, 2]
+        antenna = ecef_from_geodetic_scalar(latitude, longitude, height)
+        sa, ca, so, co = sin(latitude), cos(latitude), sin(longitude), cos(longitude)
+        n, e, d = velocity[i, 0], velocity[i, 1], velocity[i, 2]
+        vx, vy, vz = -sa * co * n - so * e - ca * co * d, -sa * so * n + co * e - ca * so * d, ca * n - sa * d
+        dry, wet = zenith_delay_scalar(latitude, height, HUMIDITY)
+        second = begin[1] + time[i]
+        mapping = mapping_coefficients(begin[2] + time[i] / 86400.0, latitude)
+        for j in range(out.shape[1]):
+            row = out[i, j]
+            k = nearest(numbers, first[j], first[j + 1], reach[j], begin[0] + time[i])
+            if k < 0:
+                row[:] = float("nan")
+                continue
+            tau = _apparent(numbers[k], begin[0] + time[i], antenna, row)
+            distance = tau * SPEED_OF_LIGHT
+            ux, uy, uz = (row[0] - antenna[0]) / distance, (row[1] - antenna[1]) / distance, 0.0
+            uz = (row[2] - antenna[2]) / distance
+            # d/dt of R(omega tau) s(t - tau), with the rate of tau from its projection on the line of sight
+            wx, wy = ROTATION_RATE * row[1], -ROTATION_RATE * row[0]
+            along = ux * (row[3] - vx) + uy * (row[4] - vy) + uz * (row[5] - vz)
+            change = ux * (row[3] - wx) + uy * (row[4] - wy) + uz * row[5]
+            rate = along / (SPEED_OF_LIGHT + change)
+            row[3] += rate * (wx - row[3])
+            row[4] += rate * (wy - row[4])
+            row[5] -= rate * row[5]
+            row[6], row[7] = distance, rate * SPEED_OF_LIGHT
+            north = -sa * co * ux - sa * so * uy + ca * uz
+            east = -so * ux + co * uy
+            up = ca * co * ux + ca * so * uy + sa * uz
+            elevation = asin(min(max(up, -1.0), 1.0))
+            azimuth = atan2(east, north)
+            row[8], row[9] = elevation, azimuth
+            if elevation > 0.0:
+                row[12] = ionosphere_scalar(klobuchar, second, latitude, longitude, azimuth, elevation)
+                dry_mapping, wet_mapping = mapping_scalar(mapping, height, elevation)
+                row[13], row[14] = dry * dry_mapping + wet * wet_mapping, wet_mapping
+            else:
+                row[12], row[13], row[14] = float("nan"), float("nan"), float("nan")

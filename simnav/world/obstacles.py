@@ -1,0 +1,257 @@
+"""Obstacles around a vessel that block and reflect signals: quays, cranes, bridges, cliffs, a ship alongside.
+
+An obstacle is a prism: a polygon on the map, from a height ``bottom`` to a height ``top`` above the ellipsoid. A ray
+from an antenna in the direction of a satellite is **blocked** if it meets a face. A wall **reflects** a signal as a
+mirror: with the distance d of the antenna from the wall's plane, the wall's outward normal m and the direction u of the
+satellite, the ray leaves the image of the antenna behind the wall, and the reflected signal travels further by::
+
+    excess = 2 d (u . m)
+
+if the point of reflection lies on the wall, and neither leg of the way is blocked. Of several reflections that with the
+shortest way counts.
+
+Source: P. D. Groves, *Principles of GNSS, Inertial, and Multisensor Integrated Navigation Systems*, 2nd ed., Artech
+House 2013, sections 9.3.4 and 10.4.1; the excess is that of a plane wave on a plane mirror.
+"""
+
+from __future__ import annotations
+
+from math import cos, inf, sin
+from typing import Annotated, Literal, NamedTuple, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, model_validator
+
+from simnav.compiled import Array, Flags, Integers, kernel
+from simnav.geometry.earth import relative_position
+from simnav.spec import Spec, SpecError, quantity
+from simnav.world.surroundings import SurroundingSpec, register_surrounding
+
+__all__ = ["Obstacle", "ObstacleMap", "Obstacles", "Paths"]
+
+_Corner = tuple[float, float]
+#: A polygon of a smaller area is a line or a point [m^2].
+_LEAST_AREA = 1e-3
+#: Points of a ray nearer than this do not count: those of the wall that reflects it [m].
+_NEAREST = 1e-6
+
+
+class Obstacle(Spec):
+    """A prism.
+
+    Attributes
+    ----------
+    name : str
+        Name, for messages.
+    corners : tuple of (float, float)
+        Corners of the polygon, north and east of the origin of the map [m]; three or more, in order.
+    bottom, top : float
+        Heights above the ellipsoid [m].
+    """
+
+    name: str = ""
+    corners: Annotated[tuple[_Corner, ...], Field(min_length=3, max_length=1000)] = quantity("m")
+    bottom: float = quantity("m", 0.0)
+    top: float = quantity("m")
+
+    @model_validator(mode="after")
+    def _proper(self) -> Self:
+        if not self.bottom < self.top:
+            raise ValueError(f"obstacle {self.name!r}: top_m = {self.top:g} should be above bottom_m = {self.bottom:g}")
+        if abs(_area(np.array(self.corners))) < _LEAST_AREA:
+            raise ValueError(f"obstacle {self.name!r}: its corners_m lie on a line; they should enclose an area")
+        return self
+
+
+@register_surrounding
+class Obstacles(SurroundingSpec):
+    """Obstacles of a place.
+
+    Attributes
+    ----------
+    latitude, longitude : float
+        Origin of the map [rad].
+    obstacle : tuple of Obstacle
+        The obstacles.
+    """
+
+    kind: Literal["obstacles"] = "obstacles"
+    latitude: float = quantity("deg")
+    longitude: float = quantity("deg")
+    obstacle: Annotated[tuple[Obstacle, ...], Field(max_length=1000)] = ()
+
+    def build(self, name: str, seed: int) -> ObstacleMap:
+        """See `SurroundingSpec.build`."""
+        return ObstacleMap(self)
+
+
+class Paths(NamedTuple):
+    """The ways of the signals of c satellites to an antenna at n times.
+
+    Attributes
+    ----------
+    blocked : (n, c) array of bool
+        Whether the direct way is blocked.
+    excess : (n, c) array
+        How much longer the reflected way is [m]; infinite without a reflection.
+    excess_rate : (n, c) array
+        Its derivative by the motion of the antenna [m/s]; zero without a reflection.
+    """
+
+    blocked: NDArray[np.bool_]
+    excess: Array
+    excess_rate: Array
+
+
+class ObstacleMap:
+    """The obstacles of a run.
+
+    Parameters
+    ----------
+    spec : Obstacles
+        Their specification.
+    """
+
+    def __init__(self, spec: Obstacles):
+        self._origin = np.array([spec.latitude, spec.longitude, 0.0])
+        self._names = [o.name or f"number {k}" for k, o in enumerate(spec.obstacle, 1)]
+        polygons = [np.array(o.corners) for o in spec.obstacle]
+        polygons = [p if _area(p) > 0.0 else p[::-1] for p in polygons]
+        walls = [np.hstack([p, np.roll(p, -1, axis=0)]) for p in polygons]
+        self._walls = np.ascontiguousarray(np.concatenate(walls) if walls else np.empty((0, 4)))
+        self._first = np.cumsum([0, *(len(w) for w in walls)]).astype(np.int64)
+        self._heights = np.array([(o.bottom, o.top) for o in spec.obstacle]).reshape(-1, 2)
+
+    def paths(self, position: Array, velocity: Array, elevation: Array, azimuth: Array) -> Paths:
+        """The ways of signals from c directions to an antenna at n times.
+
+        Parameters
+        ----------
+        position, velocity : (n, 3) array
+            Of the antenna: latitude, longitude [rad], height [m]; north-east-down [m/s].
+        elevation, azimuth : (n, c) array
+            Directions [rad].
+
+        Raises
+        ------
+        SpecError
+            If the antenna is within an obstacle: the message names it.
+        """
+        place = relative_position(position, self._origin)
+        place[:, 2] = position[:, 2]
+        shape = elevation.shape
+        blocked, excess, rate = np.empty(shape, np.bool_), np.empty(shape), np.empty(shape)
+        moving, up, around = (np.ascontiguousarray(a, dtype=np.float64) for a in (velocity, elevation, azimuth))
+        scene = self._walls, self._first, self._heights
+        found = _trace(scene, place, moving, up, around, blocked, excess, rate)
+        if found >= 0:
+            inside, row = found % len(self._names), found // len(self._names)
+            north, east, height = place[row]
+            raise SpecError(
+                f"the antenna is within the obstacle {self._names[inside]!r}, {north:.1f} m north and {east:.1f} m "
+                f"east of the origin at a height of {height:.1f} m; move the obstacle or the vessel"
+            )
+        return Paths(blocked, excess, rate)
+
+
+def _area(corners: Array) -> float:
+    """Area of a polygon, positive if its corners run from north to east."""
+    north, east = corners.T
+    return float(0.5 * np.sum(north * np.roll(east, -1) - np.roll(north, -1) * east))
+
+
+@kernel()
+def _within(walls: Array, first: int, last: int, north: float, east: float) -> bool:
+    """Whether a point is inside a polygon (the number of walls to the north of it is odd)."""
+    inside = False
+    for k in range(first, last):
+        e0, e1 = walls[k, 1], walls[k, 3]
+        if (e0 > east) != (e1 > east):
+            crossing = walls[k, 0] + (east - e0) / (e1 - e0) * (walls[k, 2] - walls[k, 0])
+            if crossing > north:
+                inside = not inside
+    return inside
+
+
+@kernel()
+def _meets(
+    scene: tuple[Array, Integers, Array], skip: int, point: tuple[float, float, float],
+    ray: tuple[float, float, float], reach: float,
+) -> bool:  # fmt: skip
+    """Whether a ray meets a face within a distance; ``skip`` is a wall that does not count."""
+    walls, first, heights = scene
+    n, e, h = point
+    un, ue, up = ray
+    for b in range(heights.shape[0]):
+        bottom, top = heights[b, 0], heights[b, 1]
+        for k in range(first[b], first[b + 1]):
+            if k == skip:
+                continue
+            dn, de = walls[k, 2] - walls[k, 0], walls[k, 3] - walls[k, 1]
+            across = un * de - ue * dn
+            if across == 0.0:
+                continue
+            an, ae = walls[k, 0] - n, walls[k, 1] - e
+            t = (an * de - ae * dn) / across
+            s = (an * ue - ae * un) / across
+            if t > _NEAREST and t < reach and s >= 0.0 and s <= 1.0 and bottom <= h + t * up <= top:
+                return True
+        if up != 0.0:
+            for level in range(2):
+                t = (heights[b, level] - h) / up
+                if t > _NEAREST and t < reach and _within(walls, first[b], first[b + 1], n + t * un, e + t * ue):
+                    return True
+    return False
+
+
+@kernel(
+    "i8(Tuple((f8[:, ::1], i8[::1], f8[:, ::1])), f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], b1[:, ::1], "
+    "f8[:, ::1], f8[:, ::1])"
+)
+def _trace(
+    scene: tuple[Array, Integers, Array], place: Array, velocity: Array, elevation: Array, azimuth: Array,
+    blocked: Flags, excess: Array, rate: Array,
+) -> int:  # fmt: skip
+    """Overwrite the last three arrays with the fields of `Paths`.
+
+    ``scene`` holds walls (w, 4): both ends, north and east; the first wall of each obstacle; bottom and top of each.
+    ``place`` is (n, 3): north, east, height. Returns -1, or ``row * obstacles + obstacle`` if an antenna is within one.
+    """
+    walls, first, heights = scene
+    for i in range(place.shape[0]):
+        n, e, h = place[i, 0], place[i, 1], place[i, 2]
+        for b in range(heights.shape[0]):
+            if heights[b, 0] <= h <= heights[b, 1] and _within(walls, first[b], first[b + 1], n, e):
+                found: int = i * heights.shape[0] + b
+                return found
+        for j in range(elevation.shape[1]):
+            level = cos(elevation[i, j])
+            un, ue, up = level * cos(azimuth[i, j]), level * sin(azimuth[i, j]), sin(elevation[i, j])
+            excess[i, j], rate[i, j] = inf, 0.0
+            blocked[i, j] = _meets(scene, -1, (n, e, h), (un, ue, up), inf)
+            for b in range(heights.shape[0]):
+                for k in range(first[b], first[b + 1]):
+                    dn, de = walls[k, 2] - walls[k, 0], walls[k, 3] - walls[k, 1]
+                    length = (dn * dn + de * de) ** 0.5
+                    if length == 0.0:
+                        continue
+                    mn, me = de / length, -dn / length
+                    away = (n - walls[k, 0]) * mn + (e - walls[k, 1]) * me
+                    along = un * mn + ue * me
+                    if away <= 0.0 or along <= 0.0:
+                        continue
+                    further = 2.0 * away * along
+                    if further >= excess[i, j]:
+                        continue
+                    t = away / along
+                    qn, qe, qh = n - 2.0 * away * mn + t * un, e - 2.0 * away * me + t * ue, h + t * up
+                    s = ((qn - walls[k, 0]) * dn + (qe - walls[k, 1]) * de) / (length * length)
+                    if s < 0.0 or s > 1.0 or qh < heights[b, 0] or qh > heights[b, 1]:
+                        continue
+                    back = (un - 2.0 * along * mn, ue - 2.0 * along * me, up)  # from the antenna to the wall
+                    if _meets(scene, k, (n, e, h), back, t) or _meets(scene, k, (qn, qe, qh), (un, ue, up), inf):
+                        continue
+                    excess[i, j] = further
+                    rate[i, j] = 2.0 * along * (velocity[i, 0] * mn + velocity[i, 1] * me)
+    return -1

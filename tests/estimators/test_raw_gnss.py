@@ -1,0 +1,121 @@
+"""Estimators with raw observations of satellites: tightly coupled by the blocks of states, consistent, and alike."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.stats import chi2
+
+from simnav.estimator import make
+from simnav.geometry.earth import relative_position
+from simnav.recording import Recording
+from simnav.scenario import Scenario
+from simnav.source import record
+from simnav.trial import Trial, run_trial
+from simnav.types import Instruments
+from tests.cases.raw_gnss import raw_gnss
+
+
+def run(name: str, scenario: Scenario, seed: int) -> tuple[Trial, Recording]:
+    recording = record(scenario, seed)
+    trial = run_trial(make(name), recording)
+    assert trial.status == "ok", trial.reason
+    return trial, recording
+
+
+def error(trial: Trial, recording: Recording) -> np.ndarray:
+    """(T, 6) errors of position [m] and velocity [m/s]."""
+    truth = recording.data.truth
+    away = relative_position(trial.position, truth.position)
+    return np.concatenate([away, trial.velocity - truth.velocity], axis=1)
+
+
+def test_the_filter_is_consistent_on_clean_runs():
+    """NEES of position and velocity at the end of independent runs, within the 99.9 % interval of chi-square."""
+    total, runs = 0.0, 8
+    for seed in range(runs):
+        trial, recording = run("ekf", raw_gnss(40.0), seed)
+        last = error(trial, recording)[-1]
+        total += last @ np.linalg.solve(trial.covariance[-1][:6, :6], last)
+    low, high = chi2.ppf([0.0005, 0.9995], 6 * runs)
+    assert low < total < high
+
+
+def test_filter_window_and_oracle_agree():
+    scenario = raw_gnss(30.0)
+    trials = {name: run(name, scenario, 3) for name in ("ekf", "sw-fgo", "oracle")}
+    errors = {name: error(*found) for name, found in trials.items()}
+    sigma = np.sqrt(np.diagonal(trials["oracle"][0].covariance, axis1=1, axis2=2)[:, :6])
+    for name in ("sw-fgo", "oracle"):
+        assert (abs(errors[name] - errors["ekf"])[5:] < sigma[5:]).all()
+    clock, truth = trials["ekf"][0].diagnostics, record(scenario, 3)
+    spec = scenario.aids["gnss"].build("gnss", 3)
+    true = spec.block("clock", truth.data.truth.time)
+    off = (clock["state.gnss.clock"] - true)[5:] / clock["sigma.gnss.clock"][5:]
+    assert abs(off).max() < 5.0
+
+
+STEP = """
+[[fault]]
+kind = "bias_step"
+instruments = "gnss"
+channels = ["E30"]
+start_s = 20.0
+end_s = 28.0
+offset_m = 40.0
+offset_m_s = 0.0
+"""
+
+
+def test_a_satellite_with_an_error_is_flagged_alone():
+    trial, recording = run("gated-ekf", raw_gnss(40.0, STEP), 2)
+    faulty = [(source, time) for source, time in trial.flagged if source == "gnss:E30"]
+    assert faulty == [("gnss:E30", float(time)) for time in range(20, 28)]
+    assert len(trial.flagged) - len(faulty) < 0.02 * 7 * 40
+    assert np.linalg.norm(error(trial, recording)[-1, :2]) < 3.0
+
+
+RECEIVER = """
+[instruments.fix]
+kind = "gnss_receiver"
+observations = "gnss"
+sigma_m = [0.5, 0.5, 1.0]
+bias_instability_m = [1.0, 1.0, 3.0]
+correlation_time_s = 600.0
+lever_arm_m = [-3.0, 0.0, -12.0]
+[instruments.doppler]
+kind = "gnss_receiver_velocity"
+observations = "gnss"
+sigma_m_s = [0.04, 0.04, 0.08]
+lever_arm_m = [-3.0, 0.0, -12.0]
+[[fault]]
+kind = "outage"
+instruments = "gnss"
+channels = {0}
+start_s = 120.0
+end_s = 181.0
+"""
+
+
+def of_instruments(recording: Recording, *names: str) -> Recording:
+    """The recording with some of its instruments only."""
+    given = recording.instruments
+    sheets = [sheet for sheet in given.values() if sheet.name in names]
+    data = replace(recording.data, aids={name: recording.data.aids[name] for name in names})
+    return replace(recording, instruments=Instruments(sheets, given.imu, given.step), data=data)
+
+
+@pytest.mark.parametrize(("left", "share"), [(("G11", "G12", "E27"), 0.5), (("G12", "E27"), 1.0)])
+def test_tight_coupling_uses_what_is_left(left, share):
+    """With three satellites for a minute the error is at most half of that with the receiver, which is silent then."""
+    gone = [s for s in raw_gnss().aids["gnss"].channels() if s not in left]
+    errors = {"raw": [], "receiver": []}
+    for seed in range(3):
+        recording = record(raw_gnss(180.0, RECEIVER.format(gone)), seed)
+        for form, names in (("raw", ("gnss",)), ("receiver", ("fix", "doppler"))):
+            part = of_instruments(recording, *names)
+            errors[form].append(np.linalg.norm(error(run_trial(make("ekf"), part), part)[-1, :2]))
+    raw, receiver = (np.sqrt(np.mean(np.square(errors[form]))) for form in ("raw", "receiver"))
+    assert raw <= share * receiver

@@ -1,0 +1,232 @@
+"""Claims: the verdict on chosen ratios, the dials of all declared claims, the search with made results, the command."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections import Counter
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import simnav
+from simnav.leaderboard.cli import app
+from simnav.leaderboard.papers import PAPERS
+from simnav.leaderboard.papers.claims import search as searching
+from simnav.leaderboard.papers.claims import stored
+from simnav.leaderboard.papers.claims.answer import Answer, DialAnswer, Point
+from simnav.leaderboard.papers.claims.claim import Claim, compared
+from simnav.leaderboard.papers.claims.declared import CLAIMS, claim_of
+from simnav.leaderboard.papers.claims.dials import choice_dial, lag_dial, lags_given, parameter_dial, scenario_dial
+from simnav.leaderboard.papers.claims.section import claim_count, claim_figures, claim_sheets
+from simnav.leaderboard.papers.measures import measure
+from simnav.leaderboard.results.result import Result
+from simnav.scenario import load
+
+RUNNER = CliRunner()
+HALF = [math.exp(e) for e in (-0.02, -0.01, 0.0, 0.01, 0.02)]  # scatter of five seeds
+
+
+def point(value, ratio: float, failed: int = 0) -> Point:
+    return Point(value, list(range(5)), [ratio * x for x in HALF], failed)
+
+
+def answer(ours: float, found: float, value: float = 10.0) -> Answer:
+    points = [point(0.0, ours), point(5.0, 0.5 * (ours + found)), point(value, found)]
+    dial = DialAnswer("lag", "the delay of the output", "s", 0.0, "not printed", points, point(value, found))
+    return Answer("c", "guo-2026", "a is 20 % better than b", 0.2, False, "s-v1", "a", "b", "horizontal_rmse",
+                  "horizontal_rmse", point("", ours), [dial])  # fmt: skip
+
+
+def test_a_claim_holds_where_the_whole_interval_reaches_it():
+    limit = 0.8 ** (1.0 / 1.5)  # a ratio of 0.862: the tolerance of all gains
+    assert answer(1.0, 1.0).limit == pytest.approx(limit)
+    assert point(0.0, 0.83).standing(limit) == "holds"
+    assert point(0.0, 0.5).standing(limit) == "holds"  # a larger gain holds, too
+    assert point(0.0, limit).standing(limit) == "undecided"
+    assert point(0.0, 0.9).standing(limit) == "does not hold"
+    assert point(0.0, 0.5, failed=1).standing(limit) == "does not hold"
+    assert Point(0.0, [1, 2], [0.5, 0.5]).standing(limit) == "undecided"  # two seeds decide nothing
+
+
+@pytest.mark.parametrize(
+    ("ours", "found", "verdict", "words"),
+    [
+        (0.8, 1.0, "holds", "holds with our settings"),
+        (1.0, 0.8, "holds if", "holds if the delay of the output is 10 s or more (20.0 % [18.4, 21.6], 5 runs)"),
+        (1.0, 0.95, "does not hold", "does not hold; tried: the delay of the output"),
+        (1.0, 0.862, "undecided", "undecided: an interval lies across the limit, and more seeds may decide it"),
+    ],
+)
+def test_verdicts(ours, found, verdict, words):
+    made = answer(ours, found)
+    assert (made.verdict, made.sentence_of_verdict) == (verdict, words)
+
+
+def test_the_range_of_a_condition_is_in_words():
+    values = (1.0, 2.0, 3.0, 5.0)
+
+    def words(ratios, judged) -> str:
+        points = [point(v, r) for v, r in zip(values, ratios, strict=True)]
+        return DialAnswer("x", "the factor", "", None, "", points, points[judged]).condition(0.86)
+
+    assert words((1.0, 1.0, 0.8, 0.7), 2) == "the factor is 3 or more"
+    assert words((0.7, 0.8, 1.0, 1.0), 1) == "the factor is 2 or less"
+    assert words((1.0, 0.8, 0.8, 1.0), 1) == "the factor is from 2 to 3"
+    assert words((1.0, 0.8, 1.0, 0.8), 1) == "the factor is 2"
+    assert words((0.8, 0.8, 0.8, 0.8), 0) == "the factor is from 1 to 5, all that was tried"
+
+
+@pytest.mark.parametrize("claim", CLAIMS, ids=lambda c: c.name)
+def test_every_value_of_every_dial_is_a_comparison_that_can_be_run(claim):
+    base = claim.base()
+    assert claim.paper in PAPERS
+    for dial in claim.dials:
+        assert dial.ours is None or dial.ours in dial.values
+        for value in dial.values:
+            setting = dial.set(base, value)
+            measure(setting.score)
+            measure(setting.than_score)
+            setting.row.make()
+            setting.than.make()
+
+
+def test_names_are_unique():
+    assert max(Counter(c.name for c in CLAIMS).values()) == 1
+    assert claim_of("guo-sw-fgo").gain == 0.1373
+
+
+def test_one_run_gives_all_lags():
+    base = compared(lambda: load("ship-turn"), "ship-fgo", "ship-ekf", "horizontal_rmse")()
+    dial = lag_dial((0.0, 5.0, 10.0))
+    made = lags_given([base, *(dial.set(base, v) for v in dial.values)])
+    assert [s.row.parameters.get("lags") for s in made] == [None, None, "5/10", "5/10"]
+    assert [s.score for s in made] == ["horizontal_rmse"] * 2 + ["horizontal_rmse_lag_5", "horizontal_rmse_lag_10"]
+    assert {s.than.label for s in made} == {"ship-ekf"}
+
+
+def test_dials_set_what_they_say():
+    base = compared(lambda: load("ship-turn"), "ship-fgo", "ship-ekf", "horizontal_rmse")()
+    assert parameter_dial("window", "w", "row", "window", (5, 10)).set(base, 5.0).row.label == "ship-fgo(window=5)"
+    wrong = scenario_dial("told", "t", "", (2.0,), lambda x: {"instruments.gnss.times_datasheet": {"sigma": x}},
+                          whose="than").set(base, 2.0)  # fmt: skip
+    assert wrong.scenario is base.scenario
+    assert wrong.than_scenario.instruments["gnss"].times_datasheet == {"sigma": 2.0}
+    both = choice_dial("c", "c", {"late": lambda s: s.with_parameters("both", lags="5")}).set(base, "late")
+    assert both.than.label == "ship-ekf(lags=5)"
+
+
+@pytest.fixture
+def made_results(monkeypatch):
+    """Results of a row whose error falls with its window, in place of runs; gives the seeds that were run."""
+    ran: dict[str, set[int]] = {}
+    kept: dict[tuple[str, str, int], Result] = {}
+
+    def run(scenarios, requests, seeds, folder, **_):
+        for scenario in scenarios:
+            for r in requests:
+                for seed in seeds:
+                    ran.setdefault(r.label, set()).add(seed)
+                    window = float(r.parameters.get("window", 1.0))
+                    value = math.exp(0.01 * np.random.default_rng(seed).standard_normal())
+                    if r.name == "ship-fgo":
+                        value *= 1.0 - 0.05 * window
+                    kept[scenario.id, r.label, seed] = Result(
+                        scenario.id, seed, r.label, {}, False, "ok", "", {"horizontal_rmse": value}
+                    )
+
+    monkeypatch.setattr(searching, "run_campaign", run)
+    monkeypatch.setattr(searching, "load", lambda *_, **__: list(kept.values()))
+    return ran
+
+
+def test_the_search_finds_the_nearest_value_and_judges_it_on_other_seeds(made_results, tmp_path):
+    dial = parameter_dial("window", "the window", "row", "window", (1, 2, 4, 6, 8), ours=1.0)
+    base = compared(lambda: load("ship-turn"), "ship-fgo", "ship-ekf", "horizontal_rmse")
+    claim = Claim("c", "", "a is 25 % better than b", 0.25, base, (dial,))
+    found = searching.search(claim, claim.dials, tmp_path, runs=3, judged=4)
+    assert found.verdict == "holds if"  # 1 - 0.05 * 4 = 0.8 is below the limit of 0.825; 0.9 is not
+    (along,) = found.dials
+    assert along.judged is not None
+    assert along.judged.value == 4.0
+    assert along.condition(claim.limit) == "the window is 4 or more"
+    assert set(along.points[0].seeds).isdisjoint(along.judged.seeds)
+    assert set(found.ours.seeds) == set(along.judged.seeds) == set(range(2000, 2004))
+    assert made_results["ship-fgo(window=2)"] == set(range(1000, 1003))  # it was not judged
+
+
+def test_an_answer_is_read_as_it_was_saved(tmp_path):
+    made = answer(1.0, 0.8)
+    stored.save(made, tmp_path)
+    again = stored.read("c", tmp_path)
+    assert again is not None
+    assert again.sentence_of_verdict == made.sentence_of_verdict
+    assert again.ours.gain.high == pytest.approx(made.ours.gain.high, abs=1e-5)
+    kept = (tmp_path / "c.json").read_bytes()
+    again_kept = stored.save(again, tmp_path).read_bytes()
+    assert json.loads(again_kept)["ours"]["ratios"] == json.loads(kept)["ours"]["ratios"]
+    (tmp_path / "c.json").write_text("{")
+    with pytest.raises(ValueError, match="is damaged"):
+        stored.read("c", tmp_path)
+    assert stored.read("nothing", tmp_path) is None
+
+
+@pytest.mark.parametrize("claim", CLAIMS, ids=lambda c: c.name)
+def test_the_stored_answers_are_those_of_the_declared_claims(claim):
+    found = stored.read(claim.name)
+    assert found is not None
+    assert (found.gain, found.sentence, found.paper) == (claim.gain, claim.sentence, claim.paper)
+    assert [(d.name, [p.value for p in d.points]) for d in found.dials] == [
+        (d.name, list(d.values)) for d in claim.dials
+    ]
+    assert found.ours.gain.runs >= 3
+
+
+def test_pages_count_claims_and_draw_them(tmp_path):
+    answers = [answer(0.8, 1.0), answer(1.0, 0.8), answer(1.0, 0.95)]
+    assert claim_count(answers) == "1 holds, 1 holds under a named condition, 1 does not hold"
+    first, values = claim_sheets(answers)
+    assert [r.cells[3] for r in first.rows] == ["holds", "holds if", "does not hold"]
+    assert len(values.rows) == 9
+    assert claim_sheets([]) == []
+    (figure, *_) = claim_figures(answers[:1], tmp_path)
+    assert figure.path.stat().st_size > 5000
+
+
+def test_the_command_shows_and_lists(tmp_path):
+    listed = json.loads(RUNNER.invoke(app, ["claim", "--json"]).stdout)
+    assert [c["claim"] for c in listed["claims"]] == [c.name for c in CLAIMS]
+    shown = RUNNER.invoke(app, ["claim", "guo-sw-fgo", "--plot", str(tmp_path / "c.png")])
+    assert "verdict:" in shown.stdout
+    assert (tmp_path / "c.png").exists()
+
+
+@pytest.mark.parametrize(
+    ("how", "message"),
+    [
+        ({"claim": "guo-sw-fog"}, "did you mean"),
+        (
+            {"claim": "guo-sw-fgo", "holds_if": ["lagg"]},
+            "has no condition 'lagg'; it has lag, lag-horizontal, outliers",
+        ),
+        ({"claim": "guo-sw-fgo", "holds_if": ["lag=a"]}, "the values should be numbers"),
+        ({"claim": "guo-sw-fgo", "gain": 3.0}, "is a paper's claim"),
+        ({"claim": "auv-graph", "holds_if": ["fusion=waits"]}, "there is no choice 'waits'"),
+        ({"claim": "ekf", "than": "sw-fgo", "gain": 10.0}, "'scenario' is missing"),
+        ({"claim": "ekf", "than": "sw-fgo", "gain": 0.0, "scenario": "ship-turn"}, "between 0 and 100"),
+        ({"claim": "ekf", "than": "sw-fgo", "gain": 9.0, "scenario": "ship-turn", "holds_if": "lag"}, "has values"),
+        (
+            {"claim": "ekf", "than": "sw-fgo", "gain": 9.0, "scenario": "ship-turn", "holds_if": "than.windo=1,2"},
+            "no parameter 'windo'",
+        ),
+        (
+            {"claim": "ship-ekf", "than": "ekf", "gain": 9.0, "scenario": "ship-turn", "holds_if": "x=1,2"},
+            "no dial 'x'",
+        ),
+    ],
+)
+def test_mistakes_are_one_sentence(how, message):
+    with pytest.raises(simnav.RequestError, match=message) as error:
+        simnav.claim(**how)
+    assert "\n" not in str(error.value)

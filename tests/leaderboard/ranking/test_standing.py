@@ -1,0 +1,61 @@
+"""Where an estimator stands: places that are no more than chance allows, and one sentence."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+
+from simnav.leaderboard.ranking.runs import group
+from simnav.leaderboard.ranking.standing import Standing, standing
+from simnav.leaderboard.results.result import Result
+
+#: Factors of thirty seeds, with a geometric mean near 1.
+SPREAD = [0.8, 1.3, 0.9, 1.1, 1.0, 1.25, 0.75, 1.05, 0.95, 1.15] * 3
+
+
+def runs(label: str, error: float, spread: list[float]) -> list[Result]:
+    return [
+        Result("pond-v1", seed, label, {}, False, "ok", "", {"horizontal_rmse": error * factor})
+        for seed, factor in enumerate(spread)
+    ]
+
+
+def stand(count: int) -> Standing:
+    found = [
+        *runs("mine", 1.0, SPREAD[:count]),
+        *runs("ekf", 1.5, [1.0] * count),
+        *runs("same", 1.01, SPREAD[:count][::-1]),
+        *runs("best", 0.5, SPREAD[:count][::-1]),
+    ]
+    return standing(group(found)["pond-v1"], "mine", "pond-v1")
+
+
+def test_the_places_are_those_that_chance_allows() -> None:
+    found = stand(30)
+    assert (found.place, found.last, found.of) == (2, 3, 4)
+    assert found.places == "may be 2 to 3 of 4"
+    assert [r.estimator for r in found.rows] == ["best", "mine", "same", "ekf"]
+
+
+def test_a_few_seeds_decide_nothing() -> None:
+    found = stand(3)
+    assert (found.place, found.last, found.of) == (1, 4, 4)
+    assert found.verdict("ekf").endswith("times that of ekf; the difference may be chance.")
+
+
+@pytest.mark.parametrize(
+    ("plain", "said"),
+    [
+        ("ekf", r"its error is 0\.6\d+ times that of ekf \(95 %: 0\.\d+ to 0\.\d+ times\)\."),
+        ("mine", r"mine may be 2 to 3 of 4 on pond-v1\."),
+        ("nobody", r"mine may be 2 to 3 of 4 on pond-v1\."),
+    ],
+)
+def test_the_verdict_is_one_sentence(plain: str, said: str) -> None:
+    assert re.search(f"{said}$", stand(30).verdict(plain))
+
+
+def test_where_it_does_not_suit_there_is_no_place() -> None:
+    found = standing(group(runs("ekf", 1.0, SPREAD))["pond-v1"], "mine", "pond-v1")
+    assert (found.place, found.last, found.places) == (None, None, "does not suit it")
