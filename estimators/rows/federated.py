@@ -19,8 +19,8 @@ class Federated(Row, solver=piece(FederatedEstimator, reset_locals=True), model=
     in the geometric mean of 8 runs, and 30 times at most, with the status ok (``simnav evaluate federated --scenario
     poor-heading --runs 8 --seed 20 --against ekf``); ``iekf`` and ``heading-bank`` are for such starts.
 
-    Source: N. A. Carlson, *Federated square root filter for decentralized parallel processes*, IEEE Trans. Aerospace and
-    Electronic Systems 26(3), 1990.
+    Source: N. A. Carlson, *Federated square root filter for decentralized parallel processes*, IEEE Trans. Aerospace
+    and Electronic Systems 26(3), 1990.
     """
 
 
