@@ -43,9 +43,10 @@ class PredictionTest:
     as wrong if
 
     - the recent innovations of the instrument are correlated from one to the next, and too large for R and H P H'; and
-    - no instrument of the other group (fixes, logs) is a witness against it: it was heard, and its own innovations are
-      not correlated. So a lasting error of the fixes is found if a log agrees with the prediction, and the other way
-      round; and
+    - no instrument of the other group (fixes, logs) is a witness against it: it is heard, and its own innovations were
+      not correlated at some time since those of the first instrument persist. So a lasting error of the fixes is found
+      if a log agrees with the prediction, and the other way round. (A filter that believes wrong fixes soon disagrees
+      with the log, too. So what the witness said at first stands until the fixes agree again); and
     - an IMU that is noisier than its datasheet by a factor of `WORSE` would explain the innovation.
 
     A lasting error of the only instrument that is heard cannot be told from a wrong prediction. The instrument is then
@@ -84,6 +85,7 @@ class PredictionTest:
         if not self._inertial and len(set(self._group.values())) < 2:
             self._group = {}
         self._recent = {name: max(self.RECENT, 3.0 / instruments[name].rate) for name in self._group}
+        self._condemned: set[str] = set()  # instruments that a witness was against since their innovations persist
         self._courses: dict[str, Course] = {}
         self._failures: dict[str, tuple[int, float]] = {}
         self._first: Array | None = None
@@ -122,11 +124,18 @@ class PredictionTest:
             course = self._courses[name] = Course()
         course.add(components, len(given.residual), time)
         if not (course.correlated(self._persistent) and course.large(self._large)):
+            self._condemned.discard(name)
             return False
-        for other, witness in self._courses.items():
-            heard = self._group[other] != self._group[name] and time - witness.time <= self._recent[other]
-            if heard and not witness.correlated(self._white):
-                return False
+        witnesses = [
+            witness
+            for other, witness in self._courses.items()
+            if self._group[other] != self._group[name] and time - witness.time <= self._recent[other]
+        ]
+        if not witnesses:
+            self._condemned.discard(name)
+        elif name in self._condemned or not all(witness.correlated(self._white) for witness in witnesses):
+            self._condemned.add(name)
+            return False
         wide = standardised(given.residual, self.WORSE**2 * given.predicted, given.noise)
         return sum(u * u for u in wide) <= self._limits[len(given.residual)]
 

@@ -108,6 +108,14 @@ def test_a_lasting_error_is_that_of_the_prediction_if_no_witness_is_heard_or_bot
     assert all(judged(True, lambda k: off[k], lambda k: off[k])[15:])
 
 
+def test_what_the_witness_said_at_first_stands():
+    """A filter that follows wrong fixes soon disagrees with the log, too."""
+    rng = np.random.default_rng(3)
+    good = rng.standard_normal((30, 3))
+    off = 3.0 + good
+    assert not any(judged(True, lambda k: good[k] if k < 18 else off[k], lambda k: off[k]))
+
+
 def test_a_white_noise_without_a_witness_is_that_of_the_fixes():
     noise = 6.0 * np.random.default_rng(4).standard_normal((30, 3))
     assert np.mean(judged(True, lambda k: noise[k], lambda k: noise[k], dvl_until=3.0)[15:]) < 0.2
