@@ -83,7 +83,7 @@ CASES = {
         _fault("imu_bias_step", "imu", 5.0, 24.0, angular_rate_deg_h=200.0, specific_force_ug=3000.0),
         _fault("imu_clipping", "imu", 8.0, 12.0, angular_rate_limit_deg_s=0.5, specific_force_limit_g=1.0),
         _fault("imu_dropout", "imu", 14.0, 14.2, output="zero"),
-        _fault("imu_gap", "imu", 17.0, 17.25),
+        _fault("imu_dropout", "imu", 17.0, 17.25),
     )),
     "gnss velocity with gross errors": Case("open-sea", 24.0, (
         _fault("gross_error", "gnss_velocity", 6.0, 20.0, probability=0.4, size_m_s=[1.0, 3.0]),

@@ -81,7 +81,7 @@ def test_faults_meet_and_come_again(name: str):
 def test_voyages_with_poor_imus_have_no_wrong_measurement():
     family = load("training-poor-imu")
     runs = [family.drawn(seed) for seed in range(60)]
-    assert {f.kind for run in runs for f in run.faults} == {"imu_gap", "imu_disturbance", "outage"}
+    assert {f.kind for run in runs for f in run.faults} == {"imu_dropout", "imu_disturbance", "outage"}
     assert all(1.0 <= run.draws["draw.worse"] <= 20.0 for run in runs)
     for run in runs:
         true = run.actual_sheet()
@@ -99,7 +99,7 @@ def test_gaps_of_poor_imus_are_short():
     labels = [record(load("training-poor-imu"), seed) for seed in (1, 3)]
     lengths = []
     for run in labels:
-        bit = [f.kind for f in run.faults].index("imu_gap")
+        bit = [f.kind for f in run.faults].index("imu_dropout")
         within = np.flatnonzero(np.diff(np.r_[0, run.data.imu_labels.faults >> bit & 1, 0]))
         lengths += np.diff(within)[::2].tolist()
     assert len(lengths) > 20

@@ -14,7 +14,6 @@ from simnav.sensors.faults.additive import AdditiveLayer, BiasStep, GrossError, 
 from simnav.sensors.faults.fault import FAULTS, Effect, FaultError, FaultSpec, Names, effect_of, register_fault
 from simnav.sensors.faults.imu_disturbance import ImuDisturbance
 from simnav.sensors.faults.imu_faults import ImuBiasStep, ImuClipping, ImuDropout
-from simnav.sensors.faults.imu_gap import ImuGap
 from simnav.sensors.faults.layer import Activity, FaultLayer
 from simnav.sensors.faults.replacing import FalseZero, Frozen, Outage, ReplacingLayer
 from simnav.sensors.faults.sizes import Size, size_by_component, size_range
@@ -37,7 +36,6 @@ __all__ = [
     "ImuClipping",
     "ImuDisturbance",
     "ImuDropout",
-    "ImuGap",
     "Multipath",
     "Names",
     "NoiseStep",

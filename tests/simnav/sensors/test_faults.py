@@ -273,9 +273,9 @@ def moving_imu(n=100) -> ImuSamples:
     )
 
 
-def test_imu_gap_repeats_the_sample_before_it():
+def test_imu_dropout_repeats_the_sample_before_it():
     before = moving_imu()
-    after, marks = layer({"kind": "imu_gap", "intervals_s": [[0.2, 0.25], [0.6, 0.61]]}).apply_imu(before, None)
+    after, marks = layer({"kind": "imu_dropout", "intervals_s": [[0.2, 0.25], [0.6, 0.61]]}).apply_imu(before, None)
     gap = np.isin(np.arange(100), [19, 20, 21, 22, 23])
     single = np.arange(100) == 59
     for name in ("angular_rate", "specific_force"):
@@ -289,15 +289,15 @@ def test_imu_gap_repeats_the_sample_before_it():
     assert np.array_equal(before.angular_rate, moving_imu().angular_rate)
 
 
-def test_imu_gap_at_the_very_start_repeats_its_first_sample():
-    after, _ = layer({"kind": "imu_gap", "end_s": 0.05}).apply_imu(moving_imu(), None)
+def test_imu_dropout_at_the_very_start_repeats_its_first_sample():
+    after, _ = layer({"kind": "imu_dropout", "end_s": 0.05}).apply_imu(moving_imu(), None)
     assert np.all(after.angular_rate[:4] == moving_imu().angular_rate[0])
     assert np.all(after.angular_rate[4] == moving_imu().angular_rate[4])
 
 
 @pytest.mark.parametrize("edges", [(0, 50, 100), (0, 1, 20, 21, 22, 60, 100)])
-def test_imu_gap_in_pieces_gives_the_same(edges):
-    table = {"kind": "imu_gap", "mean_active_s": 0.05, "mean_gap_s": 0.1}
+def test_imu_dropout_in_pieces_gives_the_same(edges):
+    table = {"kind": "imu_dropout", "mean_active_s": 0.05, "mean_gap_s": 0.1}
     samples = moving_imu()
     whole, marks = layer(table).apply_imu(samples, None)
     one = layer(table)
@@ -474,7 +474,7 @@ def test_faults_that_do_not_fit_the_instruments(table, message):
         ({"kind": "multipath", "instruments": "gnss", "sigma_m": 5}, "correlation_time_s"),
         ({"kind": "bias_step", "instruments": "gnss", "offset": 5}, "unknown key 'faults\\[0\\].offset'"),
         ({"kind": "imu_disturbance"}, "specific_force_m_s2"),
-        ({"kind": "imu_gap", "instruments": "gnss"}, "on 'imu' and nothing else"),
+        ({"kind": "imu_dropout", "instruments": "gnss"}, "on 'imu' and nothing else"),
         ({"kind": "imu_disturbance", "instruments": "dvl", "specific_force_m_s2": 1}, "on 'imu' and nothing else"),
     ],
 )
@@ -485,7 +485,7 @@ def test_faults_that_make_no_sense(table, message):
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize("fault", [{"kind": "imu_disturbance", "specific_force_m_s2": 0.5}, {"kind": "imu_gap"}])
+@pytest.mark.parametrize("fault", [{"kind": "imu_disturbance", "specific_force_m_s2": 0.5}, {"kind": "imu_dropout"}])
 def test_faults_of_the_imu_need_an_imu(fault):
     check_faults(faults(fault), INSTRUMENTS)
     with pytest.raises(SpecError, match="no IMU"):
