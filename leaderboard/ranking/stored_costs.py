@@ -8,27 +8,23 @@ rows when it is shown; the ranking does not use them.
 
 from __future__ import annotations
 
-import json
 import math
-from collections.abc import Iterable, Mapping
-from dataclasses import asdict, dataclass, fields
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from simnav.leaderboard.results.errors import RequestError, sentence
-from simnav.leaderboard.results.files import write_whole
-from simnav.leaderboard.results.provenance import Provenance, here
+from simnav.leaderboard.results.provenance import Provenance
 
+from .measured_file import checked_names, read_measured, save_measured, short_number
 from .plain_row import plain_rows
 
 __all__ = ["FILE", "NOT_MEASURED", "CostMultiple", "Costs", "cost_of", "not_measured", "read", "save", "stored"]
 
 FILE = Path(__file__).with_name("costs.json")
-FORMAT = 1
 NOT_MEASURED = "not measured"
 
-_DIGITS = 4
 _WANTED = "'simnav bench --all --output FILE' writes such a file"
 
 
@@ -96,13 +92,8 @@ def save(rows: Iterable[CostMultiple], path: Path, measured: Provenance | None =
     OSError
         If writing fails.
     """
-    lines = []
-    for row in rows:
-        values = {k: float(f"{v:.{_DIGITS}g}") if isinstance(v, float) else v for k, v in asdict(row).items()}
-        lines.append("  " + json.dumps(values))
-    known = {k: v for k, v in (measured or here()).to_dict().items() if v not in ("", None) and k != "id"}
-    head = json.dumps({"format": FORMAT, "measured": known}, indent=1)
-    return write_whole(path, head[: head.rindex("}")].rstrip() + ',\n "rows": [\n' + ",\n".join(lines) + "\n ]\n}\n")
+    lines = ({k: short_number(v) if isinstance(v, float) else v for k, v in asdict(row).items()} for row in rows)
+    return save_measured(lines, path, measured)
 
 
 def read(path: Path) -> Costs:
@@ -113,34 +104,12 @@ def read(path: Path) -> Costs:
     RequestError
         If the file is missing or is no table of costs: one sentence with the file, the field and the value.
     """
-    try:
-        content = json.loads(path.read_bytes())
-        if not isinstance(content, Mapping) or content.get("format") != FORMAT:
-            found = content.get("format") if isinstance(content, Mapping) else content
-            raise ValueError(f"format is {found!r}, and this version reads {FORMAT}")
-        if not isinstance(content.get("rows"), list) or not isinstance(content.get("measured"), Mapping):
-            raise ValueError("'rows' should be a list, and 'measured' an object with machine, versions and day")
-        known = {f.name for f in fields(Provenance)}
-        measured = Provenance(**{k: v for k, v in content["measured"].items() if k in known})
-        rows = tuple(_row(k, entry) for k, entry in enumerate(content["rows"]))
-        pairs = set[tuple[str, str]]()
-        for k, row in enumerate(rows):
-            if (row.estimator, row.plain) in pairs:
-                raise ValueError(f"rows[{k}]: there are two multiples of {row.estimator} beside {row.plain}")
-            pairs.add((row.estimator, row.plain))
-        return Costs(measured, rows)
-    except (OSError, ValueError, TypeError) as error:
-        raise RequestError(f"{path} is no table of costs: {sentence(error)}; {_WANTED}") from error
+    return Costs(*read_measured(path, _row, what="table of costs", rows="multiples", wanted=_WANTED))
 
 
-def _row(number: int, entry: Any) -> CostMultiple:
+def _row(where: str, entry: Any) -> CostMultiple:
     """A row of the file; ValueError with the field that is wrong."""
-    where = f"rows[{number}]"
-    if not isinstance(entry, Mapping):
-        raise ValueError(f"{where} is {entry!r}, and should be an object")
-    for name in ("estimator", "plain", "scenario"):
-        if not isinstance(entry.get(name), str) or not entry[name]:
-            raise ValueError(f"{where}.{name} is {entry.get(name)!r}, and should be a text")
+    entry = checked_names(where, entry)
     for name in ("value", "low", "high", "rounds"):
         x = entry.get(name)
         if isinstance(x, bool) or not isinstance(x, (int, float)) or not 0.0 < x < math.inf:

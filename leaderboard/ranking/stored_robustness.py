@@ -8,26 +8,22 @@ use them. A profile names the version of its row, and is not shown beside result
 
 from __future__ import annotations
 
-import json
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass, fields
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from simnav.leaderboard.results.errors import RequestError, sentence
-from simnav.leaderboard.results.files import write_whole
-from simnav.leaderboard.results.provenance import Provenance, here
+from simnav.leaderboard.results.provenance import Provenance
 
+from .measured_file import checked_names, read_measured, save_measured, short_number
 from .plain_row import plain_rows
 
 __all__ = ["FILE", "Profile", "ProfilePoint", "Profiles", "profile_of", "profiles_of", "read", "save", "stored"]
 
 FILE = Path(__file__).parents[1] / "standard" / "robustness.json"
-FORMAT = 1
 
-_DIGITS = 4
 _WANTED = "'simnav robustness --output FILE' writes such a file"
 
 
@@ -119,18 +115,15 @@ def save(rows: Iterable[Profile], path: Path, measured: Provenance | None = None
     OSError
         If writing fails.
     """
-    lines = []
-    for row in rows:
-        head = {f.name: getattr(row, f.name) for f in fields(row) if f.name != "points"}
-        points = [
-            [p.instrument, float(f"{p.factor:.{_DIGITS}g}"), float(f"{p.ratio:.{_DIGITS}g}"), p.failed]
-            for p in row.points
-        ]
-        lines.append("  " + json.dumps(head | {"points": points}, allow_nan=False))
-    known = {k: v for k, v in (measured or here()).to_dict().items() if v not in ("", None) and k != "id"}
-    head_of_file = json.dumps({"format": FORMAT, "measured": known}, indent=1)
-    text = head_of_file[: head_of_file.rindex("}")].rstrip() + ',\n "rows": [\n' + ",\n".join(lines) + "\n ]\n}\n"
-    return write_whole(path, text)
+    return save_measured(map(_entry, rows), path, measured)
+
+
+def _entry(row: Profile) -> dict[str, Any]:
+    """A profile as JSON holds it."""
+    head = {f.name: getattr(row, f.name) for f in fields(row) if f.name != "points"}
+    return head | {
+        "points": [[p.instrument, short_number(p.factor), short_number(p.ratio), p.failed] for p in row.points]
+    }
 
 
 def read(path: Path) -> Profiles:
@@ -141,33 +134,12 @@ def read(path: Path) -> Profiles:
     RequestError
         If the file is missing or is no file of profiles: one sentence with the file, the field and the value.
     """
-    try:
-        content = json.loads(path.read_bytes())
-        if not isinstance(content, Mapping) or content.get("format") != FORMAT:
-            found = content.get("format") if isinstance(content, Mapping) else content
-            raise ValueError(f"format is {found!r}, and this version reads {FORMAT}")
-        if not isinstance(content.get("rows"), list) or not isinstance(content.get("measured"), Mapping):
-            raise ValueError("'rows' should be a list, and 'measured' an object with machine, versions and day")
-        known = {f.name for f in fields(Provenance)}
-        measured = Provenance(**{k: v for k, v in content["measured"].items() if k in known})
-        rows = tuple(_profile(f"rows[{k}]", entry) for k, entry in enumerate(content["rows"]))
-        pairs = set[tuple[str, str]]()
-        for k, row in enumerate(rows):
-            if (row.estimator, row.plain) in pairs:
-                raise ValueError(f"rows[{k}]: there are two profiles of {row.estimator} beside {row.plain}")
-            pairs.add((row.estimator, row.plain))
-        return Profiles(measured, rows)
-    except (OSError, ValueError, TypeError) as error:
-        raise RequestError(f"{path} is no file of robustness profiles: {sentence(error)}; {_WANTED}") from error
+    return Profiles(*read_measured(path, _profile, what="file of robustness profiles", rows="profiles", wanted=_WANTED))
 
 
 def _profile(where: str, entry: Any) -> Profile:
     """A profile of the file; ValueError with the field that is wrong."""
-    if not isinstance(entry, Mapping):
-        raise ValueError(f"{where} is {entry!r}, and should be an object")
-    for name in ("estimator", "plain", "scenario"):
-        if not isinstance(entry.get(name), str) or not entry[name]:
-            raise ValueError(f"{where}.{name} is {entry.get(name)!r}, and should be a text")
+    entry = checked_names(where, entry)
     for name in ("version", "plain_version", "runs"):
         x = entry.get(name)
         if isinstance(x, bool) or not isinstance(x, int) or x < 1:
