@@ -16,7 +16,7 @@ detection.
 
 With an IMU and without one, different rules say which instrument may be excluded
 (`simnav.estimators.solvers.exclusion_rules`). If an instrument is not excluded because the position without it is not
-accurate enough, no other instrument is excluded instead.
+accurate enough, or because it is the last one (see below), no other instrument is excluded instead.
 
 **IMU.** The IMU may also be wrong: disturbed, or with larger errors than its datasheet says. One more filter uses all
 measurements with a much larger IMU noise (`disturbed_imu`). If there are a fix and a log, the IMU is excluded (this
@@ -423,7 +423,7 @@ class SolutionSeparation(Solver):
             return _IMU  # one fault explains what would be two
         contradicting = self._exclusion.contradicting(self._time) & ratios.keys()
         instruments = {*suspects, *probation, *contradicting} - {_IMU}
-        spared = [name for name in instruments if self._can_spare(name) and not self._only_against_the_imu(name)]
+        spared = [name for name in instruments if self._can_spare(name)]
         apart = {name: self._disagreement(self._older_filter(name).filter, {name, *out}) for name in spared}
         if self._imu is not None and _IMU in suspects:
             apart[_IMU] = self._disagreement(self._imu.filter, self._imu.exclusion.excluded)
@@ -432,7 +432,9 @@ class SolutionSeparation(Solver):
         least = max(min(apart.values()), _AGREEMENT)
         tied = [name for name in (*self._names, _IMU) if apart.get(name, np.inf) <= _TIED * least]
         found = min(tied, key=lambda n: (n not in probation, n == _IMU, not self._group.get(n, False), -ratios[n]))
-        return found if found == _IMU or self._pays(found, estimate) else None
+        if found == _IMU:
+            return found
+        return found if self._pays(found, estimate) and not self._only_against_the_imu(found) else None
 
     def _pays(self, name: str, estimate: Estimate) -> bool:
         """Whether the filter without an instrument knows the position well enough to be believed."""

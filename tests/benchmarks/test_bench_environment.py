@@ -66,6 +66,14 @@ sigma_m = 0.1
 [instruments.terrain_fix]
 rate_hz = 0.1
 sigma_m = [10.0, 10.0]
+[instruments.gnss_raw]
+satellites = ["G12", "G29", "E27", "E30", "E34"]
+sigma_pseudorange_m = 0.2
+sigma_range_rate_m_s = 0.03
+[instruments.gnss_receiver]
+sigma_m = [1.0, 1.0, 2.0]
+[instruments.gnss_receiver_velocity]
+sigma_m_s = 0.05
 """
 
 
