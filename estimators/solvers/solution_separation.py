@@ -432,9 +432,8 @@ class SolutionSeparation(Solver):
         least = max(min(apart.values()), _AGREEMENT)
         tied = [name for name in (*self._names, _IMU) if apart.get(name, np.inf) <= _TIED * least]
         found = min(tied, key=lambda n: (n not in probation, n == _IMU, not self._group.get(n, False), -ratios[n]))
-        if found == _IMU:
-            return found
-        return found if self._pays(found, estimate) and not self._only_against_the_imu(found) else None
+        excluded = found == _IMU or (self._pays(found, estimate) and not self._only_against_the_imu(found))
+        return found if excluded else None
 
     def _pays(self, name: str, estimate: Estimate) -> bool:
         """Whether the filter without an instrument knows the position well enough to be believed."""
