@@ -79,7 +79,7 @@ class _ImuError(NamedTuple):
 class _AidErrors(NamedTuple):
     """Places of an aid's states in y; -1 or empty where it has none. ``bias`` holds (component, place).
 
-    ``processes`` are those that the datasheet declares by name: component, place, and what the state is multiplied with.
+    ``processes`` are those that the datasheet declares by name: component, place, and factors of the state.
     """
 
     bias: list[tuple[int, int]]
@@ -179,8 +179,8 @@ class AboutTruthModel(ErrorModel):
             for error in ("scale", "misalignment", "deviation")
             if error in errors and errors[error].processes
         }
-        places = (at.get(error, -1) for error in ("scale", "misalignment", "deviation"))
-        self._aids[name] = _AidErrors(bias, *places, self._processes(sheet))
+        scale, misalignment, deviation = (at.get(error, -1) for error in ("scale", "misalignment", "deviation"))
+        self._aids[name] = _AidErrors(bias, scale, misalignment, deviation, self._processes(sheet))
         none = np.zeros_like(sheet.bias)
         white = sheet.bias_instability if errors["bias"].fast else none
         return replace(sheet, bias=none, bias_instability=white, scale=0.0, misalignment=np.zeros(3), processes=())
@@ -194,7 +194,9 @@ class AboutTruthModel(ErrorModel):
             for component, rates in enumerate(block.rates()):
                 label = f"{process.name}_of_{component}"
                 if process.second_order and rates.variance:
-                    found.append((component, self.blocks.add_second_order(sheet.name, label, process, component), factors))
+                    found.append(
+                        (component, self.blocks.add_second_order(sheet.name, label, process, component), factors)
+                    )
                 elif rates.variance or rates.noise:
                     found.append((component, self.blocks.add(sheet.name, label, [rates]), factors))
         return found

@@ -5,7 +5,8 @@ plus an in-run bias. Filter, window, full graph, smoother, sigma points, bound a
 from here, in one of the two ways of `simnav.estimators.models.sum_of_processes`: merged into one state a component, or
 apart. One more process of an error is one more block here, and nothing else.
 
-- aid: ``bias``, with the processes that the datasheet names (`simnav.declared_process`); of a log also ``current``, which a reading of the speed through the water depends on
+- aid: ``bias``, with the processes that the datasheet names (`simnav.declared_process`); of a log also ``current``,
+  which a reading of the speed through the water depends on
 - aid with a scale factor: ``scale``; of a velocity in body axes also ``misalignment``; of a magnetic compass
   ``deviation``, the amplitudes of sine and cosine of the heading
 - three gyroscopes or accelerometers: ``bias``, ``scale`` (three) and ``misalignment`` (six: each axis to the others)

@@ -221,7 +221,9 @@ class Description(Spec):
         if actual is self and not any(unstated.values()) and not waves:
             return None
         sheet = actual.instruments_sheet()
-        aids = [replace(s, details={**s.details, **unstated[s.name]}, processes=self._in_sea(s)) for s in sheet.values()]
+        aids = [
+            replace(s, details={**s.details, **unstated[s.name]}, processes=self._in_sea(s)) for s in sheet.values()
+        ]
         return Instruments(aids, sheet.imu, sheet.step)
 
     def _in_sea(self, sheet: Datasheet) -> tuple[DeclaredProcess, ...]:

@@ -19,14 +19,14 @@ from __future__ import annotations
 
 import re
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from functools import partial, wraps
 from math import inf
-from typing import Annotated, Any, ClassVar, Self, TypeVar
+from typing import Any, ClassVar, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BeforeValidator, Field, SerializerFunctionWrapHandler, model_serializer, model_validator
+from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
 from simnav.blocks import StateBlock
 from simnav.kinds import INSTRUMENTS, Kind
@@ -35,87 +35,35 @@ from simnav.recording import AidStream
 from simnav.sensors.block_values import BlockValues, check_blocks
 from simnav.sensors.error_processes import AnyErrorProcess, TotalError, declared_processes, labels_of, white_of
 from simnav.sensors.errors import InstrumentError, label_of, raised
+from simnav.sensors.figures import (
+    PROCESSES,
+    ZERO,
+    Pair,
+    SigmaPair,
+    SigmaTriple,
+    Triple,
+    figures_of,
+    times_datasheet,
+)  # fmt: skip
 from simnav.sensors.processes import GaussMarkov
 from simnav.sensors.turning import turn_to_body, turn_to_ned
-from simnav.spec import (
-    UNITS,
-    NonNegative,
-    Positive,
-    Spec,
-    SpecError,
-    Vector,
-    closest,
-    entries,
-    quantity,
-    unit_of,
-)
+from simnav.spec import UNITS, NonNegative, Positive, Spec, SpecError, closest, entries, quantity, unit_of
 from simnav.streams import stream
 from simnav.types import Array, Datasheet, TapStates
 from simnav.world.surroundings import Surroundings
 
 __all__ = [
-    "ZERO",
-    "AidSpec",
-    "Instrument",
-    "InstrumentError",
-    "Pair",
-    "SigmaPair",
-    "SigmaTriple",
-    "Triple",
-    "figures_of",
-    "label_of",
-    "raised",
-    "register_instrument",
-    "times_datasheet",
-    "turn_to_body",
-    "turn_to_ned",
-]
-
-T = TypeVar("T", bound=Spec)
+    "ZERO", "AidSpec", "Instrument", "InstrumentError", "Pair", "SigmaPair", "SigmaTriple", "Triple", "figures_of",
+    "label_of", "raised", "register_instrument", "times_datasheet", "turn_to_body", "turn_to_ned",
+]  # fmt: skip
 
 #: Names with another meaning, which no instrument may have: parts of an environment's observation and of a reference.
 _RESERVED = ("imu", "interval", "position", "velocity", "attitude")
 #: Figures for which a specification may have a separate field for each component.
 _BY_COMPONENT = ("sigma", "bias", "bias_instability", "fixed_bias")
-#: The key of ``times_datasheet`` for the sizes of all processes, which is also that of their tables.
-_PROCESSES = "error"
 #: What the identifier of a channel looks like (it stands in tables, in the TOML of faults, and after a colon), and the
 #: largest number of channels of an instrument.
 _CHANNEL, _MOST_CHANNELS = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.+-]*"), 1000
-#: Default of a vector.
-ZERO: Vector = (0.0, 0.0, 0.0)
-
-
-def _spread(n: int) -> BeforeValidator:
-    return BeforeValidator(lambda x: (x,) * n if isinstance(x, (int, float)) and not isinstance(x, bool) else x)
-
-
-#: Two or three numbers, one for each axis; TOML may have one number for all axes. One-sigma figures are not negative.
-Pair = Annotated[tuple[float, float], _spread(2)]
-Triple = Annotated[Vector, _spread(3)]
-SigmaPair = Annotated[tuple[NonNegative, NonNegative], _spread(2)]
-SigmaTriple = Annotated[tuple[NonNegative, NonNegative, NonNegative], _spread(3)]
-
-
-def figures_of(cls: type[Spec], errors: Sequence[str]) -> list[str]:
-    """The fields of a specification whose datasheet value may be wrong (``times_datasheet``)."""
-    stems = tuple(errors)
-    return [n for n in cls.model_fields if n in stems or any(n.startswith(f"{stem}_") for stem in stems)]
-
-
-def times_datasheet(spec: T) -> T:
-    """A specification with its figures multiplied by its ``times_datasheet``; the same object without them."""
-    factors: Mapping[str, float] = getattr(spec, "times_datasheet", {})
-    if not factors:
-        return spec
-    changes: dict[str, Any] = {"times_datasheet": {}}
-    for name, factor in factors.items():
-        if name == _PROCESSES:
-            changes["processes"] = tuple(process.scaled(factor) for process in spec.processes)  # type: ignore[attr-defined]
-            continue
-        value = getattr(spec, name)
-        changes[name] = tuple(factor * v for v in value) if isinstance(value, tuple) else factor * value
-    return spec.model_copy(update=changes)
 
 
 class AidSpec(Spec):
@@ -205,7 +153,7 @@ class AidSpec(Spec):
 
     @model_validator(mode="after")
     def _known_figures(self) -> Self:
-        valid = [*figures_of(type(self), self.errors), *([_PROCESSES] if self.processes else [])]
+        valid = [*figures_of(type(self), self.errors), *([PROCESSES] if self.processes else [])]
         for name in self.times_datasheet:
             if name not in valid:
                 raise ValueError(f"times_datasheet.{name}: there is no such figure{closest(name, valid)}")
@@ -251,7 +199,7 @@ class AidSpec(Spec):
         return self
 
     def actual(self) -> Self:
-        """The instrument with its true figures: those of the datasheet times ``times_datasheet``, all processes stated."""
+        """The instrument with its true figures, those of the datasheet times ``times_datasheet``, and all processes."""
         actual = times_datasheet(self)
         if all(process.stated for process in self.processes):
             return actual

@@ -1,4 +1,4 @@
-"""An error that is constant in a run, but for its factors: deviation by heading, error of scale, intercardinal error."""
+"""An error that is constant in a run, but for its factors: deviation by heading, scale, intercardinal error."""
 
 from __future__ import annotations
 

@@ -94,7 +94,7 @@ def _add(kind: FactorKind) -> None:
 
 def named_factors() -> dict[str, tuple[str, str]]:
     """The TOML keys of ``proportional_to``: name of the factor, and its unit (empty for a pure number)."""
-    found = {}
+    found: dict[str, tuple[str, str]] = {}
     for kind in FACTORS.values():
         if not kind.parameters:
             found |= {f"{kind.name}_{unit}" if unit else kind.name: (kind.name, unit) for unit in kind.units or ("",)}

@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field
 
 from simnav.kinds import Kind
-from simnav.sensors.error_processes.process import Act, ErrorProcessSpec, Sampled, register_error_process
+from simnav.sensors.error_processes.process import Act, ErrorProcessSpec, Mask, Sampled, register_error_process
 from simnav.spec import Positive, quantity
 from simnav.types import Array
 
@@ -44,7 +44,7 @@ class Loss(ErrorProcessSpec):
         """See `ErrorProcessSpec.sampled`."""
         return None
 
-    def lost(self, time: Array, factor: Array, rng: np.random.Generator, state: dict[str, float]) -> Array:
+    def lost(self, time: Array, factor: Array, rng: np.random.Generator, state: dict[str, float]) -> Mask:
         """See `ErrorProcessSpec.lost`."""
         drawn = rng.random(len(time)).tolist()
         mask = np.zeros(len(time), dtype=np.bool_)

@@ -13,9 +13,10 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from math import isinf
-from typing import Annotated, Any, ClassVar, Literal, Protocol, Self, TypeVar
+from typing import Annotated, Any, ClassVar, Literal, Protocol, Self, TypeAlias, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import BeforeValidator, Field, model_validator
 from pydantic.fields import FieldInfo
 
@@ -32,10 +33,13 @@ __all__ = [
     "Act",
     "ErrorProcessSpec",
     "Figure",
+    "Mask",
     "Sampled",
     "figure",
     "register_error_process",
 ]
+
+Mask: TypeAlias = NDArray[np.bool_]
 
 #: What a process does: it adds a coloured or a white error, rounds readings, or loses some of them.
 Act = Literal["coloured", "white", "rounds", "loses"]
@@ -56,7 +60,7 @@ Figure = Annotated[NonNegative | tuple[NonNegative, ...], BeforeValidator(_liste
 
 
 def figure(description: str) -> Any:
-    """Declare a field whose unit is that of the instrument's error: ``sigma`` is ``sigma_m`` or ``sigma_deg`` in TOML."""
+    """Declare a field in the unit of the instrument's error: ``sigma`` is ``sigma_m`` or ``sigma_deg`` in TOML."""
     return Field(json_schema_extra={"own_unit": True}, description=description)
 
 
@@ -107,8 +111,6 @@ class ErrorProcessSpec(Spec):
     @classmethod
     def from_toml(cls, table: Mapping[str, Any], *, source: str = "<toml>", path: str = "") -> Self:
         """See `Spec.from_toml`; the unit of the sizes is the end of their keys."""
-        if not isinstance(table, Mapping):
-            return super().from_toml(table, source=source, path=path)
         where = f"{path}." if path else ""
         plain, units = dict(table), {}
         for key in table:
@@ -278,7 +280,7 @@ class ErrorProcessSpec(Spec):
         """The (n, d) readings as the instrument delivers them."""
         return value
 
-    def lost(self, time: Array, factor: Array, rng: np.random.Generator, state: dict[str, float]) -> Array:
+    def lost(self, time: Array, factor: Array, rng: np.random.Generator, state: dict[str, float]) -> Mask:
         """An (n,) mask of the readings that are lost.
 
         Parameters

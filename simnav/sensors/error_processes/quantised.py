@@ -26,10 +26,10 @@ _RADIUS = 6371008.8
 
 @register_error_process
 class Quantised(ErrorProcessSpec):
-    """Readings are rounded to multiples of ``step``, after all other errors. The datasheet adds step / sqrt(12) to ``sigma``.
+    """Readings are rounded to multiples of ``step``, after all other errors.
 
-    The step of a latitude or longitude is an angle, as in a sentence of NMEA 0183: ``step_m`` over the mean radius of
-    the Earth.
+    The datasheet adds step / sqrt(12) to ``sigma``. The step of a latitude or longitude is an angle, as in a sentence
+    of NMEA 0183: ``step_m`` over the mean radius of the Earth.
     """
 
     act: ClassVar[Act] = "rounds"

@@ -55,10 +55,10 @@ class Ballistic(ErrorProcessSpec):
     """The ballistic error of a gyrocompass: a change of the north velocity throws the axis off, and it settles again.
 
     The error jumps by c dv / (speed_change cos(latitude)) where the north velocity changes by dv, and dies away as a
-    damped oscillation. The constant c is drawn for each run with the standard deviation ``sigma``. The precession of the
-    axis during a change of speed is the change of the speed-and-course error, dv / (R w cos(latitude)), times the square
-    of the Schuler period over that of the compass; what is too much or too little is the ballistic error (Bowditch 2019,
-    chapter 8: ballistic deflection). A compass of 84.4 minutes at its latitude has none.
+    damped oscillation. The constant c is drawn for each run with the standard deviation ``sigma``. The precession of
+    the axis during a change of speed is the change of the speed-and-course error, dv / (R w cos(latitude)), times the
+    square of the Schuler period over that of the compass; what is too much or too little is the ballistic error
+    (Bowditch 2019, chapter 8: ballistic deflection). A compass of 84.4 minutes at its latitude has none.
     """
 
     kind: Literal["ballistic"] = "ballistic"
