@@ -22,6 +22,7 @@ from .requests import (
     CiteRequest,
     MergeRequest,
     RankRequest,
+    RealismRequest,
     ReproduceRequest,
     RescoreRequest,
     SealRequest,
@@ -40,8 +41,9 @@ if TYPE_CHECKING:
     from simnav.leaderboard.results.result import Result
 
     from .allan import AllanReport
+    from .realism.report import RealismReport
 
-__all__ = ["allan", "bound", "cite", "merge", "rank", "reproduce", "rescore", "seal", "verify"]
+__all__ = ["allan", "bound", "cite", "merge", "rank", "realism", "reproduce", "rescore", "seal", "verify"]
 
 
 @call(RankRequest)
@@ -206,6 +208,28 @@ def allan(request: AllanRequest) -> AllanReport:
             return allan_of_file(absolute(given), start, end)
         scenario = scenario_of(given)
         return allan_of_scenario(scenario, seed, finite_number("duration", request.duration), start, end)
+
+
+@call(RealismRequest)
+def realism(request: RealismRequest) -> RealismReport:
+    """Compare the errors of simulated instruments with those of a recording.
+
+    Returns
+    -------
+    simnav.leaderboard.realism.report.RealismReport
+
+    Raises
+    ------
+    RequestError
+        If scikit-learn is not installed, the log is absent, or there is no instrument that both have.
+    """
+    from .realism.report import realism_of
+
+    runs, seed = whole_number("runs", request.runs, 3), whole_number("seed", request.seed, 0)
+    given = request.instrument
+    names = given.split(",") if isinstance(given, str) else [n for part in given or () for n in part.split(",")]
+    with mistakes():
+        return realism_of(scenario_of(request.scenario), scenario_of(request.log), names, runs, seed)
 
 
 @call(VerifyRequest)

@@ -18,7 +18,7 @@ from simnav.leaderboard.results.errors import RequestError
 from .claiming import claim
 from .costing import bench, costs
 from .given import results_of, scenario_of, scenarios_of
-from .inspection import allan, bound, cite, merge, rank, reproduce, rescore, seal, verify
+from .inspection import allan, bound, cite, merge, rank, realism, reproduce, rescore, seal, verify
 from .requests import ScenarioLike, Scenarios
 from .running import campaign, check, evaluate, make, record, robustness, run, sweep, tune
 
@@ -40,6 +40,7 @@ __all__ = [
     "make",
     "merge",
     "rank",
+    "realism",
     "record",
     "reproduce",
     "rescore",

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from simnav.kinds import Component, Kind
     from simnav.leaderboard.claiming import claim
     from simnav.leaderboard.costing import bench, costs
-    from simnav.leaderboard.inspection import allan, bound, cite, merge, rank, reproduce, rescore, seal, verify
+    from simnav.leaderboard.inspection import allan, bound, cite, merge, rank, realism, reproduce, rescore, seal, verify
     from simnav.leaderboard.publishing import (
         audit_standard,
         check_standard,
@@ -106,6 +106,7 @@ __all__ = [
     "open_source",
     "publish_standard",
     "rank",
+    "realism",
     "record",
     "register",
     "register_fault",
@@ -158,7 +159,18 @@ _HOMES = {
     ),
     "leaderboard.claiming": ("claim",),
     "leaderboard.costing": ("bench", "costs"),
-    "leaderboard.inspection": ("allan", "bound", "cite", "merge", "rank", "reproduce", "rescore", "seal", "verify"),
+    "leaderboard.inspection": (
+        "allan",
+        "bound",
+        "cite",
+        "merge",
+        "rank",
+        "realism",
+        "reproduce",
+        "rescore",
+        "seal",
+        "verify",
+    ),
     "leaderboard.results.errors": ("RequestError",),
     "leaderboard.running": ("campaign", "check", "evaluate", "make", "record", "robustness", "run", "sweep", "tune"),
     "leaderboard.publishing": (

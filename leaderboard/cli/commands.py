@@ -28,6 +28,7 @@ from simnav.leaderboard.requests import (
     EvaluateRequest,
     MergeRequest,
     Parameters,
+    RealismRequest,
     RecordRequest,
     ReproduceRequest,
     RescoreRequest,
@@ -189,6 +190,18 @@ class AllanCommand(AllanRequest):
 
 
 @request
+class RealismCommand(RealismRequest):
+    """Compare the errors of simulated instruments with those of a recording: can a classifier tell them apart?
+
+    It also prints the processes that would fit the real errors best, as tables of a scenario file.
+    """
+
+    _: KW_ONLY
+    plot: Path | None = option(default=None, help=_FIGURE)
+    fit: Path | None = option("--fit", default=None, help="Write the processes that fit to this TOML file.")
+
+
+@request
 class ReferenceCommand:
     """Run the oracles over many seeds, and store the figures that errors are divided by."""
 
@@ -264,6 +277,7 @@ COMMANDS: Mapping[str, tuple[type[Any], str]] = {
     "warmup": (WarmupCommand, "warmup"),
     "bound": (BoundCommand, "bound"),
     "allan": (AllanCommand, "allan"),
+    "realism": (RealismCommand, "realism"),
     "reproduce": (ReproduceRequest, "reproduce"),
     "claim": (ClaimCommand, "claim"),
     "reference": (ReferenceCommand, "reference"),
@@ -280,8 +294,8 @@ COMMANDS: Mapping[str, tuple[type[Any], str]] = {
 HEADINGS: Mapping[str, Sequence[str]] = {
     "Every day": ("list", "show", "run", "evaluate", "check", "new-estimator", "simulate", "sweep", "campaign",
                   "leaderboard"),
-    "Study and publish": ("tune", "train", "bench", "robustness", "bound", "allan", "reproduce", "claim", "rescore",
-                          "merge", "submit", "verify", "seal", "cite"),
+    "Study and publish": ("tune", "train", "bench", "robustness", "bound", "allan", "realism", "reproduce", "claim",
+                          "rescore", "merge", "submit", "verify", "seal", "cite"),
     "Maintain": ("standard", "reference", "warmup"),
 }  # fmt: skip
 
