@@ -10,14 +10,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import pi
+from math import pi, sqrt
 from typing import Any
 
 import numpy as np
 from scipy.optimize import nnls
 from scipy.stats import t as student
 
-from simnav.declared_process import oscillation
 from simnav.kinds import Kind
 from simnav.spec import UNITS
 from simnav.types import Array
@@ -108,9 +107,8 @@ def autocovariance(series: Sequence[ErrorSeries], longest: float = _LONGEST) -> 
     return np.asarray(total / np.maximum(pairs, 1.0)[:, None])
 
 
-def _shapes(lags: Array, n: int) -> list[tuple[dict[str, Any], Array]]:
-    """All shapes with their autocorrelation at the lags, after the mean of n readings is taken off."""
-    step = lags[1]
+def _shapes(lags: Array, step: float, n: int) -> list[tuple[dict[str, Any], Array]]:
+    """All shapes with their autocorrelation at some lags (numbers of steps), less the mean of n readings."""
     far = np.arange(n) * step
     found: list[tuple[dict[str, Any], Array]] = []
     for time in _TIMES:
@@ -119,18 +117,23 @@ def _shapes(lags: Array, n: int) -> list[tuple[dict[str, Any], Array]]:
         if period < 2.1 * step:
             continue
         for damping in _DAMPINGS:
-            swing = np.array([oscillation(t, 2.0 * pi / period, damping)[0] for t in far.tolist()])
+            w, s = 2.0 * pi / period, 2.0 * pi / period * sqrt(1.0 - damping**2)
+            swing = np.exp(-damping * w * far) * (np.cos(s * far) + damping * w / s * np.sin(s * far))
             found.append(({"kind": "gauss_markov_2", "period_s": period, "damping": damping}, swing))
     weight = np.concatenate([[1.0], 2.0 * (1.0 - np.arange(1, n) / n)]) / n
-    return [(shape, rho[: len(lags)] - float(weight @ rho)) for shape, rho in found]
+    return [(shape, rho[lags] - float(weight @ rho)) for shape, rho in found]
 
 
 def fitted(series: Sequence[ErrorSeries]) -> Fit:
     """Fit the processes to the errors of several runs."""
     rate, found = series[0].rate, autocovariance(series)
-    lags = np.arange(len(found)) / rate
+    # All near lags, and ever fewer of the far ones, which say the same as their neighbours.
+    kept_lags = np.unique(
+        np.concatenate([np.arange(min(25, len(found))), np.geomspace(1, len(found) - 1, 40)]).astype(int)
+    )
+    found, lags = found[kept_lags], kept_lags / rate
     n = round(float(np.median([s.duration for s in series])) * rate)
-    shapes = _shapes(lags, n)
+    shapes = _shapes(kept_lags, 1.0 / rate, n)
     white = np.zeros(len(lags))
     white[0] = 1.0
     near = np.sqrt(1.0 / (1.0 + lags / 10.0))[:, None]  # near lags are known better, and matter more

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -52,8 +53,8 @@ class InstrumentRealism:
         Autocovariance at multiples of ``1 / rate``; None for an IMU.
     rates : (float, float)
         Readings a second, real and simulated [Hz].
-    fit : Fit or None
-        Processes that fit the real error; None for an IMU.
+    series : sequence of ErrorSeries
+        The real errors; empty for an IMU.
     """
 
     name: str
@@ -64,7 +65,12 @@ class InstrumentRealism:
     real: Array | None = None
     simulated: Array | None = None
     rates: tuple[float, float] = (1.0, 1.0)
-    fit: Fit | None = None
+    series: Sequence[ErrorSeries] = ()
+
+    @cached_property
+    def fit(self) -> Fit | None:
+        """Processes that fit the real error; None for an IMU."""
+        return fitted(self.series) if self.series else None
 
     def telling(self, most: int = 3) -> list[tuple[str, float]]:
         """The features by which the simulation is known best, with the area under the ROC curve of each alone."""
@@ -211,7 +217,7 @@ def compared(name: str, kind: Kind, real: Sequence[ErrorSeries], simulated: Sequ
     ours, theirs = windows_of(real), windows_of(simulated)
     return InstrumentRealism(
         name, judge(ours, theirs), feature_names(kind.errors), (len(ours.values), len(theirs.values)), kind,
-        autocovariance(real), autocovariance(simulated), (real[0].rate, simulated[0].rate), fitted(real),
+        autocovariance(real), autocovariance(simulated), (real[0].rate, simulated[0].rate), real,
     )  # fmt: skip
 
 

@@ -13,6 +13,7 @@ from simnav.estimators.models.factors_about_truth import FactorsAboutTruth
 from simnav.estimators.models.inertial import InertialModel
 from simnav.estimators.models.state_blocks import StateBlocks
 from simnav.geometry.rotation import dcm_from_rpy
+from simnav.kinds import INSTRUMENTS as INSTRUMENTS_BY_KIND
 from simnav.kinds import KINDS
 from simnav.recording import Recording
 from simnav.scenario import Scenario, parse
@@ -367,11 +368,11 @@ def test_two_processes_have_two_names():
 
 
 def test_an_instrument_that_reads_another_one_names_no_processes():
-    text = (
-        f"{HEAD}[instruments.gnss_raw]\nlatitude_deg = 54.0\nlongitude_deg = 8.0\n"
-        "sigma_pseudorange_m = 1.0\nsigma_range_rate_m_s = 0.1\n"
-        '[instruments.gnss_receiver]\nobservations = "gnss_raw"\nsigma_m = 1.0\n'
-        '[[instruments.gnss_receiver.error]]\nkind = "white"\nsigma_m = 1.0\n'
-    )
+    table = {
+        "kind": "gnss_receiver",
+        "observations": "gnss_raw",
+        "sigma_m": 1.0,
+        "error": [{"kind": "white", "sigma_m": 1.0}],
+    }
     with pytest.raises(SpecError, match="which it reads; name the processes there"):
-        parse(text)
+        INSTRUMENTS_BY_KIND.items()["gnss_receiver"].from_toml(table)
