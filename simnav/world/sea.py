@@ -300,8 +300,8 @@ class Waves:
     def _components(self) -> tuple[Array, Array]:
         return components(self.sea, self._seed, self.depth)
 
-    def elevation(self, position: Array, time: Array) -> Array:
-        """Elevation of the surface.
+    def elevation(self, position: Array, time: Array, depth: Array | None = None) -> Array:
+        """Elevation of the surface, or the water column that a pressure sensor below it takes for it.
 
         The waves travel through water at rest. A current does not carry them along here.
 
@@ -311,6 +311,8 @@ class Waves:
             Latitude, longitude [rad] and height [m]; the height does not matter.
         time : (n,) array
             Time since the start of the run [s].
+        depth : (n,) array, optional
+            Depth of the sensors [m], by which each component is less: times exp(-k z).
 
         Returns
         -------
@@ -323,6 +325,9 @@ class Waves:
         elevation = np.zeros(len(time))
         for k in range(table.shape[1]):
             phase = np.arctan2(start[1, k], start[0, k])
-            elevation += np.cos(table[0, k] * time - table[1, k] * north - table[2, k] * east + phase)
+            wave = np.cos(table[0, k] * time - table[1, k] * north - table[2, k] * east + phase)
+            if depth is not None:
+                wave *= np.exp(-np.hypot(table[1, k], table[2, k]) * depth)
+            elevation += wave
         elevation *= amplitude
         return elevation
