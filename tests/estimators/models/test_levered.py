@@ -126,7 +126,7 @@ def test_filters_windows_and_smoothers_find_them(scenario: Scenario, recording: 
     trials = {name: run_trial(make(name), recording) for name in rows}
     scores = {name: nees(trial, recording) for name, trial in trials.items()}
     for name in ("ukf", "iekf", "sw-fgo"):
-        assert scores[name][0] == pytest.approx(scores["ekf"][0], rel=0.03), name
+        assert scores[name][0] == pytest.approx(scores["ekf"][0], rel=0.05), name
     assert scores["ekf"][0] < 0.4  # the antenna is 2 m off, one sigma
     for name, trial in trials.items():
         assert 0.1 < scores[name][1] < 4.0, name
