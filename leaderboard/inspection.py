@@ -27,7 +27,7 @@ from .requests import (
     SealRequest,
     VerifyRequest,
 )
-from .results import requested
+from .results import requested, scenario_files
 
 if TYPE_CHECKING:
     from simnav.leaderboard.campaign.rescoring import Rescored
@@ -64,16 +64,17 @@ def rank(request: RankRequest) -> Ranking:
         require_lower(request.score, "a ranking is by errors")
     wanted = RANKED_SCORES | ({request.score} if request.score else set())
     asked: Mapping[str, Sequence[int]] = {}
-    results = request.results
+    results, tracks = request.results, dict(request.tracks or {})
     if results is None or isinstance(results, (str, os.PathLike)):
         given = results_of(results, scores=wanted)
         asked = requested.read(results)
+        tracks = {**scenario_files.tracks(results), **tracks}
     else:
         given = list(results)
     if not all(isinstance(r, Result) for r in given):
         raise RequestError("a folder of results is wanted, or results; 'simnav.merge' puts several folders together")
     require_score(request.score, given)
-    return rank(given, score=request.score, tracks=request.tracks, requested=asked)
+    return rank(given, score=request.score, tracks=tracks, requested=asked)
 
 
 @call(RescoreRequest)

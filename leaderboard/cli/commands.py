@@ -208,7 +208,7 @@ class ReferenceCommand:
 @request
 class VerifyCommand(VerifyRequest, BundleOptions):
     """Check results or a submission, and repeat some of the runs, bit for bit.
-    The exit code is 0 if all holds, 3 if it holds but some fields differ from here and are only claimed, 1 otherwise.
+    The exit code is 0 if all holds, 3 if nothing speaks against it but something cannot be checked here, 1 otherwise.
     """
 
 
