@@ -112,9 +112,13 @@ class SimulateCommand(RecordRequest):
 
 @request
 class CheckCommand:
-    """Test an estimator against the contract: causality, shapes, determinism, missing instruments."""
+    """Test an estimator against the contract: causality, shapes, determinism, missing instruments.
+    Of a scenario with a log (a TOML file): read all recordings, and show what stops or disturbs a run.
+    """
 
-    estimator: str = option(help="my_filter.py, my_filter.py:MyFilter or a name.", argument=True, metavar="FILE")
+    estimator: str = option(
+        help="my_filter.py, my_filter.py:MyFilter or a name; or my_log.toml.", argument=True, metavar="FILE"
+    )
     parameters: Parameters = option(
         "--set", default=None, metavar="NAME=VALUE", help="Value of a parameter of the estimators."
     )
