@@ -26,6 +26,7 @@ from simnav.leaderboard.requests import (
     CampaignRequest,
     CiteRequest,
     EvaluateRequest,
+    ExportRequest,
     MergeRequest,
     Parameters,
     RecordRequest,
@@ -34,6 +35,7 @@ from simnav.leaderboard.requests import (
     RobustnessRequest,
     RunRequest,
     Scenarios,
+    ScoreRequest,
     SealRequest,
     SweepRequest,
     TuneRequest,
@@ -99,6 +101,14 @@ class RunCommand(RunRequest):
         least=0.01,
         help="Alert limit of the Stanford diagrams in metres; IMO A.915(22): 25, in ports 2.5.",
     )
+
+
+@request
+class ScoreCommand(ScoreRequest):
+    """Score estimates that were made elsewhere, with the scores and the page of a run."""
+
+    _: KW_ONLY
+    plot: Path | None = option(default=None, help=_FIGURE)
 
 
 @request
@@ -257,6 +267,8 @@ COMMANDS: Mapping[str, tuple[type[Any], str]] = {
     "show": (ShowCommand, "show"),
     "run": (RunCommand, "run"),
     "simulate": (SimulateCommand, "simulate"),
+    "score": (ScoreCommand, "score"),
+    "export": (ExportRequest, "export"),
     "check": (CheckCommand, "check"),
     "bench": (BenchCommand, "bench"),
     "new-estimator": (NewEstimatorCommand, "new_estimator"),
@@ -284,6 +296,7 @@ COMMANDS: Mapping[str, tuple[type[Any], str]] = {
 HEADINGS: Mapping[str, Sequence[str]] = {
     "Every day": ("list", "show", "run", "evaluate", "check", "new-estimator", "simulate", "sweep", "campaign",
                   "leaderboard"),
+    "Logs and programs of others": ("score", "export"),
     "Study and publish": ("tune", "train", "bench", "robustness", "bound", "allan", "reproduce", "claim", "rescore",
                           "merge", "submit", "verify", "seal", "cite"),
     "Maintain": ("standard", "reference", "warmup"),
