@@ -30,6 +30,7 @@ __all__ = [
     "CiteRequest",
     "CostsRequest",
     "EvaluateRequest",
+    "ExportRequest",
     "MergeRequest",
     "RankRequest",
     "RecordRequest",
@@ -37,6 +38,7 @@ __all__ = [
     "RescoreRequest",
     "RobustnessRequest",
     "RunRequest",
+    "ScoreRequest",
     "SealRequest",
     "SweepRequest",
     "TuneRequest",
@@ -61,6 +63,7 @@ CAMPAIGN_PROGRESS = "Called with a `simnav.leaderboard.campaign.campaign.Progres
 FOLDER = "Folder that a campaign wrote."
 _PROFILE = "What is run: smoke, quick, standard, full, robustness, or a TOML file of your own."
 _OWN_SCENARIOS = "TOML files of scenarios outside the catalogue."
+_SEALED_RUNS = "Derive the seeds from the secret in this file, as 'campaign --sealed' does."
 _FIRST_SEED = "Seed of the first run; the others count up."
 
 
@@ -70,6 +73,43 @@ class RecordRequest:
 
     scenario: ScenarioLike = option(help=_SCENARIO, more=_SCENARIO_MORE, argument=True, metavar="SCENARIO")
     seed: int = option(default=0, help="Seed of the run.", least=0)
+
+
+@request
+class ScoreRequest:
+    """Score estimates that were made elsewhere, with the scores and the page of a run."""
+
+    scenario: ScenarioLike = option(help=_SCENARIO, more=_SCENARIO_MORE, argument=True, metavar="SCENARIO")
+    files: Iterable[PathLike] = option(
+        help="Files of estimates, CSV or TUM; see docs/how-to/connect-a-program.md.",
+        argument=True,
+        metavar="FILES",
+        cli=list[Path],
+    )
+    _: KW_ONLY
+    seed: int = option(default=0, help="Seed of the run; with --sealed, its number.", least=0)
+    sealed: PathLike | None = option("--sealed", default=None, metavar="KEYFILE", help=_SEALED_RUNS)
+
+
+@request
+class ExportRequest:
+    """Write what an estimator receives, for programs of others: measurements, start and datasheets."""
+
+    scenarios: Scenarios = option(
+        help="Names, tracks or TOML files.", argument=True, metavar="SCENARIOS", cli=list[str]
+    )
+    output: PathLike = option("--output", "-o", help="File or folder to write; of several runs a folder.")
+    _: KW_ONLY
+    form: str = option("--format", default="csv", help="Format, such as csv, npz, gpx, kml, tum, nmea or mcap.")
+    seed: int = option(default=0, help="Seed of the first run; the others count up.", least=0)
+    runs: int = option("--runs", "-n", default=1, help="Seeds of each scenario.", least=1)
+    truth: bool = option("--truth", default=False, help="Write truth and fault labels, too.")
+    blind: bool = option(
+        "--blind",
+        default=False,
+        help="Neither truth, nor labels, nor seeds: for estimates that 'campaign --external' ranks; with --sealed.",
+    )
+    sealed: PathLike | None = option("--sealed", default=None, metavar="KEYFILE", help=_SEALED_RUNS)
 
 
 @request
@@ -143,6 +183,13 @@ class CampaignRequest(CampaignOptions):
         metavar="KEYFILE",
         help="Derive the seeds from the secret in this file.",
         more="Results carry its hash, and `verify` repeats them.",
+    )
+    external: PathLike | None = option(
+        "--external",
+        default=None,
+        metavar="FOLDER",
+        help="Also rank estimates that were made elsewhere: FOLDER/NAME/SCENARIO-RUN.csv or .tum.",
+        more="They are marked external: not confined, and without cost.",
     )
     oracle: bool = option(
         default=True, help="Run the oracles on simulated scenarios, too: the reference of a board, not ranked."

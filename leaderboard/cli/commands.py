@@ -26,6 +26,7 @@ from simnav.leaderboard.requests import (
     CampaignRequest,
     CiteRequest,
     EvaluateRequest,
+    ExportRequest,
     MergeRequest,
     Parameters,
     RecordRequest,
@@ -34,6 +35,7 @@ from simnav.leaderboard.requests import (
     RobustnessRequest,
     RunRequest,
     Scenarios,
+    ScoreRequest,
     SealRequest,
     SweepRequest,
     TuneRequest,
@@ -102,6 +104,14 @@ class RunCommand(RunRequest):
 
 
 @request
+class ScoreCommand(ScoreRequest):
+    """Score estimates that were made elsewhere, with the scores and the page of a run."""
+
+    _: KW_ONLY
+    plot: Path | None = option(default=None, help=_FIGURE)
+
+
+@request
 class SimulateCommand(RecordRequest):
     """Write the recording of one run: measurements, labels and truth."""
 
@@ -112,9 +122,13 @@ class SimulateCommand(RecordRequest):
 
 @request
 class CheckCommand:
-    """Test an estimator against the contract: causality, shapes, determinism, missing instruments."""
+    """Test an estimator against the contract: causality, shapes, determinism, missing instruments.
+    Of a scenario with a log (a TOML file): read all recordings, and show what stops or disturbs a run.
+    """
 
-    estimator: str = option(help="my_filter.py, my_filter.py:MyFilter or a name.", argument=True, metavar="FILE")
+    estimator: str = option(
+        help="my_filter.py, my_filter.py:MyFilter or a name; or my_log.toml.", argument=True, metavar="FILE"
+    )
     parameters: Parameters = option(
         "--set", default=None, metavar="NAME=VALUE", help="Value of a parameter of the estimators."
     )
@@ -253,6 +267,8 @@ COMMANDS: Mapping[str, tuple[type[Any], str]] = {
     "show": (ShowCommand, "show"),
     "run": (RunCommand, "run"),
     "simulate": (SimulateCommand, "simulate"),
+    "score": (ScoreCommand, "score"),
+    "export": (ExportRequest, "export"),
     "check": (CheckCommand, "check"),
     "bench": (BenchCommand, "bench"),
     "new-estimator": (NewEstimatorCommand, "new_estimator"),
@@ -280,6 +296,7 @@ COMMANDS: Mapping[str, tuple[type[Any], str]] = {
 HEADINGS: Mapping[str, Sequence[str]] = {
     "Every day": ("list", "show", "run", "evaluate", "check", "new-estimator", "simulate", "sweep", "campaign",
                   "leaderboard"),
+    "Logs and programs of others": ("score", "export"),
     "Study and publish": ("tune", "train", "bench", "robustness", "bound", "allan", "reproduce", "claim", "rescore",
                           "merge", "submit", "verify", "seal", "cite"),
     "Maintain": ("standard", "reference", "warmup"),
