@@ -23,6 +23,7 @@ from .requests import (
     ExportRequest,
     MergeRequest,
     RankRequest,
+    RealismRequest,
     ReproduceRequest,
     RescoreRequest,
     ScoreRequest,
@@ -42,10 +43,12 @@ if TYPE_CHECKING:
     from simnav.leaderboard.results.result import Result
 
     from .allan import AllanReport
+    from .realism.report import RealismReport
     from .single_run import RunReport
 
 __all__ = [
-    "allan", "bound", "cite", "export", "merge", "rank", "reproduce", "rescore", "score_files", "seal", "verify",
+    "allan", "bound", "cite", "export", "merge", "rank", "realism", "reproduce", "rescore", "score_files", "seal",
+    "verify",
 ]  # fmt: skip
 
 
@@ -282,6 +285,28 @@ def export(request: ExportRequest) -> list[Path]:
                 target.parent.mkdir(parents=True, exist_ok=True)
                 written += write("recording", request.form, told, target)
     return written
+
+
+@call(RealismRequest)
+def realism(request: RealismRequest) -> RealismReport:
+    """Compare the errors of simulated instruments with those of a recording.
+
+    Returns
+    -------
+    simnav.leaderboard.realism.report.RealismReport
+
+    Raises
+    ------
+    RequestError
+        If scikit-learn is not installed, the log is absent, or there is no instrument that both have.
+    """
+    from .realism.report import realism_of
+
+    runs, seed = whole_number("runs", request.runs, 3), whole_number("seed", request.seed, 0)
+    given = request.instrument
+    names = given.split(",") if isinstance(given, str) else [n for part in given or () for n in part.split(",")]
+    with mistakes():
+        return realism_of(scenario_of(request.scenario), scenario_of(request.log), names, runs, seed)
 
 
 @call(VerifyRequest)

@@ -33,6 +33,7 @@ __all__ = [
     "ExportRequest",
     "MergeRequest",
     "RankRequest",
+    "RealismRequest",
     "RecordRequest",
     "ReproduceRequest",
     "RescoreRequest",
@@ -505,6 +506,27 @@ class AllanRequest:
     duration: float = option(default=21600.0, least=1.0, help="Seconds that are simulated.")
     start: float = option(default=0.0, least=0.0, help="Of a log: begin here, in seconds.")
     end: float | None = option(default=None, least=0.0, help="Of a log: end here, in seconds. Default: at its end.")
+
+
+@request
+class RealismRequest:
+    """Whether the simulated errors of instruments are like those of a recording.
+
+    A logistic classifier is trained on windows of 60 s of the errors, real and simulated, and tried on recordings that
+    it has not seen. It needs scikit-learn (the extra ``realism``).
+    """
+
+    scenario: ScenarioLike = option(help=_SCENARIO, more=_SCENARIO_MORE, argument=True, metavar="SCENARIO")
+    log: ScenarioLike = option(help="A recorded scenario, likewise.", more=_SCENARIO_MORE, argument=True, metavar="LOG")
+    _: KW_ONLY
+    instrument: Sequence[str] | str | None = option(
+        "--instrument",
+        default=None,
+        help="Names of instruments, separated by commas, or imu. Default: all but the imu.",
+        cli=list[str] | None,
+    )
+    runs: int = option("--runs", "-n", default=12, least=3, help="Number of simulated runs.")
+    seed: int = option(default=0, least=0, help="Seed of the first of them.")
 
 
 @request

@@ -29,6 +29,7 @@ from simnav.leaderboard.requests import (
     ExportRequest,
     MergeRequest,
     Parameters,
+    RealismRequest,
     RecordRequest,
     ReproduceRequest,
     RescoreRequest,
@@ -203,6 +204,18 @@ class AllanCommand(AllanRequest):
 
 
 @request
+class RealismCommand(RealismRequest):
+    """Compare the errors of simulated instruments with those of a recording: can a classifier tell them apart?
+
+    It also prints the processes that would fit the real errors best, as tables of a scenario file.
+    """
+
+    _: KW_ONLY
+    plot: Path | None = option(default=None, help=_FIGURE)
+    fit: Path | None = option("--fit", default=None, help="Write the processes that fit to this TOML file.")
+
+
+@request
 class ReferenceCommand:
     """Run the oracles over many seeds, and store the figures that errors are divided by."""
 
@@ -280,6 +293,7 @@ COMMANDS: Mapping[str, tuple[type[Any], str]] = {
     "warmup": (WarmupCommand, "warmup"),
     "bound": (BoundCommand, "bound"),
     "allan": (AllanCommand, "allan"),
+    "realism": (RealismCommand, "realism"),
     "reproduce": (ReproduceRequest, "reproduce"),
     "claim": (ClaimCommand, "claim"),
     "reference": (ReferenceCommand, "reference"),
@@ -297,8 +311,8 @@ HEADINGS: Mapping[str, Sequence[str]] = {
     "Every day": ("list", "show", "run", "evaluate", "check", "new-estimator", "simulate", "sweep", "campaign",
                   "leaderboard"),
     "Logs and programs of others": ("score", "export"),
-    "Study and publish": ("tune", "train", "bench", "robustness", "bound", "allan", "reproduce", "claim", "rescore",
-                          "merge", "submit", "verify", "seal", "cite"),
+    "Study and publish": ("tune", "train", "bench", "robustness", "bound", "allan", "realism", "reproduce", "claim",
+                          "rescore", "merge", "submit", "verify", "seal", "cite"),
     "Maintain": ("standard", "reference", "warmup"),
 }  # fmt: skip
 
