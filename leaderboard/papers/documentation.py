@@ -2,7 +2,7 @@
 
 ``python -m simnav.leaderboard.papers.documentation [FOLDER]`` writes them; with a folder, the output of ``simnav
 reproduce PAPER --until-decided``, it stores the results of that folder first. Each page has a marked block for each of
-these: ``citation``, ``claims``, ``tables`` and ``contents``; the overview has ``overview``. The figures are in
+these: ``citation``, ``claims``, ``settings``, ``tables`` and ``contents``; the overview has ``overview``. The figures are in
 ``docs/papers/figures``. The text between the marks is replaced,
 and everything else is written by hand.
 """
@@ -21,7 +21,7 @@ from .claims.stored import answers_of, computed_on
 from .contents import contents
 from .figures import Drawn, write_figures
 from .paper import KINDS_OF_ROWS, Figure, Paper
-from .report import Sheet, sheets, single_run_sentence, verdicts
+from .report import Sheet, settings_sheet, sheets, single_run_sentence, verdicts
 from .reproduction import Reproduction, fill, find_method, load_results
 from .sequential import LIMIT
 from .stored import provenance, save, shipped_reproduction
@@ -102,6 +102,7 @@ def blocks(paper: Paper) -> dict[str, str]:
     return {
         "citation": _citation(paper),
         "claims": _claims(paper),
+        "settings": "\n\n".join(_markdown(settings_sheet(paper))),
         "tables": "\n\n".join(text for text in tables if text),
         "contents": _contents(paper),
     }

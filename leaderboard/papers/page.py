@@ -18,7 +18,7 @@ from simnav.leaderboard.site.pages import STATIC, TEMPLATES, environment
 
 from . import PAPERS
 from .comparison import RULES
-from .report import Sheet, Whereabouts, sheets, summary, whereabouts
+from .report import Sheet, Whereabouts, settings_sheet, sheets, summary, whereabouts
 
 if TYPE_CHECKING:
     from .figures import Drawn
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 __all__ = ["PaperPage", "pages_in", "write"]
 
-_FORMAT = 3  # of the document
+_FORMAT = 4  # of the document
 
 
 @dataclass(frozen=True)
@@ -60,6 +60,7 @@ class _Document:
     full: str
     notes: list[str]
     claims: list[Sheet]
+    settings: list[Sheet]
     tables: list[Sheet]
     figures: list[_Figure]
     contents: list[Whereabouts]
@@ -211,6 +212,7 @@ def _document(found: Reproduction, drawn: Sequence[Drawn], folder: Path | None =
         full=f"simnav reproduce {paper.key} --until-decided",
         notes=list(paper.notes),
         claims=claim_sheets(answers),
+        settings=[settings_sheet(paper)] if paper.settings else [],
         tables=list(sheets(found)),
         figures=[
             *(_Figure("", c.title, c.path.name, c.caption, c.width, c.height, []) for c in of_claims),

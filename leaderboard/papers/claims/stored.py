@@ -1,7 +1,8 @@
 """The answers that come with simnav: one small JSON file for each claim, with the ratio of every seed.
 
-``python -m simnav.leaderboard.papers.claims.stored [CLAIM...]`` computes them anew, all or those that are named, and
-keeps the runs in ``results/claims``. A page needs these files only.
+``python -m simnav.leaderboard.papers.claims.stored [--judgement] [CLAIM...]`` computes them anew, all or those that are
+named, and keeps the runs in ``results/claims``. With ``--judgement`` values that the stored search has are not searched
+again. A page needs these files only.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ __all__ = ["FOLDER", "answers_of", "computed_on", "read", "save"]
 
 #: Where the files are.
 FOLDER = Path(__file__).with_name("results")
-_FORMAT = 1
+_FORMAT = 2
 
 
 def save(answer: Answer, folder: Path = FOLDER) -> Path:
@@ -84,7 +85,9 @@ if __name__ == "__main__":
     from .declared import CLAIMS
     from .search import search
 
+    given = [a for a in sys.argv[1:] if a != "--judgement"]
     for claim in CLAIMS:
-        if len(sys.argv) < 2 or claim.name in sys.argv[1:]:
-            made = search(claim, claim.dials, Path("results") / "claims", runs=6, judged=12)
-            print(f"{claim.name}: {made.sentence_of_verdict} ({save(made)})")
+        if not given or claim.name in given:
+            known = read(claim.name) if "--judgement" in sys.argv else None
+            made = search(claim, claim.dials, Path("results") / "claims", runs=6, judged=12, known=known)
+            print(f"{claim.name}: {made.sentence_of_verdict} ({save(made)})", flush=True)
