@@ -32,9 +32,7 @@ _OPEN_LOOP = (
     "this KF is in open loop, so that its inertial navigation is never corrected. With gyros of 3 deg/h its error leaves "
     "the range of the linear model within 100 minutes"
 )
-_STATES = (
-    "this UKF has 15 states, among them the biases of the IMU. The paper's filters have nine states and no biases"
-)
+_STATES = "this UKF has 15 states, among them the biases of the IMU. The paper's filters have nine states and no biases"
 _MEMORY = "our figure includes the libraries and the record of the run, which are the same for all methods"
 _VELOCITY = "the nine-state model has no IMU biases, and the paper's model has a DVL sigma of 0.1 m/s"
 _DISTURBED = "the sea trial is not public: the size of the GNSS errors near the shore is our choice"
@@ -71,7 +69,17 @@ _SHORT = {
 _FACTORS = {(role, model): _SHORT.get(f"{role}, {model}", f"{role}, {model}") for model in _MODELS for role in _ROLES}
 
 _FOUR = ("EKF", "UKF", "SW-FGO", "GA-FGO")
-_ALL = ("KF", "EKF", "EKF, 15 states", "UKF", "UKF, 15 states", "SW-FGO", "SW-FGO, 15 states", "GA-FGO", "GA-FGO, 15 states")
+_ALL = (
+    "KF",
+    "EKF",
+    "EKF, 15 states",
+    "UKF",
+    "UKF, 15 states",
+    "SW-FGO",
+    "SW-FGO, 15 states",
+    "GA-FGO",
+    "GA-FGO, 15 states",
+)
 _RIVALS = ("EKF, 15 states", "SW-FGO, 15 states", "GA-FGO, 15 states", "Huber", "Tukey", "DCS", "GNC")
 
 

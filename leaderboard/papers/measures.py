@@ -70,7 +70,9 @@ def value_of(result: Result, name: str) -> float:
         value = float(result.peak_memory)
     elif name in ("east_over_north", "down_over_horizontal"):
         north, east = (s.get(axis, math.nan) for axis in _NORTH_EAST)
-        top, bottom = (east, north) if name == "east_over_north" else (s.get("vertical_rmse", math.nan), min(north, east))
+        top, bottom = (
+            (east, north) if name == "east_over_north" else (s.get("vertical_rmse", math.nan), min(north, east))
+        )
         value = top / bottom if bottom > 0.0 else math.nan
     else:
         value = s.get(name, math.nan)

@@ -79,15 +79,25 @@ def _document(name: str, folder: Path) -> dict[str, object] | None:
     return found
 
 
-if __name__ == "__main__":
-    import sys
+def main() -> None:
+    """The command of the module."""
+    import argparse
 
-    from .declared import CLAIMS
+    from .declared import CLAIMS, claim_of
     from .search import search
 
-    given = [a for a in sys.argv[1:] if a != "--judgement"]
-    for claim in CLAIMS:
-        if not given or claim.name in given:
-            known = read(claim.name) if "--judgement" in sys.argv else None
-            made = search(claim, claim.dials, Path("results") / "claims", runs=6, judged=12, known=known)
-            print(f"{claim.name}: {made.sentence_of_verdict} ({save(made)})", flush=True)
+    parser = argparse.ArgumentParser(prog="python -m simnav.leaderboard.papers.claims.stored")
+    parser.add_argument("claims", nargs="*", metavar="CLAIM", help="default: all")
+    parser.add_argument("--judgement", action="store_true", help="do not search again what the stored answer has")
+    parser.add_argument("--runs", type=int, default=6, help="seeds of the search")
+    parser.add_argument("--judged", type=int, default=12, help="first number of seeds of the judgement")
+    parser.add_argument("--output", type=Path, default=Path("results") / "claims", help="folder of the runs")
+    given = parser.parse_args()
+    for claim in [claim_of(name) for name in given.claims] or CLAIMS:
+        known = read(claim.name) if given.judgement else None
+        made = search(claim, claim.dials, given.output, runs=given.runs, judged=given.judged, known=known)
+        print(f"{claim.name}: {made.sentence_of_verdict} ({save(made)})", flush=True)
+
+
+if __name__ == "__main__":
+    main()
