@@ -41,8 +41,8 @@ _GAINS = {
 _SMOOTHED = {"north": 0.7631, "east": 0.8324}
 _COMPASS = "the paper's compass is not known; ours has a bias of 0.3 deg, of which the smoother estimates a part"
 _LESS = (
-    "a federated filter that resets its local filters is as good as the central one. Against one that does not reset them "
-    "the gain is there, on the second set of intervals (see the claims)"
+    "a federated filter that resets its local filters is as good as the central one. Against one that does not reset "
+    "them the gain is there, on the second set of intervals (see the claims)"
 )
 _MORE = "the paper does not print its information-sharing factors or the time of its fusion"
 _TERRAIN = (
@@ -76,7 +76,7 @@ def _claims() -> tuple[Row, ...]:
 
 
 def _as_printed() -> tuple[Row, ...]:
-    """The gains on both sets of intervals, with the IMU's random part as white noise, against both federated filters."""
+    """The gains with white IMU noise, on both sets of intervals, against both federated filters."""
     rows: list[Row] = []
     for scenario in (_WHITE, _SPARSE_WHITE):
         for than, lower in (("Federated KF", _LESS), ("Federated KF, no reset", _MORE)):
@@ -242,8 +242,8 @@ PAPER = Paper(
         "The paper's Table 2 is missing from the text at hand; the gains are those of its text.",
         "The second set of intervals was driven on land. The text gives only the range of its smoothed errors, and the "
         "RMSE is compared with it as a bound.",
-        "The random part of the IMU, 0.01 deg/h and 10 ug, is a slow bias in auv-survey. The paper calls it white noise; "
-        "as the noise of each sample it is 600 times smaller than the random walks of such an IMU.",
+        "The random part of the IMU, 0.01 deg/h and 10 ug, is a slow bias in auv-survey. The paper calls it white "
+        "noise; as the noise of each sample it is 600 times smaller than the random walks of such an IMU.",
     ),
     settings=_SETTINGS,
     variants={_WHITE: (_SCENARIO, _white_imu), _SPARSE_WHITE: (_SPARSE, _white_imu)},

@@ -2,9 +2,8 @@
 
 ``python -m simnav.leaderboard.papers.documentation [FOLDER]`` writes them; with a folder, the output of ``simnav
 reproduce PAPER --until-decided``, it stores the results of that folder first. Each page has a marked block for each of
-these: ``citation``, ``claims``, ``settings``, ``tables`` and ``contents``; the overview has ``overview``. The figures are in
-``docs/papers/figures``. The text between the marks is replaced,
-and everything else is written by hand.
+these: ``citation``, ``claims``, ``settings``, ``tables`` and ``contents``; the overview has ``overview``. The figures
+are in ``docs/papers/figures``. The text between the marks is replaced, and everything else is written by hand.
 """
 
 from __future__ import annotations

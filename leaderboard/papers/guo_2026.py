@@ -29,8 +29,8 @@ __all__ = ["CLAIMS", "PAPER"]
 _SCENARIO, _BIAS = "coastal-voyage", "window-bias"
 _COST = "the two figures come from different computers and programming languages"
 _OPEN_LOOP = (
-    "this KF is in open loop, so that its inertial navigation is never corrected. With gyros of 3 deg/h its error leaves "
-    "the range of the linear model within 100 minutes"
+    "this KF is in open loop, so that its inertial navigation is never corrected. With gyros of 3 deg/h its error "
+    "leaves the range of the linear model within 100 minutes"
 )
 _STATES = "this UKF has 15 states, among them the biases of the IMU. The paper's filters have nine states and no biases"
 _MEMORY = "our figure includes the libraries and the record of the run, which are the same for all methods"
@@ -300,8 +300,8 @@ PAPER = Paper(
     notes=(
         "The paper's figures are of one sea trial that is not public. Ours are of a simulated voyage with the same "
         "length, instruments and time of the degradation.",
-        "The paper's methods have nine states and fixed sigmas: ekf-9, sw-fgo-paper and ga-fgo-paper stand for them, and "
-        "kf-9 and ukf-9 are its KF, with feedback, and its UKF. The same methods with 15 states stand beside them.",
+        "The paper's methods have nine states and fixed sigmas: ekf-9, sw-fgo-paper and ga-fgo-paper stand for them, "
+        "and kf-9 and ukf-9 are its KF, with feedback, and its UKF. The same methods with 15 states stand beside them.",
         "Memory is the largest amount that the estimator's process takes beyond its amount at the start.",
     ),
     settings=_SETTINGS,

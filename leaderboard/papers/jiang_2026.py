@@ -40,21 +40,21 @@ _FILTERS = (
 _HEADING = "the noise of the paper's compass is not known; ours has 0.5 deg of noise and of bias, which is estimated"
 _CURRENT = "a log measures the speed through the water. Our ship sails in a current of 0.25 m/s; the paper names none"
 _DEAD_RECKONING = (
-    "the errors of the paper's filters are those of a filter that stands still in the outage (see its row): in 60 s the "
-    "ship makes 390 m at 6.5 m/s. A filter with compass and log drifts by the errors of its estimates of current and "
-    "biases"
+    "the errors of the paper's filters are those of a filter that stands still in the outage (see its row): in 60 s "
+    "the ship makes 390 m at 6.5 m/s. A filter with compass and log drifts by the errors of its estimates of current "
+    "and biases"
 )
 _STANDING = "our ship is slower in these 60 s than 500 m ask for; its speed is our choice"
 _CONTRADICTION = (
-    "the paper has two figures for the same runs: 0.04 to 0.05 deg in Figure 7, and 0.22 to 0.25 deg in Table 3. No run "
-    "can give both. Ours has a compass with 0.5 deg of noise and of bias"
+    "the paper has two figures for the same runs: 0.04 to 0.05 deg in Figure 7, and 0.22 to 0.25 deg in Table 3. No "
+    "run can give both. Ours has a compass with 0.5 deg of noise and of bias"
 )
 _LARGEST = "the noise of GNSS and the motions are our choice, because the paper's tables of them are missing"
 _SIGMA_POINTS = "with speed and heading measured the model is almost linear, so EKF and UKF give the same result"
 _KNOWN = (
-    "the noise is as the datasheet says, so there is little to adapt to. The gain is there if the filter is told a fifth "
-    "of the true noise and the network has learned the true one, or if the noise grows for a part of the run (see the "
-    "claims)"
+    "the noise is as the datasheet says, so there is little to adapt to. The gain is there if the filter is told a "
+    "fifth of the true noise and the network has learned the true one, or if the noise grows for a part of the run "
+    "(see the claims)"
 )
 _PRESENT = "a network that sees only the newest innovation cannot tell an interval of larger noise from chance"
 _NOISIER = "the gain depends on how much the noise grows, which is our choice"
@@ -353,7 +353,7 @@ def _claim(name: str, motion: str, scenario: str) -> Claim:
             Dial("both-told", "the true GNSS noise, as a multiple of what both are told (4 m),", "", told, _both_told,
                  1.0, "for comparison: the network is told the wrong noise as well, and learns its level"),
             Dial("both-told-as-trained", "the same, with a network that takes the datasheet's noise for granted", "",
-                 told, _as_trained, why="for comparison: anfis-fgo with level=datasheet, the network as it was trained"),
+                 told, _as_trained, why="for comparison: anfis-fgo with level=datasheet, the network as trained"),
             scenario_dial("noise", "the GNSS noise for 200 s of the run, as a multiple of the datasheet's,", "",
                           (1.0, 3.0, 5.0, 10.0), _noise_step, ours=1.0,
                           why="the text says that the noise of its instruments is stable, and prints no size"),

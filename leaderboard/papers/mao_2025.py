@@ -22,8 +22,8 @@ _BETTER = (
 )
 _SEEDS = "the paper shows one run; ours is the mean over many runs"
 _FIXES = (
-    "the paper does not print how noisy its fixes are, nor when; ours are five times as noisy for 130 of 320 s, and the "
-    "gain grows with this noise (see the claims)"
+    "the paper does not print how noisy its fixes are, nor when; ours are five times as noisy for 130 of 320 s, and "
+    "the gain grows with this noise (see the claims)"
 )
 _SAME_INNOVATIONS = (
     "the newest state of a window predicts the next fix as a filter does. The innovations are the same, and so are the "
@@ -242,8 +242,8 @@ def _road_claim(name: str, axis: str, gain: float) -> Claim:
     imu = Dial(
         "imu", "the noise of the IMU, as a multiple of the printed one,", "", (1.0, 3.0, 10.0, 70.0),
         lambda setting, value: setting.on(_drive_with(setting.scenario, "imu", float(value))), 1.0,
-        "the drive is not public; these are simulated drives with fixes of 1 Hz, whose noise is five times as large for "
-        "130 s. The IMU of the recorded drive car-road has 70 times the printed noise",
+        "the drive is not public; these are simulated drives with fixes of 1 Hz, whose noise is five times as large "
+        "for 130 s. The IMU of the recorded drive car-road has 70 times the printed noise",
     )  # fmt: skip
     noise = Dial(
         "noise", "the noise of the fixes for 130 s, as a multiple of the datasheet's,", "", (2.0, 5.0, 10.0, 20.0),

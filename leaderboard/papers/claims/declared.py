@@ -1,4 +1,4 @@
-"""The headline claims of the five papers, as the files of the papers declare them, with the choices that are not printed.
+"""The headline claims of the five papers, as their files declare them, each with the choices that are not printed.
 
 The conditions under which a claim holds are sufficient ones. They do not say what the authors did.
 """
