@@ -192,7 +192,7 @@ def _document(found: Reproduction, drawn: Sequence[Drawn], folder: Path | None =
     from .claims.stored import answers_of
 
     paper = found.paper
-    answers = answers_of(paper.key)
+    answers = answers_of(paper.key) if found.answers is None else found.answers
     claims = claim_count(answers)
     of_claims = [] if folder is None else claim_figures(answers, folder)
     return _Document(
