@@ -21,9 +21,9 @@ from .contents import contents
 from .figures import Drawn, write_figures
 from .paper import KINDS_OF_ROWS, Figure, Paper
 from .report import Sheet, settings_sheet, sheets, single_run_sentence, verdicts
-from .reproduction import Reproduction, fill, find_method, load_results
+from .reproduction import Reproduction, find_method, load_results
 from .sequential import LIMIT
-from .stored import provenance, save, shipped_reproduction
+from .stored import add, provenance, shipped_reproduction
 
 __all__ = ["FOLDER", "blocks", "overview", "replaced", "update"]
 
@@ -179,14 +179,14 @@ def _line(cells: Iterable[str]) -> str:
 
 
 def _store(folder: Path) -> None:
-    """Store the results of all papers that a folder has."""
+    """Add the results of all papers that a folder has to those that are stored."""
     for key in PAPERS:
         if not (folder / key / "results").is_dir():
             continue
         paper = papers.paper_of(key)
         stands_for = {m.name: find_method(m) for m in paper.methods}
         results = load_results(paper, stands_for, folder / key / "results", range(LIMIT))
-        path = save(fill(paper, stands_for, results, range(max(r.seed for r in results) + 1)))
+        path = add(paper, results)
         print(f"{path}: {len(results)} runs, {path.stat().st_size / 1000:.0f} kB")
 
 
