@@ -258,7 +258,7 @@ def _than(name: str, scenario: str = "") -> Callable[[Setting], Setting]:
 def _claim(name: str, sentence: str, row: str, score: str, gain: float, than_score: str = "") -> Claim:
     return Claim(
         name, PAPER.key, sentence, gain,
-        compared(lambda: PAPER.scenario(_WHITE), row, "federated", score, than_score),
+        compared(lambda: PAPER.scenario(_SCENARIO), row, "federated", score, than_score),
         (
             choice_dial(
                 "fusion", "the federated filter",
@@ -269,21 +269,11 @@ def _claim(name: str, sentence: str, row: str, score: str, gain: float, than_sco
                 "intervals", "the intervals of the instruments and the federated filter",
                 {
                     "first set, resets": _than("federated"),
-                    "second set, resets": _than("federated", _SPARSE_WHITE),
-                    "second set, does not reset": _than("federated-no-reset", _SPARSE_WHITE),
+                    "second set, resets": _than("federated", _SPARSE),
+                    "second set, does not reset": _than("federated-no-reset", _SPARSE),
                 },
                 ours="first set, resets",
                 why="the gains of the text do not say which of the two sets of intervals they are of",
-            ),
-            choice_dial(
-                "imu", "the random part of the IMU and the federated filter",
-                {
-                    "white noise, resets": _than("federated"),
-                    "slow bias, resets": _than("federated", _SCENARIO),
-                    "slow bias, second set, does not reset": _than("federated-no-reset", _SPARSE),
-                },
-                ours="white noise, resets",
-                why="the paper prints white noise of 0.01 deg/h and 10 ug, and no bandwidth",
             ),
         ),
     )  # fmt: skip
