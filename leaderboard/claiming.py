@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -103,6 +104,8 @@ def _own_dial(claim: Claim, text: str) -> Dial:
         raise RequestError(f"--holds-if {text}: a condition of your own claim has values, like {name}=1,2,4")
     try:
         numbers = sorted({float(v) for v in values})
+        if not all(map(math.isfinite, numbers)):
+            raise ValueError
     except ValueError:
         raise RequestError(f"--holds-if {text}: the values should be numbers, like {name}=1,2,4") from None
     whose, dot, parameter = name.partition(".")

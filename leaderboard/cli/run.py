@@ -45,8 +45,9 @@ def show(out: Output, request: RunCommand) -> None:
         shown = save_as(stanford_diagrams(diagrams, title=title), absolute(request.stanford))
     elif request.stanford is not None:
         out.remark("no Stanford diagram: no estimator gave a covariance or a protection level")
-    document = {**report.to_dict(), "plot": None if drawn is None else str(drawn),
-                "plot_lags": None if delays is None else str(delays)}  # fmt: skip
+    document = {**report.to_dict(), "plot": None if drawn is None else str(drawn)}
+    if request.plot_lags is not None:
+        document["plot_lags"] = None if delays is None else str(delays)
     if request.stanford is not None:
         integrity = {label: diagram.to_dict() for label, diagram in diagrams.items()}
         document |= {"stanford": integrity, "stanford_plot": None if shown is None else str(shown)}

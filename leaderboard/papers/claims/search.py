@@ -178,6 +178,8 @@ def _point(value: Choice, setting: Setting, results: dict[tuple[str, str, int], 
         for r in (row, than):
             if not r.tried:
                 raise RequestError(f"{r.estimator} cannot run on {r.scenario}: {r.reason}")
+            if r.status == "error" and " lag " in r.reason:  # not a failure of the method
+                raise RequestError(f"{r.estimator} on {r.scenario}: {r.reason}")
         if row.status != "ok" or than.status != "ok":
             failed += 1
             continue

@@ -251,6 +251,9 @@ def test_the_command_shows_and_lists(tmp_path):
         ({"claim": "guo-sw-fgo", "gain": 3.0}, "is a paper's claim"),
         ({"claim": "auv-graph", "holds_if": ["fusion=waits"]}, "there is no choice 'waits'"),
         ({"claim": "ekf", "than": "sw-fgo", "gain": 10.0}, "'scenario' is missing"),
+        ({"claim": "guo-sw-fgo", "holds_if": ["lag=nan"]}, "numbers"),
+        ({"claim": "guo-sw-fgo", "holds_if": ["lag=-5"]}, "from 0 to 3600"),
+        ({"claim": "mao-road-east", "holds_if": ["imu=-1"]}, "random_walk"),
         ({"claim": "ekf", "than": "sw-fgo", "gain": 0.0, "scenario": "ship-turn"}, "between 0 and 100"),
         ({"claim": "ekf", "than": "sw-fgo", "gain": 9.0, "scenario": "ship-turn", "holds_if": "lag"}, "has values"),
         (
