@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
+from simnav.leaderboard.results.errors import RequestError
 from simnav.scenario import Scenario, load
 from simnav.sensors.faults import NoiseStep
 
@@ -332,6 +333,8 @@ def _learned(setting: Setting, value: Choice) -> Setting:
 
 def _than_told(setting: Setting, value: Choice) -> Setting:
     """GNSS with five times the noise of ours, 20 m; the other method is told so many times less."""
+    if float(value) <= 0.0:
+        raise RequestError(f"told={value:g}: the true noise as a multiple of what the EKF is told should be above 0")
     gnss, sigma = "instruments.gnss", (20.0, 20.0, 40.0)
     right = with_keys(setting.scenario, "sigma", 20.0, {f"{gnss}.sigma_m": list(sigma)})
     if value == 1.0:

@@ -254,6 +254,7 @@ def test_the_command_shows_and_lists(tmp_path):
         ({"claim": "guo-sw-fgo", "holds_if": ["lag=nan"]}, "numbers"),
         ({"claim": "guo-sw-fgo", "holds_if": ["lag=-5"]}, "from 0 to 3600"),
         ({"claim": "mao-road-east", "holds_if": ["imu=-1"]}, "random_walk"),
+        ({"claim": "jiang-turn", "holds_if": ["told=0"]}, "should be above 0"),
         ({"claim": "ekf", "than": "sw-fgo", "gain": 0.0, "scenario": "ship-turn"}, "between 0 and 100"),
         ({"claim": "ekf", "than": "sw-fgo", "gain": 9.0, "scenario": "ship-turn", "holds_if": "lag"}, "has values"),
         (
