@@ -116,9 +116,10 @@ def _own_dial(claim: Claim, text: str) -> Dial:
     if dot and whose in ("row", "than", "both"):
         made = parameter_dial(name, f"{parameter} of {whose}", whose, parameter, numbers)
         with mistakes():
-            checked = made.set(claim.base(), numbers[0])
-            for request in (checked.row, checked.than):
-                request.make()
+            for number in numbers:
+                checked = made.set(claim.base(), number)
+                for request in (checked.row, checked.than):
+                    request.make()
         return made
     (dial, _), *_ = chosen_dials(claim.base().scenario, {name: numbers})
     return scenario_dial(name, dial.title, dial.unit, numbers, lambda x: {dial.key: int(x) if x.is_integer() else x})
