@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -349,6 +350,9 @@ def reproduce(request: ReproduceRequest) -> Reproduction:
     from .papers import sequential
     from .papers import stored as shipped
 
+    if request.holds_if and (request.methods or request.until_decided or request.stored):
+        raise RequestError("'holds_if' is about all claims of a paper: 'methods', 'until_decided' and 'stored' do not "
+                           "go with it")  # fmt: skip
     if request.stored and (request.until_decided or request.runs is not None):
         raise RequestError("stored results have a fixed number of runs: 'runs' and 'until_decided' do not go with them")
     if request.until_decided and request.runs is not None:
@@ -362,6 +366,19 @@ def reproduce(request: ReproduceRequest) -> Reproduction:
             return shipped.shipped_reproduction(chosen)
     workers, limit = whole_number("workers", request.workers, 1), whole_number("limit", request.limit, 1)
     folder = absolute(request.output or Path("reproduced") / chosen.key) / "results"
+    if request.holds_if:
+        from .papers.claims.declared import claims_of
+        from .papers.claims.search import search
+
+        count = 6 if request.runs is None else whole_number("runs", request.runs, 1)
+        with mistakes(ValueError, StoreError):
+            stored = shipped.shipped_reproduction(chosen)
+            answers = [
+                search(claim, claim.dials, folder.with_name("claims"), runs=count, judged=2 * count, workers=workers,
+                       progress=request.progress)
+                for claim in claims_of(chosen.key)
+            ]  # fmt: skip
+        return replace(stored, answers=answers)
     with mistakes(StoreError):
         if request.until_decided:
             return sequential.decide(

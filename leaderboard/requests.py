@@ -589,6 +589,13 @@ class ReproduceRequest:
         help="More runs for undecided rows, until all are decided.",
         more="See `simnav.leaderboard.papers.sequential`.",
     )
+    holds_if: bool = option(
+        "--holds-if",
+        default=False,
+        help="Search for the conditions under which the paper's claims hold.",
+        more="All choices that the paper does not print are varied (see `simnav claim`), on --runs seeds (6) of the "
+        "search; judged on twice as many or more. The tables are those that come with simnav.",
+    )
     limit: int = option(default=200, help="With --until-decided: largest number of runs of a scenario.", least=1)
     minutes: float | None = option(
         default=None, help="With --until-decided: start no run after this time. Default: no limit.", least=0.0

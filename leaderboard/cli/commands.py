@@ -94,6 +94,9 @@ class RunCommand(RunRequest):
 
     _: KW_ONLY
     plot: Path | None = option(default=None, help=_FIGURE)
+    plot_lags: Path | None = option(
+        default=None, help="With --lags: draw the error against the delay of the output: .png, .svg or .pdf."
+    )
     stanford: Path | None = option(
         default=None, help="Write Stanford diagrams, error beside protection level: .png, .svg or .pdf."
     )

@@ -19,7 +19,7 @@ from simnav.leaderboard.site.pages import STATIC, TEMPLATES, environment
 
 from . import PAPERS
 from .comparison import RULES
-from .report import Sheet, Whereabouts, sheets, summary, whereabouts
+from .report import Sheet, Whereabouts, settings_sheet, sheets, summary, whereabouts
 
 if TYPE_CHECKING:
     from .figures import Drawn
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 __all__ = ["PaperPage", "pages_in", "write"]
 
-_FORMAT = 3  # of the document
+_FORMAT = 4  # of the document
 
 
 @dataclass(frozen=True)
@@ -61,6 +61,7 @@ class _Document:
     full: str
     notes: list[str]
     claims: list[Sheet]
+    settings: list[Sheet]
     tables: list[Sheet]
     figures: list[_Figure]
     contents: list[Whereabouts]
@@ -204,7 +205,7 @@ def _document(found: Reproduction, drawn: Sequence[Drawn], folder: Path | None =
     from .claims.stored import answers_of
 
     paper = found.paper
-    answers = answers_of(paper.key)
+    answers = answers_of(paper.key) if found.answers is None else found.answers
     claims = claim_count(answers)
     of_claims = [] if folder is None else claim_figures(answers, folder)
     return _Document(
@@ -224,6 +225,7 @@ def _document(found: Reproduction, drawn: Sequence[Drawn], folder: Path | None =
         full=f"simnav reproduce {paper.key} --until-decided",
         notes=list(paper.notes),
         claims=claim_sheets(answers),
+        settings=[settings_sheet(paper)] if paper.settings else [],
         tables=list(sheets(found)),
         figures=[
             *(_Figure("", c.title, c.path.name, c.caption, c.width, c.height, []) for c in of_claims),
