@@ -274,7 +274,7 @@ def _track(
         )
         for s in track.scenarios
     ]
-    wrong = cells(track, runs)
+    wrong = cells(track)
     more = [COLUMN, *more] if wrong else more
     every = all(r.provisional for r in track.rows if r.ranked)
     rows = [
