@@ -43,15 +43,16 @@ class PredictionTest:
     as wrong if
 
     - the recent innovations of the instrument are correlated from one to the next, and too large for R and H P H'; and
-    - no instrument of the other group (fixes, logs) is a witness against it: it is heard, and its own innovations were
-      not correlated at some time since those of the first instrument persist. So a lasting error of the fixes is found
-      if a log agrees with the prediction, and the other way round. (A filter that believes wrong fixes soon disagrees
-      with the log, too. So what the witness said at first stands until the fixes agree again); and
-    - an IMU that is noisier than its datasheet by a factor of `WORSE` would explain the innovation.
+    - no witness is against it. A witness is another instrument that would notice the same error of the prediction
+      (`simnav.estimators.models.roles.witnesses`): it is heard, and its own innovations were not correlated at some
+      time since those of the first instrument persist. So a lasting error of the fixes is found if a log agrees with
+      the prediction, and the other way round. (A filter that believes wrong fixes soon disagrees with the log, too. So
+      what the witness said at first stands until the fixes agree again.)
 
-    A lasting error of the only instrument that is heard cannot be told from a wrong prediction. The instrument is then
-    believed, as in the plain filter: its error is bounded, and the error of an IMU alone is not. Without an IMU this
-    test is not made.
+    So a lasting error is blamed on an instrument only by a witness. Without one it cannot be told from a wrong
+    prediction, however large it is: a gyroscope that is disturbed for a second makes errors of any size. The instrument
+    is then believed, as in the plain filter. Its error is bounded, and the error of an IMU alone is not. Without an IMU
+    this test is not made.
 
     Parameters
     ----------
