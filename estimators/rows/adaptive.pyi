@@ -29,7 +29,7 @@ class _Adaptive(Row, solver=KalmanEstimator, model=Suitable, iteration=poor_head
 
 @register("sage-husa")
 class SageHusaKf(_Adaptive, adaptation=SageHusa):
-    version = 2
+    version = 3
     def __init__(
         self,
         *,
@@ -46,7 +46,7 @@ class SageHusaKf(_Adaptive, adaptation=SageHusa):
 class SageHusaPaper(
     _Adaptive, adaptation=piece(SageHusa, defaults={"fading": 1.0, "prior": 0, "lowest": 0.5, "scope": "fixes"})
 ):
-    version = 2
+    version = 3
     def __init__(
         self,
         *,
@@ -61,7 +61,7 @@ class SageHusaPaper(
 
 @register("iae")
 class Iae(_Adaptive, adaptation=piece(InnovationBased, source="innovation")):
-    version = 2
+    version = 3
     def __init__(
         self,
         *,
@@ -81,7 +81,7 @@ class Iae(_Adaptive, adaptation=piece(InnovationBased, source="innovation")):
 
 @register("iae-fixed")
 class IaeFixed(_Adaptive, adaptation=piece(FixedWindow, source="innovation")):
-    version = 2
+    version = 3
     formerly = _FORMERLY
     def __init__(
         self,
@@ -99,7 +99,7 @@ class IaeFixed(_Adaptive, adaptation=piece(FixedWindow, source="innovation")):
 
 @register("rae")
 class Rae(_Adaptive, adaptation=piece(FixedWindow, source="residual", newest=False)):
-    version = 2
+    version = 3
     formerly = _FORMERLY
     def __init__(
         self,
@@ -116,7 +116,7 @@ class Rae(_Adaptive, adaptation=piece(FixedWindow, source="residual", newest=Fal
 
 @register("adkf")
 class Adkf(_Adaptive, adaptation=AdaptiveFactor):
-    version = 2
+    version = 3
     def __init__(
         self,
         *,
@@ -143,7 +143,7 @@ class AdkfPaper(_Adaptive, adaptation=piece(AdaptiveFactor, preset="paper", c0=N
 
 @register("igg3")
 class Igg3(_Adaptive, adaptation=Igg3Weights):
-    version = 2
+    version = 3
     def __init__(
         self,
         *,
@@ -154,7 +154,7 @@ class Igg3(_Adaptive, adaptation=Igg3Weights):
 
 @register("huber-kf")
 class HuberKf(_Adaptive, adaptation=HuberWeights):
-    version = 2
+    version = 3
     def __init__(
         self,
         *,
@@ -164,7 +164,7 @@ class HuberKf(_Adaptive, adaptation=HuberWeights):
 
 @register("gated-ekf")
 class GatedEkf(_Adaptive, adaptation=ChiSquareGate):
-    version = 2
+    version = 3
     def __init__(
         self,
         *,
@@ -184,7 +184,7 @@ class FadingEkf(_Adaptive, adaptation=FadingMemory):
 
 @register("vb-akf")
 class VbAkf(_Adaptive, adaptation=VariationalBayes):
-    version = 2
+    version = 3
     def __init__(
         self,
         *,
@@ -199,7 +199,7 @@ class VbAkf(_Adaptive, adaptation=VariationalBayes):
 
 @register("mckf")
 class Mckf(_Adaptive, adaptation=piece(MaximumCorrentropy, smallest=1e-3)):
-    version = 2
+    version = 3
     def __init__(
         self,
         *,
@@ -211,7 +211,7 @@ class Mckf(_Adaptive, adaptation=piece(MaximumCorrentropy, smallest=1e-3)):
 
 @register("imm")
 class Imm(Row, solver=ImmEstimator, model=Suitable):
-    version = 2
+    version = 3
     def __init__(
         self,
         *,
