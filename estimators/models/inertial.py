@@ -61,6 +61,7 @@ from .declared_errors import CURRENT, bias_of, bias_of_triad
 from .equations import EQUATIONS, equation_of
 from .inertial_update import absorb_inertial, assimilate_inertial, innovate_inertial
 from .levered import is_own, with_lever_arms
+from .many_readings import of_instruments
 from .measurements import (
     HEADING,
     Aid,
@@ -265,6 +266,7 @@ class InertialModel(ErrorModel):
             self.blocks.bring(own)
         for sheet in own:
             self.own[sheet.name] = OwnObservation(sheet, self.blocks.places(sheet.name, _NAV), self.time)
+        self.many = of_instruments(self.own, self.bias_at)
         self._fused = set(self.noise) - self.uncalibrated - set(self.own) if self.fused else set()
 
     def _more_blocks(self) -> None:
@@ -394,6 +396,8 @@ class InertialModel(ErrorModel):
         name = measurement.instrument
         if name in self._fused and self.aid_parameters[name][0] != HEADING:  # which may say nothing
             return self.noise[name]
+        if name in self.own and (more := self.own[name].noise_without_state(measurement.side)) is not None:
+            return self.noise[name] + more
         return super().nominal_noise(measurement)
 
     def innovate(self, measurement: Measurement, covariance: Array) -> Observation | None:

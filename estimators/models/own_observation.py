@@ -72,6 +72,8 @@ class OwnObservation:
         assert observation is not None
         self._observation = observation
         self._since = since
+        #: Index of the first state of each block that has states.
+        self.places: Mapping[str, int] = {b.name: places[b.name] for b in sheet.blocks if b.name in places}
         self._slices = [
             (b.name, slice(places[b.name], places[b.name] + b.size)) for b in sheet.blocks if b.name in places
         ]
@@ -244,6 +246,15 @@ class OwnObservation:
                 part = own[:, self._columns[block.name]]
                 noise += part @ block.covariance(max(0.0, point.time - self._since)) @ part.T
         return noise
+
+    def noise_without_state(self, side: Array) -> Array | None:
+        """The (d, d) covariance of `spread` where it depends on the side information only; None if it does not.
+
+        It tells nothing about whether the state has a reading, so a kind that may have none has no such form.
+        """
+        if self.kind.observations is None or len(self._free):
+            return None
+        return self.reading_noise(side)
 
     def reading_noise(self, side: Array) -> Array | None:
         """The (d, d) covariance of a reading with this side information minus that of the datasheet; None if equal."""
