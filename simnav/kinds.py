@@ -191,6 +191,7 @@ Observation = Callable[[NavigationPoint, "Datasheet"], "tuple[Array, Array | Map
 
 #: The same for n readings of channels at one time, which costs a window a small part of n calls: (n, d) readings, and
 #: their whole Jacobian by block, arrays of the shapes (n, d, 9) and (n, d, k). Each state has a reading.
+#: The `ReadingSigma` of such a kind also takes (n, s) side information, and returns (n, d).
 Observations = Callable[[NavigationPoints, "Datasheet"], tuple[Array, Mapping[str, Array]]]
 
 #: The standard deviation (d,) of the white noise of one reading, from its (s,) side information and the datasheet: for

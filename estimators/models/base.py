@@ -216,6 +216,26 @@ class ErrorModel(ABC):
         """
         return None
 
+    def assimilate_together(
+        self, measurements: Sequence[Measurement], covariance: Array, correction: Array
+    ) -> tuple[Array, Array] | None:
+        """Use measurements of one time, each with its nominal noise, linearised at the state before the first.
+
+        Parameters
+        ----------
+        measurements : sequence of Measurement
+            Readings of channels of one instrument (`many`).
+        covariance, correction
+            As of `assimilate`; the correction is that by all of them.
+
+        Returns
+        -------
+        nis, size : (k,) array
+            As of `assimilate`, each given the measurements before it. None in place of both where the measurements have
+            to be taken one by one.
+        """
+        return None
+
     def loosen(self, covariance: Array, inflation: float, first: Array) -> None:
         """Inflate the covariance of position, velocity and attitude in place, if the motion is wrong.
 

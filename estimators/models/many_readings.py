@@ -110,5 +110,24 @@ class ManyReadings:
             jacobian[:, :, where.start + offset : where.stop + offset] = given[name]
         return self.kind.difference(value, reading), jacobian
 
+    def noise(self, side: Array) -> Array:
+        """The (n, d) variances of the white noise of n readings, from their (n, s) side information.
+
+        Raises
+        ------
+        ValueError
+            If the kind's function returns something else.
+        """
+        function, shape = self.kind.reading_sigma, (len(side), len(self.kind.components))
+        if function is None:
+            return np.broadcast_to(self._sheet.sigma**2, shape)
+        sigma = np.asarray(function(side, self._sheet), dtype=np.float64)
+        if sigma.shape != shape or not (np.isfinite(sigma).all() and np.all(sigma >= 0.0)):
+            raise ValueError(
+                f"reading_sigma of kind {self._sheet.kind!r}, for the instrument {self._sheet.name!r}, should return "
+                f"an array of shape {shape} for so many readings, finite and not negative, not {sigma.tolist()!r:.200}"
+            )
+        return np.asarray(sigma**2)
+
     def _size(self, name: str) -> int:
         return next(block.size for block in self._sheet.blocks if block.name == name)

@@ -133,7 +133,7 @@ def _figures(sheet: Datasheet, elevation: Array) -> tuple[Array, int]:
 
 
 def reading_sigma(side: Array, sheet: Datasheet) -> Array:
-    """The white noise of a reading, from its C/N0 (`simnav.kinds.ReadingSigma`)."""
-    sigma: Array = sheet.sigma * noise_factor(side[DENSITY_RATIO])
-    sigma[0] *= amplification(int(sheet.details["frequencies"]))
+    """The white noise of readings, from their C/N0 (`simnav.kinds.ReadingSigma`)."""
+    sigma: Array = sheet.sigma * noise_factor(side[..., DENSITY_RATIO])[..., None]
+    sigma[..., 0] *= amplification(int(sheet.details["frequencies"]))
     return sigma
