@@ -31,6 +31,7 @@ __all__ = [
     "CostsRequest",
     "EvaluateRequest",
     "ExportRequest",
+    "InspectRequest",
     "MergeRequest",
     "RankRequest",
     "RecordRequest",
@@ -110,6 +111,17 @@ class ExportRequest:
         help="Neither truth, nor labels, nor seeds: for estimates that 'campaign --external' ranks; with --sealed.",
     )
     sealed: PathLike | None = option("--sealed", default=None, metavar="KEYFILE", help=_SEALED_RUNS)
+
+
+@request
+class InspectRequest:
+    """Show what the files of a log hold, and write a scenario to begin with."""
+
+    files: Iterable[PathLike] = option(help="Files or folders.", argument=True, metavar="FILES", cli=list[Path])
+    _: KW_ONLY
+    output: PathLike | None = option(
+        "--output", "-o", default=None, help="Write a scenario to begin with to this TOML file."
+    )
 
 
 @request

@@ -69,9 +69,9 @@ def apart(function: Callable[[Path], Any], path: Path) -> Any:
     ours, theirs = context.Pipe(duplex=False)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DeprecationWarning)  # fork beside threads: the child uses none of them
-        process = context.Process(
+        process = context.Process(  # type: ignore[attr-defined]
             target=_answer, args=(theirs, function, path, _MEMORY + _EXPANSION * size), daemon=True
-        )  # type: ignore[attr-defined]
+        )
         process.start()
     theirs.close()
     try:

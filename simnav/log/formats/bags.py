@@ -20,6 +20,8 @@ from simnav.log.reader import Rows, register_reader
 from simnav.log.table import LogError, Table
 from simnav.spec import closest
 
+__all__ = ["topics_of"]
+
 #: Longer arrays in a message (images, point clouds) are left out.
 _LONGEST = 64
 _DEEPEST = 8
@@ -74,6 +76,32 @@ def _table(path: Path, form: str, topic: str | None, _mtime: int, _size: int) ->
     names = list(dict.fromkeys(name for row in rows for name in row))
     columns = {name: np.array([row.get(name, np.nan) for row in rows]) for name in names}
     return Table(f"{path} ({topic})", dict(columns), np.arange(1, len(rows) + 1), numbered=False)
+
+
+def topics_of(path: Path, form: str) -> list[str]:
+    """The topics of a file of the format ``rosbag`` or ``mcap``.
+
+    Raises
+    ------
+    LogError
+        If it cannot be read.
+    """
+    try:
+        if form == "mcap":
+            from mcap.reader import make_reader
+
+            with open(path, "rb") as stream:
+                summary = make_reader(stream).get_summary()
+            return sorted({c.topic for c in summary.channels.values()}) if summary else []
+        from rosbags.highlevel import AnyReader
+        from rosbags.typesys import Stores, get_typestore
+
+        with AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader:
+            return sorted({c.topic for c in reader.connections})
+    except ImportError as error:
+        raise LogError(f"{path}: needs the library {error.name}: pip install 'simnav[logs]'") from None
+    except Exception as error:
+        raise LogError(f"{path}: its topics cannot be read ({' '.join(str(error).split())[:100]})") from None
 
 
 def _choose(path: Path, topic: str | None, topics: list[str]) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from simnav.log.delimited import rows_of
 from simnav.log.files import FileSpec
@@ -26,7 +27,7 @@ def read(path: Path, file: FileSpec, sentence: str | None, talker: str | None) -
             content = content.flatten()
     except (pa.ArrowException, OSError, MemoryError, ValueError) as error:
         raise LogError(f"{path}: it is no Parquet file, or damaged ({' '.join(str(error).split())[:100]})") from None
-    columns = {}
+    columns: dict[str, NDArray[np.float64] | NDArray[np.object_]] = {}
     for name, values in zip(content.column_names, content.columns, strict=True):
         kind = values.type
         if pa.types.is_timestamp(kind):

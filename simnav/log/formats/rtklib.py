@@ -55,8 +55,9 @@ def read(path: Path, file: FileSpec, sentence: str | None, talker: str | None) -
             f"{path}, line {lines[0]}: {width} values after the time where the header names {len(names)} "
             f"({', '.join(names)})"
         )
-    columns = {n: np.array([row[2 + i] for row in cells], dtype=object) for i, n in enumerate(names)}
-    columns = {n: Table(str(path), {n: c}, np.array(lines)).column(n)[1] for n, c in columns.items()}  # type: ignore[misc]
+    texts = {n: np.array([row[2 + i] for row in cells], dtype=object) for i, n in enumerate(names)}
+    whole = Table(str(path), dict(texts), np.array(lines, dtype=np.int64))
+    columns = {n: whole.column(n)[1] for n in names}
     table = Table(str(path), dict(columns), np.array(lines, dtype=np.int64))
     return Rows(table, _time(table, cells, scale), "time")
 
