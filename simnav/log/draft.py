@@ -197,7 +197,7 @@ def draft(streams: Sequence[Stream], name: str = "my-log") -> str:
     if inertial and rate is not None:
         hertz = 1.0 / float(np.median(np.diff(rate.stream.time)))
         lines += ["", "[instruments.imu]", f"rate_hz = {_round(hertz)}",
-                  'grade = "consumer"               # check: or the figures of its datasheet']  # fmt: skip
+                  'grade = "mems"                   # check: or the figures of its datasheet']  # fmt: skip
     for quantity, guess in best.items():
         if quantity in _INSTRUMENTS:
             label, kind, sigma = _INSTRUMENTS[quantity]

@@ -32,6 +32,8 @@ _TIME = re.compile(r"^#?\s*(time|times|timestamp|stamp|t|utc|sec|secs|seconds|ep
 _DATE = re.compile(r"^\s*(date|day|%?\s*ymd)\b", re.I)
 #: Times of this size are in this unit.
 _LARGE = ((1e17, "ns"), (1e14, "us"), (1e11, "ms"))
+#: Columns of an IMU.
+_INERTIAL = re.compile(r"^(a|g|w|acc|gyr|gyro|accel|omega)[_ .]?[xyz]\b", re.I)
 _LINES = 40
 
 
@@ -212,7 +214,7 @@ def _time_keys(path: Path) -> dict[str, Any]:
                 raise LogError(f"{path}: no column holds the times; there are: {', '.join(names)}") from None
             return keys | {"time": (named, second)}
         return keys | {"time": named, "time_unit": "iso"}
-    return keys | {"time": named, "time_unit": _time_unit(named, np.asarray(values, dtype=np.float64))}
+    return keys | {"time": named, "time_unit": _time_unit(table, named, np.asarray(values, dtype=np.float64))}
 
 
 def _header_in_comment(path: Path) -> bool:
@@ -221,11 +223,15 @@ def _header_in_comment(path: Path) -> bool:
     return not second.startswith("#") and first.count(",") == second.count(",") > 0
 
 
-def _time_unit(name: str, values: Array) -> str:
+def _time_unit(table: Table, name: str, values: Array) -> str:
     ending = re.search(r"(?:_|\[|\()(ns|us|ms|s)(?:\]|\))?$", name.strip())
     if ending:
         return ending[1]
     size = float(np.nanmedian(np.abs(values)))
+    inertial = sum(bool(_INERTIAL.match(n)) for n in table.names) >= 3
+    spacing = float(np.nanmedian(np.abs(np.diff(values)))) if len(values) > 1 else 0.0
+    if inertial and size < _LARGE[-1][0] and spacing >= 1.0:  # no IMU has samples as rare as that
+        return "ms" if spacing < 1e3 else "us" if spacing < 1e6 else "ns"
     return next((unit for least, unit in _LARGE if size > least), "s")
 
 

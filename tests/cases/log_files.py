@@ -150,7 +150,8 @@ def _bag(path: Path) -> None:
             head = header(seq=k, stamp=stamp(sec=k, nanosec=500_000_000), frame_id="gps")
             message = fix(header=head, status=status(status=0, service=1),
                           latitude=LATITUDE[k], longitude=LONGITUDE[k],
-                          altitude=HEIGHT[k], position_covariance=np.arange(9.0), position_covariance_type=2)  # fmt: skip
+                          altitude=HEIGHT[k],
+                          position_covariance=np.arange(9.0), position_covariance_type=2)  # fmt: skip
             writer.write(connection, 10**9 * (k + 1), store.serialize_ros1(message, fix.__msgtype__))
 
 
