@@ -20,6 +20,7 @@ from simnav.leaderboard.publishing_requests import (
     SubmitRequest,
 )
 from simnav.leaderboard.requests import (
+    AlignRequest,
     AllanRequest,
     BenchRequest,
     BoundRequest,
@@ -39,6 +40,7 @@ from simnav.leaderboard.requests import (
     ScoreRequest,
     SealRequest,
     SweepRequest,
+    TuneNoiseRequest,
     TuneRequest,
     VerifyRequest,
 )
@@ -271,6 +273,8 @@ COMMANDS: Mapping[str, tuple[type[Any], str]] = {
     "score": (ScoreCommand, "score"),
     "export": (ExportRequest, "export"),
     "inspect": (InspectRequest, "inspect"),
+    "align": (AlignRequest, "align"),
+    "tune-noise": (TuneNoiseRequest, "tune_noise"),
     "check": (CheckCommand, "check"),
     "bench": (BenchCommand, "bench"),
     "new-estimator": (NewEstimatorCommand, "new_estimator"),
@@ -298,7 +302,7 @@ COMMANDS: Mapping[str, tuple[type[Any], str]] = {
 HEADINGS: Mapping[str, Sequence[str]] = {
     "Every day": ("list", "show", "run", "evaluate", "check", "new-estimator", "simulate", "sweep", "campaign",
                   "leaderboard"),
-    "Logs and programs of others": ("inspect", "export", "score"),
+    "Logs and programs of others": ("inspect", "align", "tune-noise", "export", "score"),
     "Study and publish": ("tune", "train", "bench", "robustness", "bound", "allan", "reproduce", "claim", "rescore",
                           "merge", "submit", "verify", "seal", "cite"),
     "Maintain": ("standard", "reference", "warmup"),

@@ -51,14 +51,14 @@ def write_mcap(recording: Recording, path: Path) -> list[Path]:
         channels: dict[str, int] = {}
         for time, topic, kind, content in messages:
             if topic not in channels:
-                properties = {name: {} for name in _SCHEMAS.get(kind, content)}
+                properties: dict[str, Any] = {name: {} for name in _SCHEMAS.get(kind, content)}
                 text = json.dumps({"title": kind, "type": "object", "properties": properties}).encode()
                 schema = writer.register_schema(kind, "jsonschema", text)
                 channels[topic] = writer.register_channel(topic, "json", schema)
             stamp = round(1e9 * time)
             stamped = {"timestamp": {"sec": stamp // 10**9, "nsec": stamp % 10**9}, **content}
             writer.add_message(channels[topic], stamp, json.dumps(stamped).encode(), stamp)
-        writer.finish()
+        writer.finish()  # type: ignore[no-untyped-call]
     return [path]
 
 

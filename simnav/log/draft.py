@@ -113,9 +113,9 @@ def _signed(quantity: str, columns: Sequence[str], values: Array) -> tuple[str, 
 
 
 def _units(stream: Stream, quantity: str, values: Array) -> tuple[str, ...]:
-    size = float(np.percentile(np.abs(values), 99.0))
+    size, width = float(np.percentile(np.abs(values), 99.0)), int(values.shape[1])
     if stream.form == "nmea":
-        return ("1",) * (3 if quantity == "position" else values.shape[1])
+        return ("1",) * (3 if quantity == "position" else width)
     if quantity == "position":
         angle = "rad" if np.abs(values[:, 0]).max() < 1.58 and np.abs(values[:, 1]).max() < 3.15 else "deg"
         if np.abs(values[:, :2]).max() > 361.0:
@@ -127,8 +127,8 @@ def _units(stream: Stream, quantity: str, values: Array) -> tuple[str, ...]:
         norm = float(np.median(np.linalg.norm(values, axis=1)))
         return ("g" if norm < 2.0 else "m_s2" if norm < 50.0 else "mg",) * 3
     if quantity in ("heading", "level"):
-        return ("deg" if size > 6.3 else "rad",) * values.shape[1]
-    return ("m" if quantity == "depth" else "m_s",) * values.shape[1]
+        return ("deg" if size > 6.3 else "rad",) * width
+    return ("m" if quantity == "depth" else "m_s",) * width
 
 
 def draft(streams: Sequence[Stream], name: str = "my-log") -> str:
@@ -219,7 +219,7 @@ def _file_keys(used: Sequence[Guess]) -> dict[Any, str]:
         place = guess.stream.path
         if place not in keys:
             keys[place] = stem if stem not in keys.values() else f"{stem}_{len(keys)}"
-    by_stream = {}
+    by_stream: dict[Any, Any] = {}
     for guess in used:
         by_stream.setdefault(guess.stream.path, (guess.stream, keys[guess.stream.path]))
     return dict(by_stream.values())

@@ -76,7 +76,7 @@ class Stream:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain: what ``simnav inspect --json`` prints."""
-        columns = {}
+        columns: dict[str, dict[str, Any]] = {}
         for name in self.table.names:
             values = self.table.columns[name]
             if values.dtype == object:
