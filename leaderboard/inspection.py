@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -23,13 +24,14 @@ from .requests import (
     ExportRequest,
     MergeRequest,
     RankRequest,
+    RealismRequest,
     ReproduceRequest,
     RescoreRequest,
     ScoreRequest,
     SealRequest,
     VerifyRequest,
 )
-from .results import requested
+from .results import requested, scenario_files
 
 if TYPE_CHECKING:
     from simnav.leaderboard.campaign.rescoring import Rescored
@@ -42,10 +44,12 @@ if TYPE_CHECKING:
     from simnav.leaderboard.results.result import Result
 
     from .allan import AllanReport
+    from .realism.report import RealismReport
     from .single_run import RunReport
 
 __all__ = [
-    "allan", "bound", "cite", "export", "merge", "rank", "reproduce", "rescore", "score_files", "seal", "verify",
+    "allan", "bound", "cite", "export", "merge", "rank", "realism", "reproduce", "rescore", "score_files", "seal",
+    "verify",
 ]  # fmt: skip
 
 
@@ -69,16 +73,17 @@ def rank(request: RankRequest) -> Ranking:
         require_lower(request.score, "a ranking is by errors")
     wanted = RANKED_SCORES | ({request.score} if request.score else set())
     asked: Mapping[str, Sequence[int]] = {}
-    results = request.results
+    results, tracks = request.results, dict(request.tracks or {})
     if results is None or isinstance(results, (str, os.PathLike)):
         given = results_of(results, scores=wanted)
         asked = requested.read(results)
+        tracks = {**scenario_files.tracks(results), **tracks}
     else:
         given = list(results)
     if not all(isinstance(r, Result) for r in given):
         raise RequestError("a folder of results is wanted, or results; 'simnav.merge' puts several folders together")
     require_score(request.score, given)
-    return rank(given, score=request.score, tracks=request.tracks, requested=asked)
+    return rank(given, score=request.score, tracks=tracks, requested=asked)
 
 
 @call(RescoreRequest)
@@ -283,6 +288,28 @@ def export(request: ExportRequest) -> list[Path]:
     return written
 
 
+@call(RealismRequest)
+def realism(request: RealismRequest) -> RealismReport:
+    """Compare the errors of simulated instruments with those of a recording.
+
+    Returns
+    -------
+    simnav.leaderboard.realism.report.RealismReport
+
+    Raises
+    ------
+    RequestError
+        If scikit-learn is not installed, the log is absent, or there is no instrument that both have.
+    """
+    from .realism.report import realism_of
+
+    runs, seed = whole_number("runs", request.runs, 3), whole_number("seed", request.seed, 0)
+    given = request.instrument
+    names = given.split(",") if isinstance(given, str) else [n for part in given or () for n in part.split(",")]
+    with mistakes():
+        return realism_of(scenario_of(request.scenario), scenario_of(request.log), names, runs, seed)
+
+
 @call(VerifyRequest)
 def verify(request: VerifyRequest) -> Verification:
     """Check the seal of results, and repeat a sample of them, which should be equal bit for bit.
@@ -323,6 +350,9 @@ def reproduce(request: ReproduceRequest) -> Reproduction:
     from .papers import sequential
     from .papers import stored as shipped
 
+    if request.holds_if and (request.methods or request.until_decided or request.stored):
+        raise RequestError("'holds_if' is about all claims of a paper: 'methods', 'until_decided' and 'stored' do not "
+                           "go with it")  # fmt: skip
     if request.stored and (request.until_decided or request.runs is not None):
         raise RequestError("stored results have a fixed number of runs: 'runs' and 'until_decided' do not go with them")
     if request.until_decided and request.runs is not None:
@@ -336,6 +366,19 @@ def reproduce(request: ReproduceRequest) -> Reproduction:
             return shipped.shipped_reproduction(chosen)
     workers, limit = whole_number("workers", request.workers, 1), whole_number("limit", request.limit, 1)
     folder = absolute(request.output or Path("reproduced") / chosen.key) / "results"
+    if request.holds_if:
+        from .papers.claims.declared import claims_of
+        from .papers.claims.search import search
+
+        count = 6 if request.runs is None else whole_number("runs", request.runs, 1)
+        with mistakes(ValueError, StoreError):
+            stored = shipped.shipped_reproduction(chosen)
+            answers = [
+                search(claim, claim.dials, folder.with_name("claims"), runs=count, judged=2 * count, workers=workers,
+                       progress=request.progress)
+                for claim in claims_of(chosen.key)
+            ]  # fmt: skip
+        return replace(stored, answers=answers)
     with mistakes(StoreError):
         if request.until_decided:
             return sequential.decide(

@@ -35,6 +35,7 @@ __all__ = [
     "InspectRequest",
     "MergeRequest",
     "RankRequest",
+    "RealismRequest",
     "RecordRequest",
     "ReproduceRequest",
     "RescoreRequest",
@@ -538,6 +539,27 @@ class AllanRequest:
 
 
 @request
+class RealismRequest:
+    """Whether the simulated errors of instruments are like those of a recording.
+
+    A logistic classifier is trained on windows of 60 s of the errors, real and simulated, and tried on recordings that
+    it has not seen. It needs scikit-learn (the extra ``realism``).
+    """
+
+    scenario: ScenarioLike = option(help=_SCENARIO, more=_SCENARIO_MORE, argument=True, metavar="SCENARIO")
+    log: ScenarioLike = option(help="A recorded scenario, likewise.", more=_SCENARIO_MORE, argument=True, metavar="LOG")
+    _: KW_ONLY
+    instrument: Sequence[str] | str | None = option(
+        "--instrument",
+        default=None,
+        help="Names of instruments, separated by commas, or imu. Default: all but the imu.",
+        cli=list[str] | None,
+    )
+    runs: int = option("--runs", "-n", default=12, least=3, help="Number of simulated runs.")
+    seed: int = option(default=0, least=0, help="Seed of the first of them.")
+
+
+@request
 class VerifyRequest:
     """Check results, and repeat a sample of the runs, which should be equal bit for bit.
 
@@ -596,6 +618,13 @@ class ReproduceRequest:
         default=False,
         help="More runs for undecided rows, until all are decided.",
         more="See `simnav.leaderboard.papers.sequential`.",
+    )
+    holds_if: bool = option(
+        "--holds-if",
+        default=False,
+        help="Search for the conditions under which the paper's claims hold.",
+        more="All choices that the paper does not print are varied (see `simnav claim`), on --runs seeds (6) of the "
+        "search; judged on twice as many or more. The tables are those that come with simnav.",
     )
     limit: int = option(default=200, help="With --until-decided: largest number of runs of a scenario.", least=1)
     minutes: float | None = option(

@@ -31,6 +31,7 @@ from simnav.leaderboard.requests import (
     InspectRequest,
     MergeRequest,
     Parameters,
+    RealismRequest,
     RecordRequest,
     ReproduceRequest,
     RescoreRequest,
@@ -96,6 +97,9 @@ class RunCommand(RunRequest):
 
     _: KW_ONLY
     plot: Path | None = option(default=None, help=_FIGURE)
+    plot_lags: Path | None = option(
+        default=None, help="With --lags: draw the error against the delay of the output: .png, .svg or .pdf."
+    )
     stanford: Path | None = option(
         default=None, help="Write Stanford diagrams, error beside protection level: .png, .svg or .pdf."
     )
@@ -206,6 +210,18 @@ class AllanCommand(AllanRequest):
 
 
 @request
+class RealismCommand(RealismRequest):
+    """Compare the errors of simulated instruments with those of a recording: can a classifier tell them apart?
+
+    It also prints the processes that would fit the real errors best, as tables of a scenario file.
+    """
+
+    _: KW_ONLY
+    plot: Path | None = option(default=None, help=_FIGURE)
+    fit: Path | None = option("--fit", default=None, help="Write the processes that fit to this TOML file.")
+
+
+@request
 class ReferenceCommand:
     """Run the oracles over many seeds, and store the figures that errors are divided by."""
 
@@ -225,7 +241,7 @@ class ReferenceCommand:
 @request
 class VerifyCommand(VerifyRequest, BundleOptions):
     """Check results or a submission, and repeat some of the runs, bit for bit.
-    The exit code is 0 if all holds, 3 if it holds but some fields differ from here and are only claimed, 1 otherwise.
+    The exit code is 0 if all holds, 3 if nothing speaks against it but something cannot be checked here, 1 otherwise.
     """
 
 
@@ -286,6 +302,7 @@ COMMANDS: Mapping[str, tuple[type[Any], str]] = {
     "warmup": (WarmupCommand, "warmup"),
     "bound": (BoundCommand, "bound"),
     "allan": (AllanCommand, "allan"),
+    "realism": (RealismCommand, "realism"),
     "reproduce": (ReproduceRequest, "reproduce"),
     "claim": (ClaimCommand, "claim"),
     "reference": (ReferenceCommand, "reference"),
@@ -303,8 +320,8 @@ HEADINGS: Mapping[str, Sequence[str]] = {
     "Every day": ("list", "show", "run", "evaluate", "check", "new-estimator", "simulate", "sweep", "campaign",
                   "leaderboard"),
     "Logs and programs of others": ("inspect", "align", "tune-noise", "export", "score"),
-    "Study and publish": ("tune", "train", "bench", "robustness", "bound", "allan", "reproduce", "claim", "rescore",
-                          "merge", "submit", "verify", "seal", "cite"),
+    "Study and publish": ("tune", "train", "bench", "robustness", "bound", "allan", "realism", "reproduce", "claim",
+                          "rescore", "merge", "submit", "verify", "seal", "cite"),
     "Maintain": ("standard", "reference", "warmup"),
 }  # fmt: skip
 

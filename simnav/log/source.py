@@ -22,7 +22,7 @@ from simnav.log.reference import Reference
 from simnav.log.table import LogError, LogWarning
 from simnav.recording import AidStream, Block, ImuLabels
 from simnav.sensors import build_layers, labels
-from simnav.types import KINDS, Array, ImuSamples, NavigationStates
+from simnav.types import KINDS, Array, ImuSamples, NavigationStates, TapStates
 from simnav.world.initial_state import draw_start
 
 if TYPE_CHECKING:
@@ -66,6 +66,8 @@ class LogSource:
         Name of the recording.
     note : str
         Which recording this is, and what in it is not measured.
+    surroundings : Surroundings
+        The surroundings of the run.
     instruments, start, initial_truth, faults, duration, step
         As of the simulator. Components that the reference lacks are NaN in ``initial_truth`` and in the truth of the
         blocks; in ``start`` they are made from the motion and the accelerometers.
@@ -99,7 +101,8 @@ class LogSource:
             self._imu, resampled = _regrid(imu, begin, self.instruments.imu.rate, self.duration)  # type: ignore[union-attr]
             notes.append(f"IMU samples were {log.imu.samples}" + (", resampled" if resampled else ""))
         self.initial_truth = self._states(np.zeros(1))
-        self._aids = self._measure(scenario, log, root, scenario.surround(seed))
+        self.surroundings = scenario.surround(seed)
+        self._aids = self._measure(scenario, log, root, self.surroundings)
         heading = _measured_heading(self._aids)
         if heading is None and scenario.initial_error.attitude[2] >= _UNKNOWN_HEADING:
             heading = 0.0, "unknown"
@@ -134,6 +137,10 @@ class LogSource:
         warnings.warn(message, LogWarning, 3)
         return length
 
+    def taps(self, time: Array) -> TapStates:
+        """What an instrument should see at n times of the run [s]; ValueError if the reference has no attitude."""
+        return replace(self._reference.taps(self._begin + time), time=time)
+
     def _states(self, time: Array) -> NavigationStates:
         return replace(self._reference.states(self._begin + time), time=time)
 
@@ -154,7 +161,7 @@ class LogSource:
                 count = math.floor((self.duration - spec.phase) * spec.rate + 1e-9) + 1
                 time = spec.phase + np.arange(first, count) / spec.rate
                 try:
-                    tap = replace(self._reference.taps(self._begin + time), time=time)
+                    tap = self.taps(time)
                 except ValueError as error:
                     raise LogError(f"instruments.{name}: {error}") from None
                 streams[name] = spec.actual().install(name, seed, surroundings).sense(tap)
