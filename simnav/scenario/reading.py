@@ -11,6 +11,7 @@ from typing import Any
 
 from simnav.plugins import PluginError, load_plugin
 from simnav.scenario.catalogue import Header, headers
+from simnav.scenario.replay import read_logs_by
 from simnav.scenario.scenario import Scenario
 from simnav.spec import SpecError, closest
 from simnav.world import VESSELS
@@ -143,3 +144,6 @@ def _read(path: Path) -> Scenario:
     except OSError as error:
         raise SpecError(f"{path}: cannot be read: {error.strerror}") from None
     return parse(text, source=str(path), folder=path.parent)
+
+
+read_logs_by(load)

@@ -181,7 +181,7 @@ def surround(
     made: dict[str, Any] = {}
     origin = np.zeros(3) if start is None else np.array([start.latitude, start.longitude, 0.0])
     if sea is not None:
-        made["sea"] = Waves(sea, seed, origin)
+        made["sea"] = Waves(sea, seed, origin, water_depth)
     if current is not None:
         made["current"] = WaterFlow(current, seed, origin)
     if water_depth is not None:
