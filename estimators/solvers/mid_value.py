@@ -17,8 +17,12 @@ The covariance is that of the mixture of the three, about the estimate, each as 
     P = 1/3 sum(P_k + d_k d_k')
 
 with the difference d_k of solution k from the estimate. So it grows where the solutions disagree, which none of the P_k
-does. If all three are wrong in the same way, it does not: a lasting error of the only instrument that gives the
-position is believed by all of them.
+does. They come together again when the wrong one has pulled the others, or when the fault has ended and all have
+followed it a little; that does not decide who was right. So their disagreement is remembered: the mean of the squared
+d_k, which fades with a memory of `MEMORY` seconds, is added to the variances, to both horizontal components alike.
+
+If all three are wrong in the same way the covariance does not grow: a lasting error of the only instrument that gives
+the position is believed by all of them.
 
 Sources: S. Osder, *Practical view of redundancy management application and theory*, J. Guidance, Control, and Dynamics
 22(1), 1999 (mid-value selection); H. W. Sorenson and D. L. Alspach, *Recursive Bayesian estimation using Gaussian
@@ -29,7 +33,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Mapping
-from math import hypot
+from math import exp, hypot
 from typing import ClassVar
 
 import numpy as np
@@ -46,6 +50,9 @@ from .state_difference import difference, displaced
 from .window import WindowEstimator
 
 __all__ = ["MidValueSelection", "middle"]
+
+#: Memory of the disagreement [s].
+MEMORY = 60.0
 
 
 def middle(estimates: list[Estimate]) -> Estimate:
@@ -128,12 +135,14 @@ class MidValueSelection(Solver):
         for one in self._solutions.values():
             one.row, one.reports_all = self.label, self.reports_all
             one.reset(start, instruments)
+        self._time, self._disagreement = start.time, np.zeros(9)
 
     def update(self, measurements: Measurements) -> Estimate:
         """Take one step's measurements, each at its own time."""
         found = {name: one.update(measurements) for name, one in self._solutions.items()}
         valid = [one for one in found.values() if _finite(one)]
         estimate = middle(valid or list(found.values()))
+        self._remember(estimate, valid)
         diagnostics: dict[str, float | Array] = dict(found["window"].diagnostics)
         apart = {name: hypot(*difference(one, estimate)[:2].tolist()) for name, one in found.items()}
         diagnostics |= {f"apart.{name}": distance for name, distance in apart.items()}
@@ -142,6 +151,17 @@ class MidValueSelection(Solver):
         diagnostics["inconsistent"] = float(np.median(votes))
         estimate.diagnostics, estimate.flagged = diagnostics, found["window"].flagged
         return estimate
+
+    def _remember(self, estimate: Estimate, valid: list[Estimate]) -> None:
+        """Update the remembered disagreement, and add it to the covariance of the estimate in place."""
+        assert estimate.covariance is not None
+        squares = np.mean([difference(one, estimate) ** 2 for one in valid], axis=0) if valid else np.zeros(9)
+        fading = exp(-(estimate.time - self._time) / MEMORY)
+        self._disagreement = fading * self._disagreement + (1.0 - fading) * squares
+        self._time = estimate.time
+        added = self._disagreement.copy()
+        added[:2] = added[:2].mean()
+        estimate.covariance[np.diag_indices(9)] += added
 
 
 def _finite(estimate: Estimate) -> bool:
