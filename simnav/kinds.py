@@ -20,6 +20,7 @@ import numpy as np
 
 from simnav.blocks import StateBlock
 from simnav.compiled import Array, kernel
+from simnav.declared_process import DeclaredProcess
 from simnav.geometry.earth import displace_scalar, relative_position
 from simnav.geometry.rotation import wrap_angle, wrap_scalar
 from simnav.plugins import PluginError, Registry
@@ -452,6 +453,8 @@ class Datasheet:
     channels : tuple of str
         Identifiers of its channels (satellites, beams, beacons), in a fixed order: it gives at most one reading of each
         at a time. Empty: it has no channels, and gives one reading at a time.
+    processes : tuple of DeclaredProcess
+        Further coloured processes of the error. White ones are in ``sigma``.
     """
 
     name: str
@@ -468,6 +471,7 @@ class Datasheet:
     details: Mapping[str, Any] = field(default_factory=dict)
     blocks: tuple[StateBlock, ...] = ()
     channels: tuple[str, ...] = ()
+    processes: tuple[DeclaredProcess, ...] = ()
 
     def __post_init__(self) -> None:
         if self.kind not in KINDS:

@@ -60,6 +60,7 @@ from .base import ErrorModel, Linearised, Observation
 from .declared_errors import CURRENT, bias_of, bias_of_triad
 from .equations import EQUATIONS, equation_of
 from .inertial_update import absorb_inertial, assimilate_inertial, innovate_inertial
+from .levered import is_own, with_lever_arms
 from .measurements import (
     HEADING,
     Aid,
@@ -183,7 +184,7 @@ class InertialModel(ErrorModel):
         imu = instruments.imu
         if imu is None:
             raise UnsuitableScenario("it needs an IMU")
-        self.instruments = instruments
+        self.instruments = instruments = with_lever_arms(instruments)
         self.time = start.time
         self.position = np.array(start.position, dtype=np.float64)
         self.velocity = np.array(start.velocity, dtype=np.float64)
@@ -259,7 +260,7 @@ class InertialModel(ErrorModel):
                 self.bias_at.get(sheet.name, -1), self.scale_at.get(sheet.name, -1),
             )  # fmt: skip
         self._more_blocks()
-        own = [sheet for sheet in observed if KINDS[sheet.kind].observation is not None]
+        own = [sheet for sheet in observed if is_own(sheet)]
         if self.calibrate:
             self.blocks.bring(own)
         for sheet in own:

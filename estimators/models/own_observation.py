@@ -30,6 +30,7 @@ from simnav.plugins import place_of
 from simnav.types import KINDS, NO_SIDE, Array, Datasheet
 
 from .channels import ChannelDatasheet, whole
+from .levered import observation_of
 
 __all__ = ["OwnObservation"]
 
@@ -48,8 +49,9 @@ class OwnObservation:
     Parameters
     ----------
     sheet : Datasheet
-        Datasheet of an instrument whose kind has an observation function. For one with channels it is that of a channel
-        (`simnav.estimators.models.channels.by_channel`); the function receives that of the instrument.
+        Datasheet of an instrument that is observed by a function (`simnav.estimators.models.levered.is_own`). For one
+        with channels it is that of a channel (`simnav.estimators.models.channels.by_channel`); the function receives
+        that of the instrument.
     places : mapping of str to int, optional
         Index of the first state of each of its blocks in the array of values that `point` receives. A block without a
         place has no state: it is zero, and its uncertainty counts as noise.
@@ -66,7 +68,7 @@ class OwnObservation:
         assert not sheet.channels, "each channel has an equation of its own, see `by_channel`"
         self.sheet, self.kind, self._given = sheet, KINDS[sheet.kind], whole(sheet)
         self.channel = sheet.channel if isinstance(sheet, ChannelDatasheet) else ""
-        observation = self.kind.observation
+        observation = observation_of(sheet)
         assert observation is not None
         self._observation = observation
         self._since = since

@@ -14,13 +14,14 @@ from simnav.estimators.adaptations.robust import HuberWeights, Igg3Weights
 from simnav.estimators.adaptations.sage_husa import SageHusa
 from simnav.estimators.adaptations.variational_bayes import VariationalBayes
 from simnav.estimators.composition import Row, piece
+from simnav.estimators.models.dvl_calibration import DvlCalibrationModel
 from simnav.estimators.models.suitable import Suitable
 from simnav.estimators.solvers.imm import ImmEstimator
 from simnav.estimators.solvers.iterated import poor_heading
 from simnav.estimators.solvers.kalman import KalmanEstimator
 
-__all__ = ["Adkf", "AdkfPaper", "FadingEkf", "GatedEkf", "HuberKf", "Iae", "IaeFixed", "Igg3", "Imm", "Mckf", "Rae"]
-__all__ += ["SageHusaKf", "SageHusaPaper", "VbAkf"]
+__all__ = ["Adkf", "Adkf23", "AdkfPaper", "FadingEkf", "GatedEkf", "HuberKf", "Iae", "IaeFixed", "Igg3", "Imm", "Mckf"]
+__all__ += ["Rae", "SageHusaKf", "SageHusaPaper", "VbAkf"]
 
 #: `innovations` was the window of these rows, as a filter has no other.
 _FORMERLY = {"window": "innovations"}
@@ -164,6 +165,16 @@ class AdkfPaper(_Adaptive, adaptation=piece(AdaptiveFactor, preset="paper", c0=N
 
     Source: Z. Zhan, C. Liu, K. Jin et al., *GNSS/SINS/DVL integrated navigation algorithm based on adaptive
     differential Kalman filtering*, PLoS One 21(2), 2026.
+    """
+
+
+@register("adkf-23")
+class Adkf23(Row, solver=KalmanEstimator, model=DvlCalibrationModel, adaptation=AdaptiveFactor, iteration=poor_heading):
+    """Adaptive robust filter over the 23 states of ``ekf-23``, as its paper has them.
+
+    With ``model__preset=paper`` the noise of GNSS and DVL is the printed one, and with ``adaptation__preset=paper`` the
+    statistic is. Source: Z. Zhan, C. Liu, K. Jin et al., *GNSS/SINS/DVL integrated navigation algorithm based on
+    adaptive differential Kalman filtering*, PLoS One 21(2), 2026.
     """
 
 

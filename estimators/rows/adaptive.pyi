@@ -11,13 +11,14 @@ from simnav.estimators.adaptations.robust import HuberWeights, Igg3Weights
 from simnav.estimators.adaptations.sage_husa import SageHusa
 from simnav.estimators.adaptations.variational_bayes import VariationalBayes
 from simnav.estimators.composition import Row, piece
+from simnav.estimators.models.dvl_calibration import DvlCalibrationModel
 from simnav.estimators.models.suitable import Suitable
 from simnav.estimators.solvers.imm import ImmEstimator
 from simnav.estimators.solvers.iterated import poor_heading
 from simnav.estimators.solvers.kalman import KalmanEstimator
 
-__all__ = ["Adkf", "AdkfPaper", "FadingEkf", "GatedEkf", "HuberKf", "Iae", "IaeFixed", "Igg3", "Imm", "Mckf", "Rae"]
-__all__ += ["SageHusaKf", "SageHusaPaper", "VbAkf"]
+__all__ = ["Adkf", "Adkf23", "AdkfPaper", "FadingEkf", "GatedEkf", "HuberKf", "Iae", "IaeFixed", "Igg3", "Imm", "Mckf"]
+__all__ += ["Rae", "SageHusaKf", "SageHusaPaper", "VbAkf"]
 _FORMERLY = {"window": "innovations"}
 
 class _Adaptive(Row, solver=KalmanEstimator, model=Suitable, iteration=poor_heading):
@@ -138,6 +139,24 @@ class AdkfPaper(_Adaptive, adaptation=piece(AdaptiveFactor, preset="paper", c0=N
         statistic: typing.Literal["discrepancy", "residual", "ratio"] = "residual",
         factor: typing.Literal["two-segment", "three-segment", "exponential"] = "three-segment",
         target: typing.Literal["R", "P"] = "R",
+        iterate_above_deg: float | None = None,
+    ) -> None: ...
+
+@register("adkf-23")
+class Adkf23(Row, solver=KalmanEstimator, model=DvlCalibrationModel, adaptation=AdaptiveFactor, iteration=poor_heading):
+    def __init__(
+        self,
+        *,
+        statistic: typing.Literal["discrepancy", "residual", "ratio"] = "residual",
+        factor: typing.Literal["two-segment", "three-segment", "exponential"] = "three-segment",
+        target: typing.Literal["R", "P"] = "R",
+        adaptation__preset: typing.Literal["default", "paper"] = "default",
+        c0: float | None = None,
+        c1: float | None = None,
+        together: int = 3,
+        lever_arm: float = 0.02,
+        delay: float = 0.005,
+        model__preset: typing.Literal["default", "paper"] = "default",
         iterate_above_deg: float | None = None,
     ) -> None: ...
 

@@ -404,8 +404,8 @@ _NAME_GAP, _LETTER = 7, 6.5  # from a point to its name, and a letter of it [pix
 _NAME_ROOM = 26  # for a name above the highest point [pixels]
 
 
-def dial(name: str, across: str, up: str, data: Mapping[str, Any], caption: str) -> Chart:
-    """Error against a dial, with the values at which estimators break.
+def dial(name: str, across: str, up: str, data: Mapping[str, Any], caption: str, *, breaking: bool = True) -> Chart:
+    """Error against a dial, with the values at which estimators break if ``breaking``.
 
     Parameters
     ----------
@@ -440,8 +440,9 @@ def dial(name: str, across: str, up: str, data: Mapping[str, Any], caption: str)
             },
         },
     ]
-    words = f"{caption} Crosses: breaking points, where the error passes twice that at the clean value. {_ZOOM_HELP}"
-    return Chart(name, f"Error against {across}", words, {"height": 300, "layer": layers}, data, byrow=True)
+    crosses = " Crosses: breaking points, where the error passes twice that at the clean value." if breaking else ""
+    title, spec = f"Error against {across}", {"height": 300, "layer": layers if breaking else layers[:-1]}
+    return Chart(name, title, f"{caption}{crosses} {_ZOOM_HELP}", spec, data, byrow=True)
 
 
 def spread(

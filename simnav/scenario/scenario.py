@@ -158,7 +158,8 @@ class Scenario(Description):
 
     def _registered(self) -> list[Spec]:
         """The parts of the scenario whose classes are registered, by simnav or by others."""
-        return [*self.instruments.values(), *self.faults, *self.surroundings.values(), self.craft]
+        processes = [process for spec in self.aids.values() for process in spec.processes]
+        return [*self.instruments.values(), *processes, *self.faults, *self.surroundings.values(), self.craft]
 
     def __reduce_ex__(self, protocol: SupportsIndex) -> Any:
         """Pickle for another process, which must load the plug-in files before it can build their instruments."""

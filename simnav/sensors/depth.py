@@ -6,7 +6,7 @@ from typing import Literal
 
 from simnav import kinds
 from simnav.kinds import LARGEST_HEIGHT, Component, Kind
-from simnav.sensors.instrument import ZERO, AidSpec, Instrument, register_instrument
+from simnav.sensors.instrument import ZERO, AidSpec, Instrument, SigmaTriple, register_instrument
 from simnav.sensors.observation import DEPTH, CompiledInstrument
 from simnav.spec import NonNegative, Vector, quantity
 
@@ -31,6 +31,7 @@ class Depth(AidSpec):
     bias_instability: NonNegative = quantity("m", 0.0)
     scale: NonNegative = quantity("percent", 0.0)
     lever_arm: Vector = quantity("m", ZERO)
+    lever_arm_sigma: SigmaTriple = quantity("m", ZERO)
     fixed_bias: float = quantity("m", 0.0)
     fixed_scale: float = quantity("percent", 0.0)
 
