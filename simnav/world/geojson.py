@@ -133,4 +133,4 @@ def _corners(polygon: Any, where: str) -> Array:
             f"{where}: [{longitude:g}, {latitude:g}] is no place; coordinates should be longitude and latitude in "
             "degrees, in this order"
         )
-    return np.radians(ring)
+    return np.asarray(np.radians(ring))
