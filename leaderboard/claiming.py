@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -103,6 +104,8 @@ def _own_dial(claim: Claim, text: str) -> Dial:
         raise RequestError(f"--holds-if {text}: a condition of your own claim has values, like {name}=1,2,4")
     try:
         numbers = sorted({float(v) for v in values})
+        if not all(map(math.isfinite, numbers)):
+            raise ValueError
     except ValueError:
         raise RequestError(f"--holds-if {text}: the values should be numbers, like {name}=1,2,4") from None
     whose, dot, parameter = name.partition(".")
@@ -113,9 +116,10 @@ def _own_dial(claim: Claim, text: str) -> Dial:
     if dot and whose in ("row", "than", "both"):
         made = parameter_dial(name, f"{parameter} of {whose}", whose, parameter, numbers)
         with mistakes():
-            checked = made.set(claim.base(), numbers[0])
-            for request in (checked.row, checked.than):
-                request.make()
+            for number in numbers:
+                checked = made.set(claim.base(), number)
+                for request in (checked.row, checked.than):
+                    request.make()
         return made
     (dial, _), *_ = chosen_dials(claim.base().scenario, {name: numbers})
     return scenario_dial(name, dial.title, dial.unit, numbers, lambda x: {dial.key: int(x) if x.is_integer() else x})

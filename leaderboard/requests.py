@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from simnav.scenario import Scenario
 
 __all__ = [
+    "AlignRequest",
     "AllanRequest",
     "BenchRequest",
     "BoundRequest",
@@ -30,6 +31,8 @@ __all__ = [
     "CiteRequest",
     "CostsRequest",
     "EvaluateRequest",
+    "ExportRequest",
+    "InspectRequest",
     "MergeRequest",
     "RankRequest",
     "RealismRequest",
@@ -38,8 +41,10 @@ __all__ = [
     "RescoreRequest",
     "RobustnessRequest",
     "RunRequest",
+    "ScoreRequest",
     "SealRequest",
     "SweepRequest",
+    "TuneNoiseRequest",
     "TuneRequest",
     "VerifyRequest",
 ]
@@ -62,6 +67,7 @@ CAMPAIGN_PROGRESS = "Called with a `simnav.leaderboard.campaign.campaign.Progres
 FOLDER = "Folder that a campaign wrote."
 _PROFILE = "What is run: smoke, quick, standard, full, robustness, or a TOML file of your own."
 _OWN_SCENARIOS = "TOML files of scenarios outside the catalogue."
+_SEALED_RUNS = "Derive the seeds from the secret in this file, as 'campaign --sealed' does."
 _FIRST_SEED = "Seed of the first run; the others count up."
 
 
@@ -71,6 +77,70 @@ class RecordRequest:
 
     scenario: ScenarioLike = option(help=_SCENARIO, more=_SCENARIO_MORE, argument=True, metavar="SCENARIO")
     seed: int = option(default=0, help="Seed of the run.", least=0)
+
+
+@request
+class ScoreRequest:
+    """Score estimates that were made elsewhere, with the scores and the page of a run."""
+
+    scenario: ScenarioLike = option(help=_SCENARIO, more=_SCENARIO_MORE, argument=True, metavar="SCENARIO")
+    files: Iterable[PathLike] = option(
+        help="Files of estimates, CSV or TUM; see docs/how-to/connect-a-program.md.",
+        argument=True,
+        metavar="FILES",
+        cli=list[Path],
+    )
+    _: KW_ONLY
+    seed: int = option(default=0, help="Seed of the run; with --sealed, its number.", least=0)
+    sealed: PathLike | None = option("--sealed", default=None, metavar="KEYFILE", help=_SEALED_RUNS)
+
+
+@request
+class ExportRequest:
+    """Write what an estimator receives, for programs of others: measurements, start and datasheets."""
+
+    scenarios: Scenarios = option(
+        help="Names, tracks or TOML files.", argument=True, metavar="SCENARIOS", cli=list[str]
+    )
+    output: PathLike = option("--output", "-o", help="File or folder to write; of several runs a folder.")
+    _: KW_ONLY
+    form: str = option("--format", default="csv", help="Format, such as csv, npz, gpx, kml, tum, nmea or mcap.")
+    seed: int = option(default=0, help="Seed of the first run; the others count up.", least=0)
+    runs: int = option("--runs", "-n", default=1, help="Seeds of each scenario.", least=1)
+    truth: bool = option("--truth", default=False, help="Write truth and fault labels, too.")
+    blind: bool = option(
+        "--blind",
+        default=False,
+        help="Neither truth, nor labels, nor seeds: for estimates that 'campaign --external' ranks; with --sealed.",
+    )
+    sealed: PathLike | None = option("--sealed", default=None, metavar="KEYFILE", help=_SEALED_RUNS)
+
+
+@request
+class AlignRequest:
+    """Compare every instrument of a log with the reference: delay, lever arm, offset, scale, each with its sigma."""
+
+    scenario: ScenarioLike = option(help=_SCENARIO, more=_SCENARIO_MORE, argument=True, metavar="SCENARIO")
+    seed: int = option(default=0, help="Number of the recording.", least=0)
+
+
+@request
+class TuneNoiseRequest:
+    """Propose noise figures for the datasheets of a log, from its reference and the stillest stretches of its IMU."""
+
+    scenario: ScenarioLike = option(help=_SCENARIO, more=_SCENARIO_MORE, argument=True, metavar="SCENARIO")
+    seed: int = option(default=0, help="Number of the recording.", least=0)
+
+
+@request
+class InspectRequest:
+    """Show what the files of a log hold, and write a scenario to begin with."""
+
+    files: Iterable[PathLike] = option(help="Files or folders.", argument=True, metavar="FILES", cli=list[Path])
+    _: KW_ONLY
+    output: PathLike | None = option(
+        "--output", "-o", default=None, help="Write a scenario to begin with to this TOML file."
+    )
 
 
 @request
@@ -144,6 +214,13 @@ class CampaignRequest(CampaignOptions):
         metavar="KEYFILE",
         help="Derive the seeds from the secret in this file.",
         more="Results carry its hash, and `verify` repeats them.",
+    )
+    external: PathLike | None = option(
+        "--external",
+        default=None,
+        metavar="FOLDER",
+        help="Also rank estimates that were made elsewhere: FOLDER/NAME/SCENARIO-RUN.csv or .tum.",
+        more="They are marked external: not confined, and without cost.",
     )
     oracle: bool = option(
         default=True, help="Run the oracles on simulated scenarios, too: the reference of a board, not ranked."
@@ -541,6 +618,13 @@ class ReproduceRequest:
         default=False,
         help="More runs for undecided rows, until all are decided.",
         more="See `simnav.leaderboard.papers.sequential`.",
+    )
+    holds_if: bool = option(
+        "--holds-if",
+        default=False,
+        help="Search for the conditions under which the paper's claims hold.",
+        more="All choices that the paper does not print are varied (see `simnav claim`), on --runs seeds (6) of the "
+        "search; judged on twice as many or more. The tables are those that come with simnav.",
     )
     limit: int = option(default=200, help="With --until-decided: largest number of runs of a scenario.", least=1)
     minutes: float | None = option(

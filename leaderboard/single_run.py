@@ -6,6 +6,7 @@ import math
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,6 +14,7 @@ import numpy as np
 from simnav.kinds import EQUATIONS, KINDS
 from simnav.leaderboard.campaign.recorder import record_here
 from simnav.leaderboard.campaign.request import EstimatorRequest
+from simnav.leaderboard.figures.lag_figure import lag_figure
 from simnav.leaderboard.figures.run_figure import run_figure
 from simnav.leaderboard.ranking.ranking_table import consistency
 from simnav.leaderboard.ranking.rows import Consistency
@@ -33,7 +35,7 @@ if TYPE_CHECKING:
     from simnav.scoring import Stanford
     from simnav.trial import Trial
 
-__all__ = ["EstimatorRun", "RunReport", "run_once"]
+__all__ = ["EstimatorRun", "RunReport", "run_once", "score_of_files"]
 
 
 #: Diagnostics that an estimator gives for each instrument that it uses.
@@ -150,6 +152,25 @@ class RunReport(Shown):
             raise RequestError("there is nothing to draw: no estimator gave an estimate")
         return run_figure(self.recording, trials, [e.estimator for e in self.estimators if e.reference])
 
+    def plot_lags(self) -> Figure:
+        """The latency-accuracy curve: horizontal RMSE against the delay of the output.
+
+        Raises
+        ------
+        RequestError
+            If no estimator ran with ``lags``.
+        """
+        base = "horizontal_rmse"
+        names = _late_scores(self.estimators)
+        if not names:
+            raise RequestError("there is no output that is late: run with lags, like --lags 1/5/10")
+        curves = {
+            e.estimator: [(lag, float(e.scores[s])) for lag, s in ((0.0, base), *names) if e.scores.get(s, 0.0) > 0.0]
+            for e in self.estimators
+        }
+        return lag_figure({k: v for k, v in curves.items() if v},
+                          f"{self.recording.scenario}, seed {self.recording.seed}")  # fmt: skip
+
     def stanford(self, limit: float = 25.0) -> dict[str, Stanford]:
         """Errors beside protection levels, by label, of the estimators that have a protection level.
 
@@ -193,19 +214,41 @@ def run_once(
     return RunReport(recording, simulated, tuple(runs))
 
 
+def score_of_files(scenario: Scenario, paths: Sequence[Path], seed: int) -> RunReport:
+    """Score files of estimates of one run; see `simnav.leaderboard.interface.score_files`."""
+    from simnav.trial.estimate_file import trial_of_file
+
+    started = time.perf_counter()
+    recording = record_here(scenario, seed)
+    simulated = time.perf_counter() - started
+    runs = []
+    for path in paths:
+        with mistakes(ValueError, OSError):
+            trial = trial_of_file(path, recording)
+        scores = score(trial, recording) if len(trial) else {}
+        runs.append(EstimatorRun(path.name, {}, False, trial.status, printable(trial.reason), math.nan, scores, trial))
+    return RunReport(recording, simulated, tuple(runs))
+
+
 def _covariance(scores: Mapping[str, float]) -> str:
     """What the truth of this run says of the covariance: the verdict, and the NEES that it is from."""
     nees = scores.get("nees_horizontal", math.nan)
     return consistency(Consistency(badge(np.array([nees])), nees))
 
 
+def _late_scores(estimators: Sequence[EstimatorRun]) -> list[tuple[float, str]]:
+    """The lags [s] that any estimator ran with, ascending, each with the name of its horizontal RMSE."""
+    names = {n for e in estimators for n in e.scores if n.startswith("horizontal_rmse_lag_")}
+    return sorted((seconds_of(name.rpartition("_")[2]), name) for name in names)
+
+
 def lag_table(estimators: Sequence[EstimatorRun]) -> tables.Fitted:
     """Horizontal RMSE against the delay of the output: a row an estimator, a column a lag."""
     base = "horizontal_rmse"
-    names = {n for e in estimators for n in e.scores if n.startswith(f"{base}_lag_")}
-    lags = sorted(names, key=lambda name: seconds_of(name.rpartition("_")[2]))
-    columns = ["estimator", "newest", *(f"{seconds_of(n.rpartition('_')[2]):g} s late" for n in lags)]
-    cells = [[e.estimator, *(tables.number(e.scores.get(s)) for s in (base, *lags))] for e in estimators]
+    names = _late_scores(estimators)
+    columns = ["estimator", "newest", *(f"{lag:g} s late" for lag, _ in names)]
+    cells = [[e.estimator, *(tables.number(e.scores.get(s)) for s in (base, *(s for _, s in names)))]
+             for e in estimators]  # fmt: skip
     return tables.Fitted("Horizontal RMSE [m] of an output that is late", columns, cells, columns, numeric=columns[1:])
 
 

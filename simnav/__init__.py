@@ -27,7 +27,20 @@ if TYPE_CHECKING:
     from simnav.kinds import Component, Kind
     from simnav.leaderboard.claiming import claim
     from simnav.leaderboard.costing import bench, costs
-    from simnav.leaderboard.inspection import allan, bound, cite, merge, rank, realism, reproduce, rescore, seal, verify
+    from simnav.leaderboard.inspection import (
+        allan,
+        bound,
+        cite,
+        export,
+        merge,
+        rank,
+        realism,
+        reproduce,
+        rescore,
+        score_files,
+        seal,
+        verify,
+    )
     from simnav.leaderboard.publishing import (
         audit_standard,
         check_standard,
@@ -98,6 +111,7 @@ __all__ = [
     "claim",
     "costs",
     "evaluate",
+    "export",
     "load",
     "load_plugin",
     "make",
@@ -119,6 +133,7 @@ __all__ = [
     "run_standard",
     "run_trial",
     "score",
+    "score_files",
     "seal",
     "site",
     "standard",
@@ -163,11 +178,13 @@ _HOMES = {
         "allan",
         "bound",
         "cite",
+        "export",
         "merge",
         "rank",
         "realism",
         "reproduce",
         "rescore",
+        "score_files",
         "seal",
         "verify",
     ),

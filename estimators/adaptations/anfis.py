@@ -137,9 +137,10 @@ class Anfis(NoiseAdaptation):
         Parameter file of `simnav train anfis`; empty: the file that comes with simnav.
     lowest, highest : float
         Bounds of the sigma, as multiples of the datasheet's sigma (of the learned one with ``level="learned"``).
-    level : "datasheet" or "learned"
-        What the inputs and the output are relative to: the datasheet's noise, as in the training; or the noise that the
-        last innovations have, for a datasheet that may be wrong (`simnav.estimators.adaptations.anfis_level`).
+    level : "learned" or "datasheet"
+        What the inputs and the output are relative to: the noise that the last innovations have, which is the
+        datasheet's until they contradict it (`simnav.estimators.adaptations.anfis_level`); or always the datasheet's
+        noise, as in the training.
 
     Raises
     ------
@@ -153,7 +154,7 @@ class Anfis(NoiseAdaptation):
         file: str = "",
         lowest: float = 1.0,
         highest: float = 30.0,
-        level: Literal["datasheet", "learned"] = "datasheet",
+        level: Literal["datasheet", "learned"] = "learned",
     ):
         if level not in ("datasheet", "learned"):
             raise ValueError(f"level is {level!r}; it must be 'datasheet' or 'learned'")

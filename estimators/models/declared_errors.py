@@ -12,8 +12,9 @@ apart. One more process of an error is one more block here, and nothing else.
 - three gyroscopes or accelerometers: ``bias``, ``scale`` (three) and ``misalignment`` (six: each axis to the others)
 - a lasting fault, for estimators that know the faults: its size (`error_of_fault`)
 
-What an instrument of somebody else needs beyond that it brings along in its datasheet (`Datasheet.blocks`). No
-datasheet says how well a lever arm was measured.
+What an instrument needs beyond that it brings along in its datasheet (`Datasheet.blocks`): the error of its lever arm
+if ``lever_arm_sigma`` says how well that was measured (`simnav.estimators.models.levered`), and whatever an instrument
+of somebody else depends on.
 """
 
 from __future__ import annotations

@@ -14,13 +14,14 @@ from simnav.estimators.adaptations.robust import HuberWeights, Igg3Weights
 from simnav.estimators.adaptations.sage_husa import SageHusa
 from simnav.estimators.adaptations.variational_bayes import VariationalBayes
 from simnav.estimators.composition import Row, piece
+from simnav.estimators.models.dvl_calibration import DvlCalibrationModel
 from simnav.estimators.models.suitable import Suitable
 from simnav.estimators.solvers.imm import ImmEstimator
 from simnav.estimators.solvers.iterated import poor_heading
 from simnav.estimators.solvers.kalman import KalmanEstimator
 
-__all__ = ["Adkf", "AdkfPaper", "FadingEkf", "GatedEkf", "HuberKf", "Iae", "IaeFixed", "Igg3", "Imm", "Mckf", "Rae"]
-__all__ += ["SageHusaKf", "SageHusaPaper", "VbAkf"]
+__all__ = ["Adkf", "Adkf23", "AdkfPaper", "FadingEkf", "GatedEkf", "HuberKf", "Iae", "IaeFixed", "Igg3", "Imm", "Mckf"]
+__all__ += ["Rae", "SageHusaKf", "SageHusaPaper", "VbAkf"]
 
 #: `innovations` was the window of these rows, as a filter has no other.
 _FORMERLY = {"window": "innovations"}
@@ -42,9 +43,13 @@ class SageHusaKf(_Adaptive, adaptation=SageHusa):
     2
         Windows, priors and forgetting are in seconds for an instrument of more than 1 Hz. Innovations that persist
         while no other instrument contradicts them are taken as a wrong prediction, and not as noise (`PredictionTest`).
+    3
+        A lasting error is blamed on an instrument only by a witness, whatever its size. Before, one that an IMU of 20
+        times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
+        Fixes that see no error of a log at first may see it later.
     """
 
-    version = 2
+    version = 3
 
 
 @register("sage-husa-paper")
@@ -61,9 +66,13 @@ class SageHusaPaper(
     2
         Windows, priors and forgetting are in seconds for an instrument of more than 1 Hz. Innovations that persist
         while no other instrument contradicts them are taken as a wrong prediction, and not as noise (`PredictionTest`).
+    3
+        A lasting error is blamed on an instrument only by a witness, whatever its size. Before, one that an IMU of 20
+        times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
+        Fixes that see no error of a log at first may see it later.
     """
 
-    version = 2
+    version = 3
 
 
 @register("iae")
@@ -78,9 +87,13 @@ class Iae(_Adaptive, adaptation=piece(InnovationBased, source="innovation")):
     2
         Windows, priors and forgetting are in seconds for an instrument of more than 1 Hz. Innovations that persist
         while no other instrument contradicts them are taken as a wrong prediction, and not as noise (`PredictionTest`).
+    3
+        A lasting error is blamed on an instrument only by a witness, whatever its size. Before, one that an IMU of 20
+        times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
+        Fixes that see no error of a log at first may see it later.
     """
 
-    version = 2
+    version = 3
 
 
 @register("iae-fixed")
@@ -94,9 +107,13 @@ class IaeFixed(_Adaptive, adaptation=piece(FixedWindow, source="innovation")):
     2
         Windows, priors and forgetting are in seconds for an instrument of more than 1 Hz. Innovations that persist
         while no other instrument contradicts them are taken as a wrong prediction, and not as noise (`PredictionTest`).
+    3
+        A lasting error is blamed on an instrument only by a witness, whatever its size. Before, one that an IMU of 20
+        times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
+        Fixes that see no error of a log at first may see it later.
     """
 
-    version = 2
+    version = 3
     formerly = _FORMERLY
 
 
@@ -111,9 +128,13 @@ class Rae(_Adaptive, adaptation=piece(FixedWindow, source="residual", newest=Fal
     2
         Windows, priors and forgetting are in seconds for an instrument of more than 1 Hz. Innovations that persist
         while no other instrument contradicts them are taken as a wrong prediction, and not as noise (`PredictionTest`).
+    3
+        A lasting error is blamed on an instrument only by a witness, whatever its size. Before, one that an IMU of 20
+        times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
+        Fixes that see no error of a log at first may see it later.
     """
 
-    version = 2
+    version = 3
     formerly = _FORMERLY
 
 
@@ -129,9 +150,13 @@ class Adkf(_Adaptive, adaptation=AdaptiveFactor):
     2
         Innovations that persist while no other instrument contradicts them are taken as a wrong prediction, and not as
         noise or gross errors of their instrument (`PredictionTest`).
+    3
+        A lasting error is blamed on an instrument only by a witness, whatever its size. Before, one that an IMU of 20
+        times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
+        Fixes that see no error of a log at first may see it later.
     """
 
-    version = 2
+    version = 3
 
 
 @register("adkf-paper")
@@ -140,6 +165,16 @@ class AdkfPaper(_Adaptive, adaptation=piece(AdaptiveFactor, preset="paper", c0=N
 
     Source: Z. Zhan, C. Liu, K. Jin et al., *GNSS/SINS/DVL integrated navigation algorithm based on adaptive
     differential Kalman filtering*, PLoS One 21(2), 2026.
+    """
+
+
+@register("adkf-23")
+class Adkf23(Row, solver=KalmanEstimator, model=DvlCalibrationModel, adaptation=AdaptiveFactor, iteration=poor_heading):
+    """Adaptive robust filter over the 23 states of ``ekf-23``, as its paper has them.
+
+    With ``model__preset=paper`` the noise of GNSS and DVL is the printed one, and with ``adaptation__preset=paper`` the
+    statistic is. Source: Z. Zhan, C. Liu, K. Jin et al., *GNSS/SINS/DVL integrated navigation algorithm based on
+    adaptive differential Kalman filtering*, PLoS One 21(2), 2026.
     """
 
 
@@ -155,9 +190,13 @@ class Igg3(_Adaptive, adaptation=Igg3Weights):
     2
         Innovations that persist while no other instrument contradicts them are taken as a wrong prediction, and not as
         noise or gross errors of their instrument (`PredictionTest`).
+    3
+        A lasting error is blamed on an instrument only by a witness, whatever its size. Before, one that an IMU of 20
+        times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
+        Fixes that see no error of a log at first may see it later.
     """
 
-    version = 2
+    version = 3
 
 
 @register("huber-kf")
@@ -171,9 +210,13 @@ class HuberKf(_Adaptive, adaptation=HuberWeights):
     2
         Innovations that persist while no other instrument contradicts them are taken as a wrong prediction, and not as
         noise or gross errors of their instrument (`PredictionTest`).
+    3
+        A lasting error is blamed on an instrument only by a witness, whatever its size. Before, one that an IMU of 20
+        times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
+        Fixes that see no error of a log at first may see it later.
     """
 
-    version = 2
+    version = 3
 
 
 @register("gated-ekf")
@@ -188,9 +231,13 @@ class GatedEkf(_Adaptive, adaptation=ChiSquareGate):
     2
         Innovations that persist while no other instrument contradicts them are taken as a wrong prediction, and not as
         noise or gross errors of their instrument (`PredictionTest`).
+    3
+        A lasting error is blamed on an instrument only by a witness, whatever its size. Before, one that an IMU of 20
+        times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
+        Fixes that see no error of a log at first may see it later.
     """
 
-    version = 2
+    version = 3
 
 
 @register("fading-ekf")
@@ -213,9 +260,13 @@ class VbAkf(_Adaptive, adaptation=VariationalBayes):
     2
         Windows, priors and forgetting are in seconds for an instrument of more than 1 Hz. Innovations that persist
         while no other instrument contradicts them are taken as a wrong prediction, and not as noise (`PredictionTest`).
+    3
+        A lasting error is blamed on an instrument only by a witness, whatever its size. Before, one that an IMU of 20
+        times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
+        Fixes that see no error of a log at first may see it later.
     """
 
-    version = 2
+    version = 3
 
 
 @register("mckf")
@@ -229,9 +280,13 @@ class Mckf(_Adaptive, adaptation=piece(MaximumCorrentropy, smallest=1e-3)):
     2
         Innovations that persist while no other instrument contradicts them are taken as a wrong prediction, and not as
         noise or gross errors of their instrument (`PredictionTest`).
+    3
+        A lasting error is blamed on an instrument only by a witness, whatever its size. Before, one that an IMU of 20
+        times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
+        Fixes that see no error of a log at first may see it later.
     """
 
-    version = 2
+    version = 3
 
 
 @register("imm")
@@ -246,6 +301,10 @@ class Imm(Row, solver=ImmEstimator, model=Suitable):
     2
         Innovations that persist while no other instrument contradicts them are taken as a wrong prediction, and not as
         noise or gross errors of their instrument (`PredictionTest`).
+    3
+        A lasting error is blamed on an instrument only by a witness, whatever its size. Before, one that an IMU of 20
+        times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
+        Fixes that see no error of a log at first may see it later.
     """
 
-    version = 2
+    version = 3

@@ -11,13 +11,14 @@ from simnav.estimators.adaptations.robust import HuberWeights, Igg3Weights
 from simnav.estimators.adaptations.sage_husa import SageHusa
 from simnav.estimators.adaptations.variational_bayes import VariationalBayes
 from simnav.estimators.composition import Row, piece
+from simnav.estimators.models.dvl_calibration import DvlCalibrationModel
 from simnav.estimators.models.suitable import Suitable
 from simnav.estimators.solvers.imm import ImmEstimator
 from simnav.estimators.solvers.iterated import poor_heading
 from simnav.estimators.solvers.kalman import KalmanEstimator
 
-__all__ = ["Adkf", "AdkfPaper", "FadingEkf", "GatedEkf", "HuberKf", "Iae", "IaeFixed", "Igg3", "Imm", "Mckf", "Rae"]
-__all__ += ["SageHusaKf", "SageHusaPaper", "VbAkf"]
+__all__ = ["Adkf", "Adkf23", "AdkfPaper", "FadingEkf", "GatedEkf", "HuberKf", "Iae", "IaeFixed", "Igg3", "Imm", "Mckf"]
+__all__ += ["Rae", "SageHusaKf", "SageHusaPaper", "VbAkf"]
 _FORMERLY = {"window": "innovations"}
 
 class _Adaptive(Row, solver=KalmanEstimator, model=Suitable, iteration=poor_heading):
@@ -29,7 +30,7 @@ class _Adaptive(Row, solver=KalmanEstimator, model=Suitable, iteration=poor_head
 
 @register("sage-husa")
 class SageHusaKf(_Adaptive, adaptation=SageHusa):
-    version = 2
+    version = 3
     def __init__(
         self,
         *,
@@ -46,7 +47,7 @@ class SageHusaKf(_Adaptive, adaptation=SageHusa):
 class SageHusaPaper(
     _Adaptive, adaptation=piece(SageHusa, defaults={"fading": 1.0, "prior": 0, "lowest": 0.5, "scope": "fixes"})
 ):
-    version = 2
+    version = 3
     def __init__(
         self,
         *,
@@ -61,7 +62,7 @@ class SageHusaPaper(
 
 @register("iae")
 class Iae(_Adaptive, adaptation=piece(InnovationBased, source="innovation")):
-    version = 2
+    version = 3
     def __init__(
         self,
         *,
@@ -81,7 +82,7 @@ class Iae(_Adaptive, adaptation=piece(InnovationBased, source="innovation")):
 
 @register("iae-fixed")
 class IaeFixed(_Adaptive, adaptation=piece(FixedWindow, source="innovation")):
-    version = 2
+    version = 3
     formerly = _FORMERLY
     def __init__(
         self,
@@ -99,7 +100,7 @@ class IaeFixed(_Adaptive, adaptation=piece(FixedWindow, source="innovation")):
 
 @register("rae")
 class Rae(_Adaptive, adaptation=piece(FixedWindow, source="residual", newest=False)):
-    version = 2
+    version = 3
     formerly = _FORMERLY
     def __init__(
         self,
@@ -116,7 +117,7 @@ class Rae(_Adaptive, adaptation=piece(FixedWindow, source="residual", newest=Fal
 
 @register("adkf")
 class Adkf(_Adaptive, adaptation=AdaptiveFactor):
-    version = 2
+    version = 3
     def __init__(
         self,
         *,
@@ -141,9 +142,27 @@ class AdkfPaper(_Adaptive, adaptation=piece(AdaptiveFactor, preset="paper", c0=N
         iterate_above_deg: float | None = None,
     ) -> None: ...
 
+@register("adkf-23")
+class Adkf23(Row, solver=KalmanEstimator, model=DvlCalibrationModel, adaptation=AdaptiveFactor, iteration=poor_heading):
+    def __init__(
+        self,
+        *,
+        statistic: typing.Literal["discrepancy", "residual", "ratio"] = "residual",
+        factor: typing.Literal["two-segment", "three-segment", "exponential"] = "three-segment",
+        target: typing.Literal["R", "P"] = "R",
+        adaptation__preset: typing.Literal["default", "paper"] = "default",
+        c0: float | None = None,
+        c1: float | None = None,
+        together: int = 3,
+        lever_arm: float = 0.02,
+        delay: float = 0.005,
+        model__preset: typing.Literal["default", "paper"] = "default",
+        iterate_above_deg: float | None = None,
+    ) -> None: ...
+
 @register("igg3")
 class Igg3(_Adaptive, adaptation=Igg3Weights):
-    version = 2
+    version = 3
     def __init__(
         self,
         *,
@@ -154,7 +173,7 @@ class Igg3(_Adaptive, adaptation=Igg3Weights):
 
 @register("huber-kf")
 class HuberKf(_Adaptive, adaptation=HuberWeights):
-    version = 2
+    version = 3
     def __init__(
         self,
         *,
@@ -164,7 +183,7 @@ class HuberKf(_Adaptive, adaptation=HuberWeights):
 
 @register("gated-ekf")
 class GatedEkf(_Adaptive, adaptation=ChiSquareGate):
-    version = 2
+    version = 3
     def __init__(
         self,
         *,
@@ -184,7 +203,7 @@ class FadingEkf(_Adaptive, adaptation=FadingMemory):
 
 @register("vb-akf")
 class VbAkf(_Adaptive, adaptation=VariationalBayes):
-    version = 2
+    version = 3
     def __init__(
         self,
         *,
@@ -199,7 +218,7 @@ class VbAkf(_Adaptive, adaptation=VariationalBayes):
 
 @register("mckf")
 class Mckf(_Adaptive, adaptation=piece(MaximumCorrentropy, smallest=1e-3)):
-    version = 2
+    version = 3
     def __init__(
         self,
         *,
@@ -211,7 +230,7 @@ class Mckf(_Adaptive, adaptation=piece(MaximumCorrentropy, smallest=1e-3)):
 
 @register("imm")
 class Imm(Row, solver=ImmEstimator, model=Suitable):
-    version = 2
+    version = 3
     def __init__(
         self,
         *,

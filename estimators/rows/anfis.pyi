@@ -12,6 +12,7 @@ __all__ = ["AnfisEkf", "AnfisFgo", "AnfisFgoMotion"]
 
 @register("anfis-fgo")
 class AnfisFgo(ShipFgo, adaptation=Anfis):
+    version = 2
     def __init__(
         self,
         *,
@@ -19,7 +20,7 @@ class AnfisFgo(ShipFgo, adaptation=Anfis):
         file: str = "",
         lowest: float = 1.0,
         highest: float = 30.0,
-        level: typing.Literal["datasheet", "learned"] = "datasheet",
+        level: typing.Literal["datasheet", "learned"] = "learned",
         acceleration: float = 0.05,
         turn_rate_deg: float = 0.6,
         turn_time: float = 10.0,
@@ -34,13 +35,14 @@ class AnfisFgo(ShipFgo, adaptation=Anfis):
 
 @register("anfis-fgo-motion")
 class AnfisFgoMotion(ShipFgo, adaptation=piece(Anfis, features="motion")):
+    version = 2
     def __init__(
         self,
         *,
         file: str = "",
         lowest: float = 1.0,
         highest: float = 30.0,
-        level: typing.Literal["datasheet", "learned"] = "datasheet",
+        level: typing.Literal["datasheet", "learned"] = "learned",
         acceleration: float = 0.05,
         turn_rate_deg: float = 0.6,
         turn_time: float = 10.0,
@@ -55,6 +57,7 @@ class AnfisFgoMotion(ShipFgo, adaptation=piece(Anfis, features="motion")):
 
 @register("anfis-ekf")
 class AnfisEkf(ShipEkf, adaptation=Anfis):
+    version = 2
     def __init__(
         self,
         *,
@@ -62,7 +65,7 @@ class AnfisEkf(ShipEkf, adaptation=Anfis):
         file: str = "",
         lowest: float = 1.0,
         highest: float = 30.0,
-        level: typing.Literal["datasheet", "learned"] = "datasheet",
+        level: typing.Literal["datasheet", "learned"] = "learned",
         acceleration: float = 0.05,
         turn_rate_deg: float = 0.6,
         turn_time: float = 10.0,

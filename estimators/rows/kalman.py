@@ -7,13 +7,15 @@ from simnav.estimators.models.inertial import InertialModel
 from simnav.estimators.models.kinematic import KinematicModel
 from simnav.estimators.models.nine_state import NineStateModel
 from simnav.estimators.models.ship import ShipModel
+from simnav.estimators.models.standing_ship import StandingShip
 from simnav.estimators.models.unaided import UnaidedModel
 from simnav.estimators.solvers.invariant import InvariantKalmanEstimator
 from simnav.estimators.solvers.iterated import Iteration, poor_heading
 from simnav.estimators.solvers.kalman import KalmanEstimator
 from simnav.estimators.solvers.linear import LinearKalmanEstimator
 
-__all__ = ["Ekf", "Ekf9", "Ekf23", "GnssOnly", "InvariantEkf", "IteratedEkf", "Kf", "Kf23", "PureInertial", "ShipEkf"]
+__all__ = ["Ekf", "Ekf9", "Ekf23", "GnssOnly", "InvariantEkf", "IteratedEkf", "Kf", "Kf9", "Kf23", "PureInertial"]
+__all__ += ["ShipEkf", "ShipEkfStanding"]
 
 
 @register("ekf", aliases=("eskf",))
@@ -73,6 +75,17 @@ class Kf(Row, solver=LinearKalmanEstimator, model=InertialModel):
     """
 
 
+@register("kf-9")
+class Kf9(Row, solver=piece(LinearKalmanEstimator, defaults={"feedback": 1.0}), model=NineStateModel):
+    """Linear 9-state error-state KF, closed loop: the estimated error is fed back once a second.
+
+    The states and fixed sigmas of ``ekf-9``. All measurements of a second are linearised about the same nominal
+    trajectory, which is corrected afterwards. Source: P. S. Maybeck, *Stochastic Models, Estimation, and Control*, vol.
+    1, 1979, section 6.3; the states are those of M. Guo, B. Wang, L. Wei et al., *Robust INS/GNSS/DVL integrated
+    navigation for MASS based on gradient-adaptive factor graph optimization*, 2026.
+    """
+
+
 @register("kf-23", aliases=("kf-paper-003",))
 class Kf23(Row, solver=LinearKalmanEstimator, model=DvlCalibrationModel):
     """Linear 23-state error-state KF, open loop, with the DVL's errors as states.
@@ -87,6 +100,15 @@ class ShipEkf(Row, solver=KalmanEstimator, model=ShipModel):
     """EKF on GNSS, compass and log, for a ship without an INS; estimates log and compass bias and the current.
 
     It uses no IMU. Source: *GNSS/DR integrated navigation for ships*, the paper that proposes ANFIS-FGO.
+    """
+
+
+@register("ship-ekf-standing")
+class ShipEkfStanding(Row, solver=KalmanEstimator, model=StandingShip):
+    """``ship-ekf`` without dead reckoning: where there is no fix, the position stays where it is.
+
+    For comparison only: its error at the end of an outage is the distance that the ship made. One reading of the
+    outages in the figures of *GNSS/DR integrated navigation for ships*, the paper that proposes ANFIS-FGO.
     """
 
 

@@ -8,13 +8,15 @@ from simnav.estimators.models.inertial import InertialModel
 from simnav.estimators.models.kinematic import KinematicModel
 from simnav.estimators.models.nine_state import NineStateModel
 from simnav.estimators.models.ship import ShipModel
+from simnav.estimators.models.standing_ship import StandingShip
 from simnav.estimators.models.unaided import UnaidedModel
 from simnav.estimators.solvers.invariant import InvariantKalmanEstimator
 from simnav.estimators.solvers.iterated import Iteration, poor_heading
 from simnav.estimators.solvers.kalman import KalmanEstimator
 from simnav.estimators.solvers.linear import LinearKalmanEstimator
 
-__all__ = ["Ekf", "Ekf9", "Ekf23", "GnssOnly", "InvariantEkf", "IteratedEkf", "Kf", "Kf23", "PureInertial", "ShipEkf"]
+__all__ = ["Ekf", "Ekf9", "Ekf23", "GnssOnly", "InvariantEkf", "IteratedEkf", "Kf", "Kf9", "Kf23", "PureInertial"]
+__all__ += ["ShipEkf", "ShipEkfStanding"]
 
 @register("ekf", aliases=("eskf",))
 class Ekf(Row, solver=KalmanEstimator, model=InertialModel, iteration=poor_heading):
@@ -75,6 +77,21 @@ class Kf(Row, solver=LinearKalmanEstimator, model=InertialModel):
         self,
         *,
         calibrate: bool = True,
+        feedback: float = 0.0,
+    ) -> None: ...
+
+@register("kf-9")
+class Kf9(Row, solver=piece(LinearKalmanEstimator, defaults={"feedback": 1.0}), model=NineStateModel):
+    def __init__(
+        self,
+        *,
+        sigma_position: float = 0.01,
+        sigma_velocity: float = 0.02,
+        sigma_attitude_deg: float = 0.01,
+        sigma_gnss_horizontal: float = 2.5,
+        sigma_gnss_vertical: float = 5.0,
+        sigma_dvl: float = 0.1,
+        feedback: float = 1.0,
     ) -> None: ...
 
 @register("kf-23", aliases=("kf-paper-003",))
@@ -85,6 +102,7 @@ class Kf23(Row, solver=LinearKalmanEstimator, model=DvlCalibrationModel):
         lever_arm: float = 0.02,
         delay: float = 0.005,
         preset: typing.Literal["default", "paper"] = "default",
+        feedback: float = 0.0,
     ) -> None: ...
 
 @register("ship-ekf")
@@ -98,6 +116,14 @@ class ShipEkf(Row, solver=KalmanEstimator, model=ShipModel):
         current: float = 0.3,
         current_time: float = 3600.0,
         sway: float = 0.2,
+    ) -> None: ...
+
+@register("ship-ekf-standing")
+class ShipEkfStanding(Row, solver=KalmanEstimator, model=StandingShip):
+    def __init__(
+        self,
+        *,
+        patience: float = 1.5,
     ) -> None: ...
 
 @register("gnss-only", aliases=("gnss",))

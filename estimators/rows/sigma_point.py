@@ -3,11 +3,12 @@
 from simnav.estimator import register
 from simnav.estimators.composition import Row, piece
 from simnav.estimators.models.inertial_points import InertialPoints
+from simnav.estimators.models.nine_state_points import NineStatePoints
 from simnav.estimators.models.ship_points import ShipPoints
 from simnav.estimators.solvers.filterpy_unscented import FilterpyUnscentedEstimator
 from simnav.estimators.solvers.sigma_point import SigmaPointEstimator
 
-__all__ = ["Ckf", "FilterpyUkf", "ShipCkf", "ShipUkf", "Ukf"]
+__all__ = ["Ckf", "FilterpyUkf", "ShipCkf", "ShipUkf", "Ukf", "Ukf9"]
 
 #: Points of equal weight, ``sqrt(n)`` sigma out.
 _CUBATURE = piece(SigmaPointEstimator, alpha=1.0, beta=0.0, kappa=0.0)
@@ -18,6 +19,15 @@ class Ukf(Row, solver=SigmaPointEstimator, model=InertialPoints):
     """Unscented Kalman filter on the manifold: the states of ``ekf``, moments by sigma points.
 
     Source: S. J. Julier and J. K. Uhlmann, *Unscented filtering and nonlinear estimation*, Proc. IEEE 92, 2004.
+    """
+
+
+@register("ukf-9")
+class Ukf9(Row, solver=SigmaPointEstimator, model=NineStatePoints):
+    """9-state UKF: the states and fixed sigmas of ``ekf-9``, moments by sigma points.
+
+    The points and weights are those of ``ukf``, because the paper prints none. Source: M. Guo, B. Wang, L. Wei et al.,
+    *Robust INS/GNSS/DVL integrated navigation for MASS based on gradient-adaptive factor graph optimization*, 2026.
     """
 
 

@@ -3,11 +3,12 @@
 from simnav.estimator import register
 from simnav.estimators.composition import Row, piece
 from simnav.estimators.models.inertial_points import InertialPoints
+from simnav.estimators.models.nine_state_points import NineStatePoints
 from simnav.estimators.models.ship_points import ShipPoints
 from simnav.estimators.solvers.filterpy_unscented import FilterpyUnscentedEstimator
 from simnav.estimators.solvers.sigma_point import SigmaPointEstimator
 
-__all__ = ["Ckf", "FilterpyUkf", "ShipCkf", "ShipUkf", "Ukf"]
+__all__ = ["Ckf", "FilterpyUkf", "ShipCkf", "ShipUkf", "Ukf", "Ukf9"]
 _CUBATURE = piece(SigmaPointEstimator, alpha=1.0, beta=0.0, kappa=0.0)
 
 @register("ukf")
@@ -16,6 +17,22 @@ class Ukf(Row, solver=SigmaPointEstimator, model=InertialPoints):
         self,
         *,
         calibrate: bool = True,
+        alpha: float = 0.5,
+        beta: float = 2.0,
+        kappa: float = 0.0,
+    ) -> None: ...
+
+@register("ukf-9")
+class Ukf9(Row, solver=SigmaPointEstimator, model=NineStatePoints):
+    def __init__(
+        self,
+        *,
+        sigma_position: float = 0.01,
+        sigma_velocity: float = 0.02,
+        sigma_attitude_deg: float = 0.01,
+        sigma_gnss_horizontal: float = 2.5,
+        sigma_gnss_vertical: float = 5.0,
+        sigma_dvl: float = 0.1,
         alpha: float = 0.5,
         beta: float = 2.0,
         kappa: float = 0.0,

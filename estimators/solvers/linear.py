@@ -1,4 +1,8 @@
-"""The linear error-state Kalman filter, feed-forward (open loop): the error is estimated, and never fed back.
+"""The linear error-state Kalman filter: open loop (feed-forward), or closed loop with feedback at an interval.
+
+In open loop the error is estimated, and never fed back; all that follows is about it. In closed loop
+(``feedback``) the estimated error is taken off the nominal trajectory at this interval, and is zero afterwards, so the
+nominal trajectory stays near the true one.
 
 The nominal trajectory is free inertial navigation from the initial state. The filter estimates its error with F and H
 taken along the nominal trajectory, and the estimate is nominal minus error. It is linear: with the nominal trajectory
@@ -43,6 +47,8 @@ from .kalman import KalmanEstimator
 
 __all__ = ["LinearKalmanEstimator"]
 
+_ROUNDING = 1e-6  # of times [s]
+
 
 class LinearKalmanEstimator(KalmanEstimator):
     """The solver of the module, over any model that can propagate an error.
@@ -51,6 +57,8 @@ class LinearKalmanEstimator(KalmanEstimator):
     ----------
     model, adaptation
         Model and adaptation of the filter, as for `KalmanEstimator`.
+    feedback : float
+        Interval after which the estimated error is fed back into the nominal trajectory [s]; 0: never (open loop).
 
     Attributes
     ----------
@@ -66,18 +74,26 @@ class LinearKalmanEstimator(KalmanEstimator):
     }
     assimilates = False
 
-    def __init__(self, model: ModelChoice, adaptation: Adaptation | None = None):
+    def __init__(self, model: ModelChoice, adaptation: Adaptation | None = None, feedback: float = 0.0):
+        if not feedback >= 0.0:
+            raise ValueError(f"feedback is {feedback:g}; it must be an interval in s, or 0 for none")
         super().__init__(model, adaptation)
+        self.feedback = feedback
 
     def reset(self, start: InitialState, instruments: Instruments) -> None:
         """Begin a run; UnsuitableScenario if the model lacks an instrument."""
         super().reset(start, instruments)
         self.x = np.zeros(self.model.size)
+        self._fed_back = start.time
 
     def update(self, measurements: Measurements) -> Estimate:
         """Take one step's measurements, each at its own time."""
         estimate = super().update(measurements)
         estimate.diagnostics = {**estimate.diagnostics, "nominal_error": float(np.linalg.norm(self.x[:3]))}
+        if self.feedback > 0.0 and self.model.time - self._fed_back >= self.feedback - _ROUNDING:
+            self.model.correct(self.x)
+            self.x[:] = 0.0
+            self._fed_back = self.model.time
         return estimate
 
     def _propagate(self, until: float) -> None:

@@ -20,12 +20,15 @@ from simnav.leaderboard.publishing_requests import (
     SubmitRequest,
 )
 from simnav.leaderboard.requests import (
+    AlignRequest,
     AllanRequest,
     BenchRequest,
     BoundRequest,
     CampaignRequest,
     CiteRequest,
     EvaluateRequest,
+    ExportRequest,
+    InspectRequest,
     MergeRequest,
     Parameters,
     RealismRequest,
@@ -35,8 +38,10 @@ from simnav.leaderboard.requests import (
     RobustnessRequest,
     RunRequest,
     Scenarios,
+    ScoreRequest,
     SealRequest,
     SweepRequest,
+    TuneNoiseRequest,
     TuneRequest,
     VerifyRequest,
 )
@@ -92,6 +97,9 @@ class RunCommand(RunRequest):
 
     _: KW_ONLY
     plot: Path | None = option(default=None, help=_FIGURE)
+    plot_lags: Path | None = option(
+        default=None, help="With --lags: draw the error against the delay of the output: .png, .svg or .pdf."
+    )
     stanford: Path | None = option(
         default=None, help="Write Stanford diagrams, error beside protection level: .png, .svg or .pdf."
     )
@@ -100,6 +108,14 @@ class RunCommand(RunRequest):
         least=0.01,
         help="Alert limit of the Stanford diagrams in metres; IMO A.915(22): 25, in ports 2.5.",
     )
+
+
+@request
+class ScoreCommand(ScoreRequest):
+    """Score estimates that were made elsewhere, with the scores and the page of a run."""
+
+    _: KW_ONLY
+    plot: Path | None = option(default=None, help=_FIGURE)
 
 
 @request
@@ -113,9 +129,13 @@ class SimulateCommand(RecordRequest):
 
 @request
 class CheckCommand:
-    """Test an estimator against the contract: causality, shapes, determinism, missing instruments."""
+    """Test an estimator against the contract: causality, shapes, determinism, missing instruments.
+    Of a scenario with a log (a TOML file): read all recordings, and show what stops or disturbs a run.
+    """
 
-    estimator: str = option(help="my_filter.py, my_filter.py:MyFilter or a name.", argument=True, metavar="FILE")
+    estimator: str = option(
+        help="my_filter.py, my_filter.py:MyFilter or a name; or my_log.toml.", argument=True, metavar="FILE"
+    )
     parameters: Parameters = option(
         "--set", default=None, metavar="NAME=VALUE", help="Value of a parameter of the estimators."
     )
@@ -221,7 +241,7 @@ class ReferenceCommand:
 @request
 class VerifyCommand(VerifyRequest, BundleOptions):
     """Check results or a submission, and repeat some of the runs, bit for bit.
-    The exit code is 0 if all holds, 3 if it holds but some fields differ from here and are only claimed, 1 otherwise.
+    The exit code is 0 if all holds, 3 if nothing speaks against it but something cannot be checked here, 1 otherwise.
     """
 
 
@@ -266,6 +286,11 @@ COMMANDS: Mapping[str, tuple[type[Any], str]] = {
     "show": (ShowCommand, "show"),
     "run": (RunCommand, "run"),
     "simulate": (SimulateCommand, "simulate"),
+    "score": (ScoreCommand, "score"),
+    "export": (ExportRequest, "export"),
+    "inspect": (InspectRequest, "inspect"),
+    "align": (AlignRequest, "align"),
+    "tune-noise": (TuneNoiseRequest, "tune_noise"),
     "check": (CheckCommand, "check"),
     "bench": (BenchCommand, "bench"),
     "new-estimator": (NewEstimatorCommand, "new_estimator"),
@@ -294,6 +319,7 @@ COMMANDS: Mapping[str, tuple[type[Any], str]] = {
 HEADINGS: Mapping[str, Sequence[str]] = {
     "Every day": ("list", "show", "run", "evaluate", "check", "new-estimator", "simulate", "sweep", "campaign",
                   "leaderboard"),
+    "Logs and programs of others": ("inspect", "align", "tune-noise", "export", "score"),
     "Study and publish": ("tune", "train", "bench", "robustness", "bound", "allan", "realism", "reproduce", "claim",
                           "rescore", "merge", "submit", "verify", "seal", "cite"),
     "Maintain": ("standard", "reference", "warmup"),

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from simnav.leaderboard.inspection import reproduce
 from simnav.leaderboard.papers import figures, page, report
+from simnav.leaderboard.papers.claims.points import gain_text
 from simnav.leaderboard.papers.comparison import RULES
 from simnav.leaderboard.requests import ReproduceRequest
 
@@ -26,7 +27,10 @@ def show(out: Output, request: ReproduceRequest) -> None:
     table = report.write_csv(found, folder / f"paper-{about.key}.csv")
     with out.progress("drawing") as bar:
         drawn = figures.write_figures(
-            found, folder, lambda done, total, note: bar(done, total, note=note), scores_only=request.stored
+            found,
+            folder,
+            lambda done, total, note: bar(done, total, note=note),
+            scores_only=request.stored or request.holds_if,
         )
     written = page.write(found, drawn, folder)
     paths = [d.path for d in drawn if d.path is not None]
@@ -37,6 +41,10 @@ def show(out: Output, request: ReproduceRequest) -> None:
     for note in about.notes:
         out.print(f"note: {note}")
     out.print(f"rule: {RULES}", report.summary(found))
-    if found.count("undecided") and not request.stored:
+    for answer in found.answers or []:
+        out.print(f"claim: {answer.sentence}", *answer.shown())
+        out.print(f"with our settings: {gain_text(answer.ours)}: {answer.standing}",
+                  f"verdict: {answer.sentence_of_verdict}")  # fmt: skip
+    if found.count("undecided") and not (request.stored or request.holds_if):
         out.print(f"more runs for undecided rows: simnav reproduce {about.key} --until-decided")
     out.print(f"table:   {table}", f"figures: {len(paths)} as PNG in {folder}", f"page:    {written}")

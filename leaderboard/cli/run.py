@@ -20,7 +20,12 @@ __all__ = ["show"]
 
 def show(out: Output, request: RunCommand) -> None:
     """Run estimators once over one scenario and score them."""
-    for option, path in (("--plot", request.plot), ("--stanford", request.stanford)):
+    if request.plot_lags is not None and request.lags is None:
+        raise RequestError(
+            "--plot-lags draws the error against the delay of the output: give delays, like --lags 1/5/10"
+        )
+    figures = (("--plot", request.plot), ("--plot-lags", request.plot_lags), ("--stanford", request.stanford))
+    for option, path in figures:
         require_figure(option, path)
         if path is not None and not absolute(path).parent.is_dir():
             raise RequestError(f"{option} {path}: there is no folder {path.parent}")
@@ -30,6 +35,9 @@ def show(out: Output, request: RunCommand) -> None:
     drawn = None
     if request.plot is not None and any(len(e.trial) for e in report.estimators):
         drawn = save_as(report.plot(), absolute(request.plot))
+    delays = None
+    if request.plot_lags is not None and any("_lag_" in name for e in report.estimators for name in e.scores):
+        delays = save_as(report.plot_lags(), absolute(request.plot_lags))
     diagrams = {} if request.stanford is None else report.stanford(request.alert_limit)
     shown = None
     if request.stanford is not None and diagrams:
@@ -38,6 +46,8 @@ def show(out: Output, request: RunCommand) -> None:
     elif request.stanford is not None:
         out.remark("no Stanford diagram: no estimator gave a covariance or a protection level")
     document = {**report.to_dict(), "plot": None if drawn is None else str(drawn)}
+    if request.plot_lags is not None:
+        document["plot_lags"] = None if delays is None else str(delays)
     if request.stanford is not None:
         integrity = {label: diagram.to_dict() for label, diagram in diagrams.items()}
         document |= {"stanford": integrity, "stanford_plot": None if shown is None else str(shown)}
@@ -55,6 +65,8 @@ def show(out: Output, request: RunCommand) -> None:
         out.remark(f"{', '.join(doubtful)}: the self-test says that the measurements contradict the estimate")
     if drawn is not None:
         out.print(f"figure: {drawn}")
+    if delays is not None:
+        out.print(f"error against delay: {delays}")
     if shown is not None:
         out.print(f"Stanford diagrams: {shown}")
     if any(e.trial.failed for e in report.estimators):

@@ -2,9 +2,8 @@
 
 ``python -m simnav.leaderboard.papers.documentation [FOLDER]`` writes them; with a folder, the output of ``simnav
 reproduce PAPER --until-decided``, it stores the results of that folder first. Each page has a marked block for each of
-these: ``citation``, ``claims``, ``tables`` and ``contents``; the overview has ``overview``. The figures are in
-``docs/papers/figures``. The text between the marks is replaced,
-and everything else is written by hand.
+these: ``citation``, ``claims``, ``settings``, ``tables`` and ``contents``; the overview has ``overview``. The figures
+are in ``docs/papers/figures``. The text between the marks is replaced, and everything else is written by hand.
 """
 
 from __future__ import annotations
@@ -21,10 +20,10 @@ from .claims.stored import answers_of, computed_on
 from .contents import contents
 from .figures import Drawn, write_figures
 from .paper import KINDS_OF_ROWS, Figure, Paper
-from .report import Sheet, sheets, single_run_sentence, verdicts
-from .reproduction import Reproduction, fill, find_method, load_results
+from .report import Sheet, settings_sheet, sheets, single_run_sentence, verdicts
+from .reproduction import Reproduction, find_method, load_results
 from .sequential import LIMIT
-from .stored import provenance, save, shipped_reproduction
+from .stored import add, provenance, shipped_reproduction
 
 __all__ = ["FOLDER", "blocks", "overview", "replaced", "update"]
 
@@ -102,6 +101,7 @@ def blocks(paper: Paper) -> dict[str, str]:
     return {
         "citation": _citation(paper),
         "claims": _claims(paper),
+        "settings": "\n\n".join(_markdown(settings_sheet(paper))),
         "tables": "\n\n".join(text for text in tables if text),
         "contents": _contents(paper),
     }
@@ -179,14 +179,14 @@ def _line(cells: Iterable[str]) -> str:
 
 
 def _store(folder: Path) -> None:
-    """Store the results of all papers that a folder has."""
+    """Add the results of all papers that a folder has to those that are stored."""
     for key in PAPERS:
         if not (folder / key / "results").is_dir():
             continue
         paper = papers.paper_of(key)
         stands_for = {m.name: find_method(m) for m in paper.methods}
         results = load_results(paper, stands_for, folder / key / "results", range(LIMIT))
-        path = save(fill(paper, stands_for, results, range(max(r.seed for r in results) + 1)))
+        path = add(paper, results)
         print(f"{path}: {len(results)} runs, {path.stat().st_size / 1000:.0f} kB")
 
 

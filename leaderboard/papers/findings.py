@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     from simnav.leaderboard.campaign.request import EstimatorRequest
     from simnav.leaderboard.results.result import Result
 
+    from .claims.answer import Answer
+
 __all__ = ["Finding", "Findings"]
 
 
@@ -74,6 +76,8 @@ class Findings:
         Method of the paper -> the estimator that stands for it.
     results : list of Result
         Results of all runs.
+    answers : list of Answer or None
+        When the paper's claims hold, if this was searched; None: the answers that come with simnav count.
     """
 
     paper: Paper
@@ -81,3 +85,4 @@ class Findings:
     findings: list[Finding]
     stands_for: dict[str, EstimatorRequest | None]
     results: list[Result]
+    answers: list[Answer] | None = None

@@ -25,6 +25,15 @@ _OWN = {
     "position_rmse": Measure("Position RMSE (3-D)", "m", 1.0),
     "update_mean": Measure("Time per epoch", "ms", 1e3),
     "peak_memory": Measure("Peak memory", "MB", 1e-6),
+    "east_over_north": Measure("East RMSE over North RMSE", "", 1.0),
+    "down_over_horizontal": Measure("Vertical RMSE over the smaller of North and East RMSE", "", 1.0),
+}
+_NORTH_EAST = ("north_rmse", "east_rmse")
+_SCORES = {
+    "position_rmse": ("horizontal_rmse", "vertical_rmse"),
+    "peak_memory": (),
+    "east_over_north": _NORTH_EAST,
+    "down_over_horizontal": (*_NORTH_EAST, "vertical_rmse"),
 }
 
 
@@ -49,7 +58,7 @@ def scores_of(name: str) -> tuple[str, ...]:
     >>> scores_of("position_rmse"), scores_of("peak_memory")
     (('horizontal_rmse', 'vertical_rmse'), ())
     """
-    return {"position_rmse": ("horizontal_rmse", "vertical_rmse"), "peak_memory": ()}.get(name, (name,))
+    return _SCORES.get(name, (name,))
 
 
 def value_of(result: Result, name: str) -> float:
@@ -59,6 +68,12 @@ def value_of(result: Result, name: str) -> float:
         value = math.hypot(s.get("horizontal_rmse", math.nan), s.get("vertical_rmse", math.nan))
     elif name == "peak_memory":
         value = float(result.peak_memory)
+    elif name in ("east_over_north", "down_over_horizontal"):
+        north, east = (s.get(axis, math.nan) for axis in _NORTH_EAST)
+        top, bottom = (
+            (east, north) if name == "east_over_north" else (s.get("vertical_rmse", math.nan), min(north, east))
+        )
+        value = top / bottom if bottom > 0.0 else math.nan
     else:
         value = s.get(name, math.nan)
     return value * measure(name).factor

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from functools import cache
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
 from pydantic import TypeAdapter
@@ -18,7 +19,7 @@ from simnav.leaderboard.site.pages import STATIC, TEMPLATES, environment
 
 from . import PAPERS
 from .comparison import RULES
-from .report import Sheet, Whereabouts, sheets, summary, whereabouts
+from .report import Sheet, Whereabouts, settings_sheet, sheets, summary, whereabouts
 
 if TYPE_CHECKING:
     from .figures import Drawn
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
 
 __all__ = ["PaperPage", "pages_in", "write"]
 
-_FORMAT = 3  # of the document
+_FORMAT = 4  # of the document
 
 
 @dataclass(frozen=True)
@@ -60,6 +61,7 @@ class _Document:
     full: str
     notes: list[str]
     claims: list[Sheet]
+    settings: list[Sheet]
     tables: list[Sheet]
     figures: list[_Figure]
     contents: list[Whereabouts]
@@ -114,10 +116,9 @@ class PaperPage:
         (folder / place).mkdir(parents=True, exist_ok=True)
         document = self.document
         if self.stored is not None:
-            from .figures import write_figures
-
-            drawn = write_figures(self.stored, folder / place, scores_only=True)
-            document = _document(self.stored, drawn, folder / place)
+            document, figures = _drawn(self.document.paper)
+            for name, content in figures.items():
+                write_whole(folder / place / name, content)
         else:
             for figure in document.figures:
                 shutil.copyfile(self.folder / figure.file, folder / place / figure.file)
@@ -178,6 +179,19 @@ def _stored(folder: Path, key: str) -> PaperPage | None:
         return None
 
 
+@cache
+def _drawn(key: str) -> tuple[_Document, dict[str, bytes]]:
+    """The page from the stored results with its figures, by name: the same in each site that a process makes."""
+    from . import paper, stored
+    from .figures import write_figures
+
+    found = stored.shipped_reproduction(paper.paper_of(key))
+    with TemporaryDirectory() as folder:
+        place = Path(folder)
+        document = _document(found, write_figures(found, place, scores_only=True), place)
+        return document, {path.name: path.read_bytes() for path in sorted(place.iterdir())}
+
+
 def _render(document: _Document, place: str, site: SiteFacts) -> str:
     template = environment().get_template("paper.html")
     return str(template.render(paper=document, place=place, page=f"paper-{document.paper}.html", site=site))
@@ -191,7 +205,7 @@ def _document(found: Reproduction, drawn: Sequence[Drawn], folder: Path | None =
     from .claims.stored import answers_of
 
     paper = found.paper
-    answers = answers_of(paper.key)
+    answers = answers_of(paper.key) if found.answers is None else found.answers
     claims = claim_count(answers)
     of_claims = [] if folder is None else claim_figures(answers, folder)
     return _Document(
@@ -211,6 +225,7 @@ def _document(found: Reproduction, drawn: Sequence[Drawn], folder: Path | None =
         full=f"simnav reproduce {paper.key} --until-decided",
         notes=list(paper.notes),
         claims=claim_sheets(answers),
+        settings=[settings_sheet(paper)] if paper.settings else [],
         tables=list(sheets(found)),
         figures=[
             *(_Figure("", c.title, c.path.name, c.caption, c.width, c.height, []) for c in of_claims),

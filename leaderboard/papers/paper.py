@@ -12,6 +12,7 @@ from simnav.scenario import Scenario
 from simnav.scenario import load as load_scenario
 
 from . import key_of
+from .settings import PaperSetting
 
 __all__ = [
     "ATTITUDE",
@@ -280,6 +281,8 @@ class Paper:
         Together with tables and figures all that the paper has.
     notes : tuple of str
         What the reader has to know of the comparison.
+    settings : tuple of PaperSetting
+        The settings of the comparison, each with what the paper says of it.
     variants : mapping of str to (str, callable)
         Other readings of a scenario: name -> scenario of the catalogue, and what makes the variant of it.
     """
@@ -298,6 +301,7 @@ class Paper:
     figures: tuple[Figure, ...] = ()
     not_shown: tuple[NotShown, ...] = ()
     notes: tuple[str, ...] = ()
+    settings: tuple[PaperSetting, ...] = ()
     variants: Mapping[str, tuple[str, Callable[[Scenario], Scenario]]] = field(default_factory=dict)
 
     @property

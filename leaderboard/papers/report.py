@@ -15,7 +15,7 @@ from simnav.leaderboard.results.files import write_whole
 from .comparison import as_gain
 from .contents import contents
 from .measures import measure
-from .paper import KINDS_OF_ROWS, Gain, Range
+from .paper import KINDS_OF_ROWS, Gain, Paper, Range
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -28,6 +28,7 @@ __all__ = [
     "Whereabouts",
     "contents_table",
     "paper_tables",
+    "settings_sheet",
     "sheets",
     "single_run_sentence",
     "summary",
@@ -117,6 +118,14 @@ class Sheet:
     columns: list[Column]
     rows: list[SheetRow]
     notes: list[str]
+
+
+def settings_sheet(paper: Paper) -> Sheet:
+    """The settings of a comparison: what the paper prints, and ours."""
+    columns = [Column(title, False) for title in ("setting", "the paper", "here", "source")]
+    rows = [SheetRow([s.what, s.printed or tables.MISSING, s.value, s.source], "ours") for s in paper.settings]
+    notes = ["'printed': as the paper prints it; 'ours': the paper does not print it, and the value is our choice"]
+    return Sheet("Settings: printed, read from a figure, or ours", "", columns, rows, notes)
 
 
 def sheets(found: Reproduction) -> Iterator[Sheet]:

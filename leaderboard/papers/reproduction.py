@@ -59,6 +59,7 @@ class Reproduction(Findings):
             "seeds": list(self.seeds),
             "methods": {name: None if r is None else r.label for name, r in self.stands_for.items()},
             "rows": [_row_dict(f) for f in self.findings],
+            "claims": [a.to_dict() for a in self.answers or []],
         }
 
     def to_frame(self) -> Any:

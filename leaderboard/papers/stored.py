@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -26,7 +26,7 @@ from .reproduction import Reproduction, fill, find_method
 if TYPE_CHECKING:
     from simnav.leaderboard.campaign.request import EstimatorRequest
 
-__all__ = ["FOLDER", "provenance", "save", "shipped_reproduction"]
+__all__ = ["FOLDER", "add", "provenance", "save", "shipped_reproduction"]
 
 #: Where the files are.
 FOLDER = Path(__file__).with_name("results")
@@ -34,8 +34,18 @@ FOLDER = Path(__file__).with_name("results")
 _KEY = b"simnav_paper"
 
 
-def save(found: Reproduction, folder: Path = FOLDER) -> Path:
-    """Write the results of a comparison; returns the path of the file."""
+def save(found: Reproduction, folder: Path = FOLDER, sources: Sequence[Provenance] | None = None) -> Path:
+    """Write the results of a comparison; returns the path of the file.
+
+    Parameters
+    ----------
+    found : Reproduction
+        The comparison.
+    folder : Path
+        Folder of the file.
+    sources : sequence of Provenance, optional
+        Where the results come from; default: what they say themselves.
+    """
     import pyarrow as pa
     import pyarrow.parquet as pq
 
@@ -55,13 +65,33 @@ def save(found: Reproduction, folder: Path = FOLDER) -> Path:
     about = {
         "paper": found.paper.key,
         "methods": {name: None if r is None else r.label for name, r in found.stands_for.items()},
-        "provenance": [p.to_dict() for p in distinct(r.provenance for r in results)],
+        "provenance": [p.to_dict() for p in (distinct(r.provenance for r in results) if sources is None else sources)],
     }
     table = pa.table(columns).replace_schema_metadata({_KEY: json.dumps(about).encode()})
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / f"{found.paper.key}.parquet"
     pq.write_table(table, path, compression="zstd", compression_level=19)
     return path
+
+
+def add(paper: Paper, results: Sequence[Result], folder: Path = FOLDER) -> Path:
+    """Add results to those that are stored; returns the path of the file.
+
+    What is stored of an estimator on a scenario is replaced by the results of the same estimator on this scenario, all
+    seeds, so that no two versions of an estimator are mixed.
+    """
+    new = {(r.scenario, r.estimator) for r in results}
+    kept: list[Result] = []
+    sources = [r.provenance for r in results]
+    if (folder / f"{paper.key}.parquet").exists():
+        wanted = {paper.scenario(s).id for s in paper.participants()}
+        kept = [r for r in _results(_read(paper.key, folder)[0])
+                if (r.scenario, r.estimator) not in new and r.scenario in wanted]  # fmt: skip
+        sources += provenance(paper, folder)
+    stands_for = {m.name: find_method(m) for m in paper.methods}
+    every = [*kept, *results]
+    found = fill(paper, stands_for, every, range(max((r.seed + 1 for r in every), default=0)))
+    return save(found, folder, distinct(sources))
 
 
 def shipped_reproduction(paper: Paper, folder: Path = FOLDER) -> Reproduction:
@@ -78,15 +108,21 @@ def shipped_reproduction(paper: Paper, folder: Path = FOLDER) -> Reproduction:
         request = find_method(method)
         same = request is not None and request.label == about["methods"].get(method.name)
         stands_for[method.name] = request if same else None
-    results = []
+    results = _results(table)
+    most = max((r.seed + 1 for r in results), default=0)
+    return fill(paper, stands_for, results, range(most))
+
+
+def _results(table: Any) -> list[Result]:
+    """The results of a table."""
+    found = []
     for row in table.to_pylist():
         scores = {k.removeprefix("score."): v for k, v in row.items() if k.startswith("score.") and not math.isnan(v)}
-        results.append(
+        found.append(
             Result(row["scenario"], row["seed"], row["estimator"], {}, False, row["status"], row["reason"], scores,
                    peak_memory=row["peak_memory"])
         )  # fmt: skip
-    most = max((r.seed + 1 for r in results), default=0)
-    return fill(paper, stands_for, results, range(most))
+    return found
 
 
 def provenance(paper: Paper, folder: Path = FOLDER) -> list[Provenance]:

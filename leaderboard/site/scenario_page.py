@@ -20,6 +20,7 @@ from .charts import NO_BOUND, NO_FAULTS, Chart, spread_data, timed
 from .columns import SCORES_SHOWN
 from .content import PLAIN
 from .curves import Curves, Gathered
+from .latency import latency_chart
 from .overview import bar_scale, board_columns, board_row
 from .rounding import short
 from .sweeps import SweepFile
@@ -282,6 +283,8 @@ def _over_all_runs(
         ("nees_horizontal", "nees", "Consistency of every run", "NEES by degree of freedom [-]", (0.7, 1.5)),
     )
     made += [c for words in spreads if (c := _spread(ranking, runs, *words))]
+    if (late := latency_chart([row.estimator for row in ranking.rows], runs)) is not None:
+        made.append(late)
     cdf = {n: q for n, c in by.items() if (q := curves.quantiles(c)) is not None}
     if cdf:
         caption = f"Over all epochs of {drawn}."

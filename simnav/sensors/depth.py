@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from simnav import kinds
 from simnav.geometry.earth import displace
 from simnav.kinds import LARGEST_HEIGHT, Component, Kind
-from simnav.sensors.instrument import ZERO, AidSpec, Instrument, register_instrument
+from simnav.sensors.instrument import ZERO, AidSpec, Instrument, SigmaTriple, register_instrument
 from simnav.sensors.observation import DEPTH, CompiledInstrument
 from simnav.spec import NonNegative, Vector, quantity
 from simnav.types import Array, TapStates
@@ -46,6 +46,7 @@ class Depth(AidSpec):
     bias_instability: NonNegative = quantity("m", 0.0)
     scale: NonNegative = quantity("percent", 0.0)
     lever_arm: Vector = quantity("m", ZERO)
+    lever_arm_sigma: SigmaTriple = quantity("m", ZERO)
     waves: bool = False
     fixed_bias: float = quantity("m", 0.0)
     fixed_scale: float = quantity("percent", 0.0)

@@ -28,7 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
-from simnav.blocks import StateBlock
+from simnav.blocks import LEVER_ARM, StateBlock
 from simnav.kinds import INSTRUMENTS, Kind
 from simnav.plugins import PluginError, registered_kind, with_named_errors
 from simnav.recording import AidStream
@@ -70,8 +70,8 @@ class AidSpec(Spec):
     """Base class of the specifications of aiding instruments.
 
     Subclasses declare ``sigma`` and, as far as they apply, ``bias``, ``bias_instability``, ``scale``,
-    ``misalignment``, ``lever_arm`` and their ``fixed_`` forms, each with its unit. If the components of a
-    measurement have different units, each has a field of its own: ``sigma_range``, ``sigma_bearing``.
+    ``misalignment``, ``lever_arm``, ``lever_arm_sigma`` and their ``fixed_`` forms, each with its unit. If the
+    components of a measurement have different units, each has a field of its own: ``sigma_range``, ``sigma_bearing``.
 
     Attributes
     ----------
@@ -88,7 +88,14 @@ class AidSpec(Spec):
 
     definition: ClassVar[Kind]
     example: ClassVar[Mapping[str, Any]]
-    errors: ClassVar[tuple[str, ...]] = ("sigma", "bias", "bias_instability", "scale", "misalignment")
+    errors: ClassVar[tuple[str, ...]] = (
+        "sigma",
+        "bias",
+        "bias_instability",
+        "scale",
+        "misalignment",
+        "lever_arm_sigma",
+    )
     unstated: ClassVar[tuple[str, ...]] = ()
 
     kind: str
@@ -129,10 +136,12 @@ class AidSpec(Spec):
 
     @model_serializer(mode="wrap")
     def _without_empty(self, serialize: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """The digest of a scenario whose instruments name no processes is what it was before there were any."""
+        """The digest of a scenario that names no processes and no sigma of a lever arm is what it was before these."""
         table: dict[str, Any] = serialize(self)
         if not self.processes:
             table.pop("processes", None)
+        if not any(np.atleast_1d(self.figure("lever_arm_sigma"))):
+            table.pop("lever_arm_sigma", None)
         return table
 
     @model_validator(mode="after")
@@ -160,12 +169,17 @@ class AidSpec(Spec):
         return self
 
     def blocks(self) -> tuple[StateBlock, ...]:
-        """The states that this instrument brings along, from its fields; none, unless a subclass says so.
+        """The states that this instrument brings along, from its fields.
+
+        These are three of its lever arm if a figure says how well that is known (``lever_arm_sigma``), and what a
+        subclass adds.
 
         The figures of a block are fields of the specification that ``errors`` names, so that an ideal instrument has
         none of them, and ``times_datasheet`` may change them.
         """
-        return ()
+        if not any(sigma := np.atleast_1d(self.figure("lever_arm_sigma")).tolist()):
+            return ()
+        return (StateBlock(LEVER_ARM, 3, "m", tuple(sigma)),)
 
     def channels(self) -> tuple[str, ...]:
         """The identifiers of the channels of this instrument (satellites, beams, beacons); none, unless a subclass says
@@ -422,8 +436,10 @@ class Instrument(ABC):
         if sheet.bias_instability.any():
             rng = stream(seed, "instrument", name, "bias_instability")
             self._instability = GaussMarkov(sheet.bias_instability, sheet.correlation_time, rng)
-        self.levered = bool(self.lever_arm.any())
         self._blocks = {block.name: BlockValues(block, block.label(name), seed) for block in sheet.blocks}
+        if LEVER_ARM in self._blocks:
+            self.lever_arm = sheet.lever_arm + self.block(LEVER_ARM, np.zeros(1))[0]
+        self.levered = bool(self.lever_arm.any())
 
     def block(self, name: str, time: Array) -> Array:
         """The true values of a block of states at n times.

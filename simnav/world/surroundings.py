@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, TypeVar
+from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 
@@ -45,7 +45,15 @@ class SurroundingsError(SpecError):
 
 
 class SurroundingSpec(Spec):
-    """Base class of the specifications of parts of the surroundings: a table ``[surroundings.NAME]`` of a scenario."""
+    """Base class of the specifications of parts of the surroundings: a table ``[surroundings.NAME]`` of a scenario.
+
+    Attributes
+    ----------
+    files : tuple of str
+        Names of the fields that are paths of files, as of `simnav.world.vessel.VesselSpec`.
+    """
+
+    files: ClassVar[tuple[str, ...]] = ()
 
     kind: str
 

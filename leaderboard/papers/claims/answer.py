@@ -97,7 +97,7 @@ class Answer(Shown):
         for dial in self.dials:
             title = dial.title.rstrip(",")
             for point in dial.points:
-                judged = dial.judged if dial.judged is not None and dial.judged.value == point.value else None
+                judged = next((p for p in dial.tried if p.value == point.value), None)
                 other, verdict = ("", "") if judged is None else (gain_text(judged), judged.standing(self.limit))
                 ours = "ours" if point.value == dial.ours else ""
                 rows.append([title, dial.text(point.value), ours, gain_text(point), other, verdict])
@@ -119,7 +119,7 @@ class Answer(Shown):
             "dials": [
                 {"name": d.name, "title": d.title, "unit": d.unit, "ours": d.ours, "why": d.why,
                  "points": [_point_dict(p, self.limit) for p in d.points],
-                 "judged": None if d.judged is None else _point_dict(d.judged, self.limit)}
+                 "judged": [_point_dict(p, self.limit) for p in d.tried]}
                 for d in self.dials
             ],
         }  # fmt: skip
@@ -130,7 +130,7 @@ class Answer(Shown):
         names = ("claim", "paper", "sentence", "gain", "derived", "scenario", "row", "than", "score", "than_score")
         dials = [
             DialAnswer(d["name"], d["title"], d["unit"], d["ours"], d["why"], [_point(p) for p in d["points"]],
-                       None if d["judged"] is None else _point(d["judged"]))
+                       [_point(p) for p in d["judged"]])
             for d in found["dials"]
         ]  # fmt: skip
         return cls(**{name: found[name] for name in names}, ours=_point(found["ours"]), dials=dials)
@@ -138,7 +138,7 @@ class Answer(Shown):
     def to_frame(self) -> Any:
         """One line for each value of each dial; see `simnav.leaderboard.results.frame.frame`."""
         rows = [(d.name, "search", p) for d in self.dials for p in d.points]
-        rows += [(d.name, "judgement", d.judged) for d in self.dials if d.judged is not None]
+        rows += [(d.name, "judgement", p) for d in self.dials for p in d.tried]
         rows.append(("", "judgement", self.ours))
         return frame([
             {"dial": name, "value": str(p.value), "seeds": which, "gain": p.gain.value, "low": p.gain.low,

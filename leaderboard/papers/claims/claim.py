@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
@@ -102,7 +103,10 @@ class Dial:
         """
         if self.numeric:
             try:
-                found: tuple[Choice, ...] = tuple(sorted({float(v) for v in values}))
+                numbers = sorted({float(v) for v in values})
+                found: tuple[Choice, ...] = tuple(numbers)
+                if not all(map(math.isfinite, numbers)):
+                    raise ValueError
             except ValueError:
                 raise RequestError(
                     f"--holds-if {self.name}={','.join(values)}: the values should be numbers, like {self.name}="

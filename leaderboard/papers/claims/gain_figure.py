@@ -60,8 +60,8 @@ def _panel(ax: Axes, ours: Point, dial: DialAnswer) -> None:
     colour = PALETTE[0][0]
     for x, point in zip(places, dial.points, strict=True):
         _bar(ax, x, point, colour, "o", 0.0)
-    if dial.judged is not None:
-        _bar(ax, names.index(dial.judged.value), dial.judged, PALETTE[1][0], "s", 0.14)
+    for point in dial.tried:
+        _bar(ax, names.index(point.value), point, PALETTE[1][0], "s", 0.14)
     if dial.ours in names:
         _bar(ax, names.index(dial.ours), ours, PALETTE[1][0], "s", 0.14)
     texts = [v if isinstance(v, str) else f"{v:g}" for v in names]

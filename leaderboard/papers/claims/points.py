@@ -68,8 +68,8 @@ class DialAnswer:
         As of `simnav.leaderboard.papers.claims.claim.Dial`.
     points : list of Point
         The gain at each value, on the seeds of the search.
-    judged : Point or None
-        The gain at the value that was judged, on seeds of their own.
+    tried : list of Point
+        The gain at the values that were judged, in turn, each on seeds of its own; the last one counts.
     """
 
     name: str
@@ -78,7 +78,12 @@ class DialAnswer:
     ours: Choice | None
     why: str
     points: list[Point]
-    judged: Point | None
+    tried: list[Point]
+
+    @property
+    def judged(self) -> Point | None:
+        """The value that was judged last; None if there was none to be judged."""
+        return self.tried[-1] if self.tried else None
 
     def text(self, value: Choice) -> str:
         """A value with its unit."""

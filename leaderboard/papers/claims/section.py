@@ -70,7 +70,7 @@ def _values(answers: Sequence[Answer]) -> Sheet:
             mark = f" ({chr(ord('a') + whys.index(d.why))})" if d.why else ""
             title = d.title.rstrip(",") + mark
             for p in d.points:
-                judged = d.judged if d.judged is not None and d.judged.value == p.value else None
+                judged = next((j for j in d.tried if j.value == p.value), None)
                 if p.value == d.ours:
                     judged = a.ours
                 value = d.text(p.value) + (" (ours)" if p.value == d.ours else "")

@@ -1,7 +1,8 @@
 """The answers that come with simnav: one small JSON file for each claim, with the ratio of every seed.
 
-``python -m simnav.leaderboard.papers.claims.stored [CLAIM...]`` computes them anew, all or those that are named, and
-keeps the runs in ``results/claims``. A page needs these files only.
+``python -m simnav.leaderboard.papers.claims.stored [--judgement] [CLAIM...]`` computes them anew, all or those that are
+named, and keeps the runs in ``results/claims``. With ``--judgement`` values that the stored search has are not searched
+again. A page needs these files only.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ __all__ = ["FOLDER", "answers_of", "computed_on", "read", "save"]
 
 #: Where the files are.
 FOLDER = Path(__file__).with_name("results")
-_FORMAT = 1
+_FORMAT = 2
 
 
 def save(answer: Answer, folder: Path = FOLDER) -> Path:
@@ -78,13 +79,25 @@ def _document(name: str, folder: Path) -> dict[str, object] | None:
     return found
 
 
-if __name__ == "__main__":
-    import sys
+def main() -> None:
+    """The command of the module."""
+    import argparse
 
-    from .declared import CLAIMS
+    from .declared import CLAIMS, claim_of
     from .search import search
 
-    for claim in CLAIMS:
-        if len(sys.argv) < 2 or claim.name in sys.argv[1:]:
-            made = search(claim, claim.dials, Path("results") / "claims", runs=6, judged=12)
-            print(f"{claim.name}: {made.sentence_of_verdict} ({save(made)})")
+    parser = argparse.ArgumentParser(prog="python -m simnav.leaderboard.papers.claims.stored")
+    parser.add_argument("claims", nargs="*", metavar="CLAIM", help="default: all")
+    parser.add_argument("--judgement", action="store_true", help="do not search again what the stored answer has")
+    parser.add_argument("--runs", type=int, default=6, help="seeds of the search")
+    parser.add_argument("--judged", type=int, default=12, help="first number of seeds of the judgement")
+    parser.add_argument("--output", type=Path, default=Path("results") / "claims", help="folder of the runs")
+    given = parser.parse_args()
+    for claim in [claim_of(name) for name in given.claims] or CLAIMS:
+        known = read(claim.name) if given.judgement else None
+        made = search(claim, claim.dials, given.output, runs=given.runs, judged=given.judged, known=known)
+        print(f"{claim.name}: {made.sentence_of_verdict} ({save(made)})", flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -341,7 +341,8 @@ def test_a_wrong_datasheet_costs_nothing_with_a_learned_level():
     """On a training seed, with fixes three times as noisy as their datasheet: better than no adaptation."""
     scenario = load("ship-turn").with_values({"instruments.gnss.times_datasheet": {"sigma": 3.0}})
     recording = record(scenario, FIRST_TRAINING_SEED)
-    rows = {"plain": make("ship-ekf"), "as trained": make("anfis-ekf"), "learned": make("anfis-ekf", level="learned")}
+    trained = make("anfis-ekf", level="datasheet")
+    rows = {"plain": make("ship-ekf"), "as trained": trained, "learned": make("anfis-ekf")}
     found = {
         name: score(run_trial(row, recording), recording, ["horizontal_rmse"])["horizontal_rmse"]
         for name, row in rows.items()

@@ -35,7 +35,7 @@ def point(value, ratio: float, failed: int = 0) -> Point:
 
 def answer(ours: float, found: float, value: float = 10.0) -> Answer:
     points = [point(0.0, ours), point(5.0, 0.5 * (ours + found)), point(value, found)]
-    dial = DialAnswer("lag", "the delay of the output", "s", 0.0, "not printed", points, point(value, found))
+    dial = DialAnswer("lag", "the delay of the output", "s", 0.0, "not printed", points, [point(value, found)])
     return Answer("c", "guo-2026", "a is 20 % better than b", 0.2, False, "s-v1", "a", "b", "horizontal_rmse",
                   "horizontal_rmse", point("", ours), [dial])  # fmt: skip
 
@@ -70,7 +70,7 @@ def test_the_range_of_a_condition_is_in_words():
 
     def words(ratios, judged, ours=None) -> str:
         points = [point(v, r) for v, r in zip(values, ratios, strict=True)]
-        return DialAnswer("x", "the factor", "", ours, "", points, points[judged]).condition(0.86)
+        return DialAnswer("x", "the factor", "", ours, "", points, [points[judged]]).condition(0.86)
 
     assert words((1.0, 1.0, 0.8, 0.7), 2) == "the factor is 3 or more"
     assert words((0.7, 0.8, 1.0, 1.0), 1, 5.0) == "the factor is 2 or less"
@@ -154,8 +154,43 @@ def test_the_search_finds_the_nearest_value_and_judges_it_on_other_seeds(made_re
     assert along.judged.value == 4.0
     assert along.condition(claim.limit) == "the window is 4 or more"
     assert set(along.points[0].seeds).isdisjoint(along.judged.seeds)
-    assert set(found.ours.seeds) == set(along.judged.seeds) == set(range(2000, 2004))
+    assert set(found.ours.seeds) == set(along.judged.seeds) == set(range(3000, 3004))
     assert made_results["ship-fgo(window=2)"] == set(range(1000, 1003))  # it was not judged
+
+
+def test_where_a_judgement_fails_the_next_value_is_judged_on_other_seeds(made_results, monkeypatch, tmp_path):
+    """The first value looks good in the search only: what is judged next has seeds that nothing was judged on."""
+    dial = parameter_dial("window", "the window", "row", "window", (1, 4, 6), ours=1.0)
+    base = compared(lambda: load("ship-turn"), "ship-fgo", "ship-ekf", "horizontal_rmse")
+    claim = Claim("c", "", "a is 25 % better than b", 0.25, base, (dial,))
+    inner = searching._point
+
+    def lucky(value, setting, results):
+        found = inner(value, setting, results)
+        if value == 4.0 and min(found.seeds) >= searching.JUDGED_FROM:
+            return Point(value, found.seeds, [1.0, 1.01] * (len(found.seeds) // 2))
+        return found
+
+    monkeypatch.setattr(searching, "_point", lucky)
+    found = searching.search(claim, claim.dials, tmp_path, runs=3, judged=4)
+    (along,) = found.dials
+    assert [(p.value, p.standing(claim.limit)) for p in along.tried] == [(4.0, "does not hold"), (6.0, "holds")]
+    assert set(along.tried[0].seeds).isdisjoint(along.tried[1].seeds)
+    assert along.condition(claim.limit) == "the window is 6 or more"
+
+
+def test_an_undecided_judgement_gets_more_seeds_and_a_known_search_is_not_repeated(made_results, tmp_path):
+    dial = parameter_dial("window", "the window", "row", "window", (1, 3.51), ours=1.0)  # a ratio of about the limit
+    base = compared(lambda: load("ship-turn"), "ship-fgo", "ship-ekf", "horizontal_rmse")
+    claim = Claim("c", "", "a is 25 % better than b", 0.25, base, (dial,))
+    found = searching.search(claim, claim.dials, tmp_path, runs=3, judged=4)
+    (tried,) = found.dials[0].tried
+    assert len(found.ours.seeds) == 4
+    assert len(tried.seeds) in (4, 8, 16)
+    assert tried.standing(claim.limit) != "undecided" or len(tried.seeds) == 16
+    made_results.clear()
+    searching.search(claim, claim.dials, tmp_path, runs=3, judged=4, known=found)
+    assert min(min(seeds) for seeds in made_results.values()) >= searching.JUDGED_FROM
 
 
 def test_an_answer_is_read_as_it_was_saved(tmp_path):
@@ -216,6 +251,10 @@ def test_the_command_shows_and_lists(tmp_path):
         ({"claim": "guo-sw-fgo", "gain": 3.0}, "is a paper's claim"),
         ({"claim": "auv-graph", "holds_if": ["fusion=waits"]}, "there is no choice 'waits'"),
         ({"claim": "ekf", "than": "sw-fgo", "gain": 10.0}, "'scenario' is missing"),
+        ({"claim": "guo-sw-fgo", "holds_if": ["lag=nan"]}, "numbers"),
+        ({"claim": "guo-sw-fgo", "holds_if": ["lag=-5"]}, "from 0 to 3600"),
+        ({"claim": "mao-road-east", "holds_if": ["imu=-1"]}, "random_walk"),
+        ({"claim": "jiang-turn", "holds_if": ["told=0"]}, "should be above 0"),
         ({"claim": "ekf", "than": "sw-fgo", "gain": 0.0, "scenario": "ship-turn"}, "between 0 and 100"),
         ({"claim": "ekf", "than": "sw-fgo", "gain": 9.0, "scenario": "ship-turn", "holds_if": "lag"}, "has values"),
         (
