@@ -16,15 +16,14 @@ from simnav.leaderboard.results.errors import RequestError, StoreError, mistakes
 from simnav.leaderboard.results.scratch import scratch
 
 from .calls import call, finite_number, whole_number
+from .error_requests import AllanRequest, RealismRequest
 from .given import absolute, results_of, scenario_of, scenarios_of
 from .requests import (
-    AllanRequest,
     BoundRequest,
     CiteRequest,
     ExportRequest,
     MergeRequest,
     RankRequest,
-    RealismRequest,
     ReproduceRequest,
     RescoreRequest,
     ScoreRequest,

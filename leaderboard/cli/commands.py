@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from simnav.leaderboard.calls import option, request
 from simnav.leaderboard.claim_requests import ClaimRequest
+from simnav.leaderboard.error_requests import AllanRequest, RealismRequest
 from simnav.leaderboard.publishing_requests import (
     AuditRequest,
     BundleOptions,
@@ -21,7 +22,6 @@ from simnav.leaderboard.publishing_requests import (
 )
 from simnav.leaderboard.requests import (
     AlignRequest,
-    AllanRequest,
     BenchRequest,
     BoundRequest,
     CampaignRequest,
@@ -31,7 +31,6 @@ from simnav.leaderboard.requests import (
     InspectRequest,
     MergeRequest,
     Parameters,
-    RealismRequest,
     RecordRequest,
     ReproduceRequest,
     RescoreRequest,

@@ -174,7 +174,7 @@ def _fit(
         return np.inf, np.zeros(p), np.full((p, p), np.inf), names, difference
     a, b = derivative.reshape(-1, p), difference.reshape(-1)
     weight = np.ones(len(b))
-    solution = np.zeros(p)
+    solution: Array = np.zeros(p)
     for _ in range(4):  # Huber's weights, with the scale of the residuals
         solution = np.linalg.lstsq(a * weight[:, None], b * weight, rcond=None)[0] if p else solution
         residual = b - a @ solution
