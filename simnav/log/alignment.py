@@ -176,7 +176,9 @@ def _fit(
     weight = np.ones(len(b))
     solution: Array = np.zeros(p)
     for _ in range(4):  # Huber's weights, with the scale of the residuals
-        solution = np.linalg.lstsq(a * weight[:, None], b * weight, rcond=None)[0] if p else solution
+        solution = np.asarray(
+            np.linalg.lstsq(a * weight[:, None], b * weight, rcond=None)[0] if p else solution, np.float64
+        )
         residual = b - a @ solution
         scale = max(1.345 * _NORMAL * float(np.median(np.abs(residual))), 1e-12)
         weight = np.sqrt(np.minimum(1.0, scale / np.maximum(np.abs(residual), 1e-300)))
