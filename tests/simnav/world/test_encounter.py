@@ -7,6 +7,8 @@ import pytest
 
 from simnav.geometry.rotation import wrap_angle
 from simnav.scenario import parse
+from simnav.simulation.simulator import Simulator, simulate
+from simnav.simulation.steps import SteppedRuns
 from simnav.spec import SpecError
 from simnav.world import Current, Sea, Ship, Start, Turn, Uuv
 from simnav.world.sea import components, spectrum, steady, wave_number
@@ -139,3 +141,23 @@ def test_scenarios_that_do_not_name_it_are_unchanged():
     assert "response" in parse(head + sea + 'response = "encounter"\n' + depth).model_dump()["sea"]
     with pytest.raises(SpecError, match="yaw_gain is of no use without response"):
         parse(head + sea + "yaw_gain = 0.2\n" + depth)
+
+
+def test_one_block_many_blocks_and_steps_give_the_same_numbers():
+    head = (
+        'name = "a"\nversion = 1\ntitle = "a"\nduration_s = 20.0\nwater_depth_m = 15.0\n[start]\nlatitude_deg = 1.0\n'
+        'longitude_deg = 1.0\nspeed_m_s = 5.0\n[[manoeuvre]]\nkind = "turn"\nangle_deg = 90.0\n'
+        '[sea]\nsignificant_height_m = 1.5\npeak_period_s = 6.0\nresponse = "encounter"\n'
+    )
+    scenario = parse(head + "[instruments.gyrocompass]\nrate_hz = 2.0\nsigma_deg = 0.1\n")
+    whole = simulate(scenario, 5).data.aids["gyrocompass"].value
+    simulator = Simulator(scenario, 5)
+    parts = [simulator.advance(t).aids["gyrocompass"].value for t in (3.0, 4.0, 20.0)]
+    np.testing.assert_array_equal(np.concatenate(parts), whole)
+    runs = SteppedRuns(1)
+    runs.begin(0, Simulator(scenario, 5))
+    stepped = []
+    for _ in range(20):
+        runs.advance(np.array([True]))
+        stepped += [m.value for m in runs.packet(0).aids]
+    np.testing.assert_array_equal(np.array(stepped), whole)
