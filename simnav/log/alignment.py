@@ -173,10 +173,11 @@ def _fit(
     if len(difference) < _LEAST:
         return np.inf, np.zeros(p), np.full((p, p), np.inf), names, difference
     a, b = derivative.reshape(-1, p), difference.reshape(-1)
-    weight = np.ones(len(b))
-    solution = np.zeros(p)
+    weight: Array = np.ones(len(b))
+    solution: Array = np.zeros(p)
     for _ in range(4):  # Huber's weights, with the scale of the residuals
-        solution = np.linalg.lstsq(a * weight[:, None], b * weight, rcond=None)[0] if p else solution
+        if p:
+            solution = np.asarray(np.linalg.lstsq(a * weight[:, None], b * weight, rcond=None)[0], dtype=np.float64)
         residual = b - a @ solution
         scale = max(1.345 * _NORMAL * float(np.median(np.abs(residual))), 1e-12)
         weight = np.sqrt(np.minimum(1.0, scale / np.maximum(np.abs(residual), 1e-300)))
