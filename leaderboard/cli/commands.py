@@ -10,6 +10,13 @@ from typing import TYPE_CHECKING, Any
 
 from simnav.leaderboard.calls import option, request
 from simnav.leaderboard.claim_requests import ClaimRequest
+from simnav.leaderboard.log_requests import (
+    AlignRequest,
+    ExportRequest,
+    InspectRequest,
+    ScoreRequest,
+    TuneNoiseRequest,
+)
 from simnav.leaderboard.publishing_requests import (
     AuditRequest,
     BundleOptions,
@@ -20,15 +27,12 @@ from simnav.leaderboard.publishing_requests import (
     SubmitRequest,
 )
 from simnav.leaderboard.requests import (
-    AlignRequest,
     AllanRequest,
     BenchRequest,
     BoundRequest,
     CampaignRequest,
     CiteRequest,
     EvaluateRequest,
-    ExportRequest,
-    InspectRequest,
     MergeRequest,
     Parameters,
     RealismRequest,
@@ -38,10 +42,8 @@ from simnav.leaderboard.requests import (
     RobustnessRequest,
     RunRequest,
     Scenarios,
-    ScoreRequest,
     SealRequest,
     SweepRequest,
-    TuneNoiseRequest,
     TuneRequest,
     VerifyRequest,
 )
