@@ -45,8 +45,8 @@ class SageHusaKf(_Adaptive, adaptation=SageHusa):
         while no other instrument contradicts them are taken as a wrong prediction, and not as noise (`PredictionTest`).
     3
         A lasting error is blamed on an instrument only by a witness, whatever its size. Before, one that an IMU of 20
-        times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors and compasses are
-        tested, too.
+        times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
+        Fixes that see no error of a log at first may see it later.
     """
 
     version = 3
@@ -68,8 +68,8 @@ class SageHusaPaper(
         while no other instrument contradicts them are taken as a wrong prediction, and not as noise (`PredictionTest`).
     3
         A lasting error is blamed on an instrument only by a witness, whatever its size. Before, one that an IMU of 20
-        times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors and compasses are
-        tested, too.
+        times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
+        Fixes that see no error of a log at first may see it later.
     """
 
     version = 3
@@ -89,8 +89,8 @@ class Iae(_Adaptive, adaptation=piece(InnovationBased, source="innovation")):
         while no other instrument contradicts them are taken as a wrong prediction, and not as noise (`PredictionTest`).
     3
         A lasting error is blamed on an instrument only by a witness, whatever its size. Before, one that an IMU of 20
-        times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors and compasses are
-        tested, too.
+        times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
+        Fixes that see no error of a log at first may see it later.
     """
 
     version = 3
@@ -109,8 +109,8 @@ class IaeFixed(_Adaptive, adaptation=piece(FixedWindow, source="innovation")):
         while no other instrument contradicts them are taken as a wrong prediction, and not as noise (`PredictionTest`).
     3
         A lasting error is blamed on an instrument only by a witness, whatever its size. Before, one that an IMU of 20
-        times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors and compasses are
-        tested, too.
+        times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
+        Fixes that see no error of a log at first may see it later.
     """
 
     version = 3
@@ -130,8 +130,8 @@ class Rae(_Adaptive, adaptation=piece(FixedWindow, source="residual", newest=Fal
         while no other instrument contradicts them are taken as a wrong prediction, and not as noise (`PredictionTest`).
     3
         A lasting error is blamed on an instrument only by a witness, whatever its size. Before, one that an IMU of 20
-        times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors and compasses are
-        tested, too.
+        times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
+        Fixes that see no error of a log at first may see it later.
     """
 
     version = 3
@@ -152,8 +152,8 @@ class Adkf(_Adaptive, adaptation=AdaptiveFactor):
         noise or gross errors of their instrument (`PredictionTest`).
     3
         A lasting error is blamed on an instrument only by a witness, whatever its size. Before, one that an IMU of 20
-        times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors and compasses are
-        tested, too.
+        times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
+        Fixes that see no error of a log at first may see it later.
     """
 
     version = 3
@@ -192,8 +192,8 @@ class Igg3(_Adaptive, adaptation=Igg3Weights):
         noise or gross errors of their instrument (`PredictionTest`).
     3
         A lasting error is blamed on an instrument only by a witness, whatever its size. Before, one that an IMU of 20
-        times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors and compasses are
-        tested, too.
+        times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
+        Fixes that see no error of a log at first may see it later.
     """
 
     version = 3
@@ -212,8 +212,8 @@ class HuberKf(_Adaptive, adaptation=HuberWeights):
         noise or gross errors of their instrument (`PredictionTest`).
     3
         A lasting error is blamed on an instrument only by a witness, whatever its size. Before, one that an IMU of 20
-        times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors and compasses are
-        tested, too.
+        times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
+        Fixes that see no error of a log at first may see it later.
     """
 
     version = 3
@@ -233,8 +233,8 @@ class GatedEkf(_Adaptive, adaptation=ChiSquareGate):
         noise or gross errors of their instrument (`PredictionTest`).
     3
         A lasting error is blamed on an instrument only by a witness, whatever its size. Before, one that an IMU of 20
-        times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors and compasses are
-        tested, too.
+        times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
+        Fixes that see no error of a log at first may see it later.
     """
 
     version = 3
@@ -262,8 +262,8 @@ class VbAkf(_Adaptive, adaptation=VariationalBayes):
         while no other instrument contradicts them are taken as a wrong prediction, and not as noise (`PredictionTest`).
     3
         A lasting error is blamed on an instrument only by a witness, whatever its size. Before, one that an IMU of 20
-        times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors and compasses are
-        tested, too.
+        times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
+        Fixes that see no error of a log at first may see it later.
     """
 
     version = 3
@@ -282,8 +282,8 @@ class Mckf(_Adaptive, adaptation=piece(MaximumCorrentropy, smallest=1e-3)):
         noise or gross errors of their instrument (`PredictionTest`).
     3
         A lasting error is blamed on an instrument only by a witness, whatever its size. Before, one that an IMU of 20
-        times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors and compasses are
-        tested, too.
+        times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
+        Fixes that see no error of a log at first may see it later.
     """
 
     version = 3
@@ -303,8 +303,8 @@ class Imm(Row, solver=ImmEstimator, model=Suitable):
         noise or gross errors of their instrument (`PredictionTest`).
     3
         A lasting error is blamed on an instrument only by a witness, whatever its size. Before, one that an IMU of 20
-        times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors and compasses are
-        tested, too.
+        times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
+        Fixes that see no error of a log at first may see it later.
     """
 
     version = 3

@@ -65,8 +65,8 @@ class IaeFgo(Row, solver=_WINDOW, model=Suitable, adaptation=piece(InnovationBas
         while no other instrument contradicts them are taken as a wrong prediction, and not as noise (`PredictionTest`).
     3
         A lasting error is blamed on an instrument only by a witness, whatever its size. Before, one that an IMU of 20
-        times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors and compasses are
-        tested, too.
+        times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
+        Fixes that see no error of a log at first may see it later.
     """
 
     version = 3
@@ -86,8 +86,8 @@ class IaeFgoFixed(Row, solver=_WINDOW, model=Suitable, adaptation=piece(FixedWin
         while no other instrument contradicts them are taken as a wrong prediction, and not as noise (`PredictionTest`).
     3
         A lasting error is blamed on an instrument only by a witness, whatever its size. Before, one that an IMU of 20
-        times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors and compasses are
-        tested, too.
+        times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
+        Fixes that see no error of a log at first may see it later.
     """
 
     version = 3

@@ -29,19 +29,30 @@ def three(offsets) -> list[Estimate]:
 
 
 def test_the_middle_of_each_component_and_the_mixture_about_it():
-    """1/3 sum(P + d d') with d = -0.1, 0 and 0.3: 1 + 0.1/3 on the diagonal, and 0.1/3 beside it."""
-    found = middle(three([0.2, 0.1, 0.5]))
-    assert difference(found, START) == pytest.approx(np.full(9, 0.2), abs=1e-6)
-    assert found.covariance == pytest.approx(np.eye(9) + 0.1 / 3.0, abs=1e-5)
+    """1/3 sum(P + d d') with d = -0.001, 0 and 0.003: P + 1e-5 / 3 in every element."""
+    found, apart = middle(three([0.002, 0.001, 0.005]))
+    assert difference(found, START) == pytest.approx(np.full(9, 0.002), rel=5e-3)
+    assert apart == pytest.approx(np.outer([0.0, -0.001, 0.003], np.ones(9)), rel=2e-2, abs=1e-6)
+    assert found.covariance - np.eye(9) == pytest.approx(np.full((9, 9), 1e-5 / 3.0), rel=2e-2)
+
+
+def test_longitudes_and_headings_go_round_the_circle():
+    west, east = (
+        Estimate(1.0, np.array([0.0, x, 0.0]), np.zeros(3), np.array([0.0, 0.0, x]), np.eye(9)) for x in (3.14, -3.14)
+    )
+    found, apart = middle([west, east, east])
+    assert np.remainder(found.position[1], 2.0 * np.pi) == pytest.approx(np.remainder(-3.14, 2.0 * np.pi))
+    assert np.remainder(found.attitude[2], 2.0 * np.pi) == pytest.approx(np.remainder(-3.14, 2.0 * np.pi))
+    assert np.abs(apart[:, 8]).max() < 0.01
 
 
 def test_each_component_has_a_middle_of_its_own():
     north, east, down = (displaced(START, np.eye(9)[k], np.eye(9)) for k in range(3))
-    assert difference(middle([north, east, down]), START) == pytest.approx(np.zeros(9), abs=1e-6)
+    assert difference(middle([north, east, down])[0], START) == pytest.approx(np.zeros(9), abs=1e-6)
 
 
 def test_one_solution_that_is_lost_moves_the_estimate_no_further_than_to_its_neighbour():
-    far = middle(three([0.0, 0.1, 1e3]))
+    far, _ = middle(three([0.0, 0.1, 1e3]))
     assert difference(far, START)[:3] == pytest.approx(np.full(3, 0.1), abs=1e-6)
     assert far.covariance[0, 0] > 1e5
 
