@@ -197,7 +197,8 @@ def allan_of_scenario(scenario: Scenario, seed: int, duration: float, start: flo
 
 
 def _of_log(scenario: Scenario, seed: int, start: float, end: float | None) -> AllanReport:
-    from simnav.log.channel import list_recordings, read_imu
+    from simnav.log.channel import list_recordings
+    from simnav.log.imu_series import read_imu
 
     assert scenario.log is not None
     assert scenario.log.imu is not None  # `simnav.scenario.consistency`

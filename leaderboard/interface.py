@@ -18,7 +18,20 @@ from simnav.leaderboard.results.errors import RequestError
 from .claiming import claim
 from .costing import bench, costs
 from .given import results_of, scenario_of, scenarios_of
-from .inspection import allan, bound, cite, merge, rank, reproduce, rescore, seal, verify
+from .inspection import (
+    allan,
+    bound,
+    cite,
+    export,
+    merge,
+    rank,
+    realism,
+    reproduce,
+    rescore,
+    score_files,
+    seal,
+    verify,
+)  # fmt: skip
 from .requests import ScenarioLike, Scenarios
 from .running import campaign, check, evaluate, make, record, robustness, run, sweep, tune
 
@@ -37,9 +50,11 @@ __all__ = [
     "claim",
     "costs",
     "evaluate",
+    "export",
     "make",
     "merge",
     "rank",
+    "realism",
     "record",
     "reproduce",
     "rescore",
@@ -48,6 +63,7 @@ __all__ = [
     "run",
     "scenario_of",
     "scenarios_of",
+    "score_files",
     "seal",
     "sweep",
     "tune",

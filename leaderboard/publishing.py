@@ -69,12 +69,12 @@ def site(request: SiteRequest) -> SiteReport:
     from simnav.leaderboard.site.report import SiteReport
     from simnav.leaderboard.site.site import build
 
-    from .results import requested
+    from .results import requested, scenario_files
     from .site import sweeps as swept
 
     shown, processes = whole_number("runs_shown", request.runs_shown, 1), whole_number("workers", request.workers, 1)
     found = results_of(request.results, series=True)
-    ranking = ranked(found, requested=requested.read(request.results))
+    ranking = ranked(found, tracks=scenario_files.tracks(request.results), requested=requested.read(request.results))
     correlations = () if request.against is None else tuple(rank_correlations(ranking, rank(request.against)))
     index = build(
         found, ranking, absolute(request.output), progress=request.progress, workers=processes,
@@ -157,10 +157,11 @@ def submit(request: SubmitRequest) -> Submission:
                 f"{report.summary.left} of {report.summary.total} runs are left after {request.minutes:g} minutes; the "
                 "same command continues"
             )
-        with mistakes(StoreError):
-            found = pack(folder, home / "results", [r.label for r in source.requests])
+        runs = runs_of(str(request.profile))
+        with mistakes(StoreError):  # the folder may also have the runs of another profile
+            found = pack(folder, home / "results", [r.label for r in source.requests], runs)
         ran = {r.scenario for r in found}
-        runs = {s: n for s, n in runs_of(str(request.profile)).items() if s in ran}
+        runs = {s: n for s, n in runs.items() if s in ran}
         rows = [_row(r) for r in source.requests]
         digest = write_bundle(
             target, title=source.title, benchmark=BENCHMARK, profile=name, runs=runs, main=source.main, estimators=rows,

@@ -180,6 +180,7 @@ def campaign(request: CampaignRequest) -> CampaignReport:
         A summary of all results in the folder.
     """
     from simnav.leaderboard.campaign.campaign import combined, require_known
+    from simnav.leaderboard.campaign.external import add_external, external_files
     from simnav.leaderboard.campaign.oracles import beside_oracles
     from simnav.leaderboard.campaign.seal import read_seal
     from simnav.leaderboard.ranking.ranking import rank
@@ -197,10 +198,14 @@ def campaign(request: CampaignRequest) -> CampaignReport:
     for (scenarios, _, runs), everyone in zip(parts, asked, strict=True):
         chosen = scenarios_of(scenarios, optional=request.profile is not None)
         tracks |= {s.id: s.track for s in chosen}
+        seeds = seeds_of(request.seed, runs)
+        if request.external is not None:  # what is missing is said before hours of runs
+            external_files(absolute(request.external), chosen, seeds)
         for some, beside in beside_oracles(chosen, everyone) if request.oracle else [(chosen, everyone)]:
             left = None if end is None else max(0.0, (end - time.monotonic()) / 60.0)
-            seeds = seeds_of(request.seed, runs)
             summaries.append(_run(request, some, beside, seeds, folder, seal=seal, minutes=left))
+        if request.external is not None:
+            add_external(folder, absolute(request.external), chosen, seeds, seal)
     results = results_of(folder)
     ranking = rank(results, tracks=tracks, requested=requested.read(folder))
     return CampaignReport(results, ranking, combined(summaries))

@@ -6,6 +6,7 @@ import math
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -34,7 +35,7 @@ if TYPE_CHECKING:
     from simnav.scoring import Stanford
     from simnav.trial import Trial
 
-__all__ = ["EstimatorRun", "RunReport", "run_once"]
+__all__ = ["EstimatorRun", "RunReport", "run_once", "score_of_files"]
 
 
 #: Diagnostics that an estimator gives for each instrument that it uses.
@@ -210,6 +211,22 @@ def run_once(
         runs.append(EstimatorRun(request.label, request.parameters, estimator.reference, trial.status,
                                  printable(trial.reason), seconds, scores, trial))  # fmt: skip
     report(len(requests), len(requests))
+    return RunReport(recording, simulated, tuple(runs))
+
+
+def score_of_files(scenario: Scenario, paths: Sequence[Path], seed: int) -> RunReport:
+    """Score files of estimates of one run; see `simnav.leaderboard.interface.score_files`."""
+    from simnav.trial.estimate_file import trial_of_file
+
+    started = time.perf_counter()
+    recording = record_here(scenario, seed)
+    simulated = time.perf_counter() - started
+    runs = []
+    for path in paths:
+        with mistakes(ValueError, OSError):
+            trial = trial_of_file(path, recording)
+        scores = score(trial, recording) if len(trial) else {}
+        runs.append(EstimatorRun(path.name, {}, False, trial.status, printable(trial.reason), math.nan, scores, trial))
     return RunReport(recording, simulated, tuple(runs))
 
 

@@ -27,7 +27,20 @@ if TYPE_CHECKING:
     from simnav.kinds import Component, Kind
     from simnav.leaderboard.claiming import claim
     from simnav.leaderboard.costing import bench, costs
-    from simnav.leaderboard.inspection import allan, bound, cite, merge, rank, reproduce, rescore, seal, verify
+    from simnav.leaderboard.inspection import (
+        allan,
+        bound,
+        cite,
+        export,
+        merge,
+        rank,
+        realism,
+        reproduce,
+        rescore,
+        score_files,
+        seal,
+        verify,
+    )
     from simnav.leaderboard.publishing import (
         audit_standard,
         check_standard,
@@ -98,6 +111,7 @@ __all__ = [
     "claim",
     "costs",
     "evaluate",
+    "export",
     "load",
     "load_plugin",
     "make",
@@ -106,6 +120,7 @@ __all__ = [
     "open_source",
     "publish_standard",
     "rank",
+    "realism",
     "record",
     "register",
     "register_fault",
@@ -118,6 +133,7 @@ __all__ = [
     "run_standard",
     "run_trial",
     "score",
+    "score_files",
     "seal",
     "site",
     "standard",
@@ -158,7 +174,20 @@ _HOMES = {
     ),
     "leaderboard.claiming": ("claim",),
     "leaderboard.costing": ("bench", "costs"),
-    "leaderboard.inspection": ("allan", "bound", "cite", "merge", "rank", "reproduce", "rescore", "seal", "verify"),
+    "leaderboard.inspection": (
+        "allan",
+        "bound",
+        "cite",
+        "export",
+        "merge",
+        "rank",
+        "realism",
+        "reproduce",
+        "rescore",
+        "score_files",
+        "seal",
+        "verify",
+    ),
     "leaderboard.results.errors": ("RequestError",),
     "leaderboard.running": ("campaign", "check", "evaluate", "make", "record", "robustness", "run", "sweep", "tune"),
     "leaderboard.publishing": (

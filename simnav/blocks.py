@@ -27,12 +27,15 @@ import numpy as np
 from simnav.compiled import Array
 from simnav.spec import UNITS
 
-__all__ = ["NAVIGATION", "Process", "Rates", "StateBlock", "blocks_of"]
+__all__ = ["LEVER_ARM", "NAVIGATION", "Process", "Rates", "StateBlock", "blocks_of"]
 
 Process = Literal["constant", "random_walk", "gauss_markov", "clock"]
 _PROCESSES: tuple[str, ...] = get_args(Process)
 #: In a Jacobian by block, the name of position, velocity and attitude.
 NAVIGATION = "navigation"
+#: The block of an instrument whose place in the vessel is not known well: what its lever arm is more than the datasheet
+#: says, forward, starboard, down.
+LEVER_ARM = "lever_arm"
 
 _NAME = re.compile(r"[a-z][a-z0-9]*(_[a-z0-9]+)*")
 

@@ -10,8 +10,10 @@ from __future__ import annotations
 import ast
 import contextlib
 import hashlib
+import importlib.metadata
 import importlib.util
 import inspect
+import os
 import re
 import sys
 import traceback
@@ -20,7 +22,7 @@ import warnings
 from collections.abc import Callable, Iterator
 from functools import wraps
 from importlib import import_module
-from importlib.metadata import entry_points
+from importlib.metadata import EntryPoint
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
@@ -30,6 +32,7 @@ __all__ = [
     "code_digest",
     "code_text",
     "declared_in",
+    "entry_points",
     "exception_of",
     "import_file",
     "is_file_module",
@@ -258,6 +261,29 @@ def exception_of(cls: Any, error: BaseException) -> str:
     return f"{type(error).__name__}{where}: {error}"
 
 
+#: The entry points of each group, and the state of the import path in which they were read.
+_installed: dict[str, tuple[tuple[tuple[str, int], ...], tuple[EntryPoint, ...]]] = {}
+
+
+def entry_points(group: str) -> tuple[EntryPoint, ...]:
+    """The installed entry points of a group.
+
+    The metadata of all packages are read once, and again when the import path or a folder on it changes.
+    """
+    state = tuple((folder, _changed(folder)) for folder in sys.path)
+    if group not in _installed or _installed[group][0] != state:
+        _installed[group] = state, tuple(importlib.metadata.entry_points(group=group))
+    return _installed[group][1]
+
+
+def _changed(folder: str) -> int:
+    """Time of the last change of a folder [ns]; 0 if there is none."""
+    try:
+        return os.stat(folder or ".").st_mtime_ns
+    except OSError:
+        return 0
+
+
 class Registry(Generic[C]):
     """The classes or functions of one sort, by name.
 
@@ -328,7 +354,7 @@ class Registry(Generic[C]):
             return
         self._discovered = True
         import_module(self.home)
-        for point in sorted(entry_points(group=self.group), key=lambda p: p.name):
+        for point in sorted(entry_points(self.group), key=lambda p: p.name):
             before = dict(self._classes)
             try:
                 point.load()

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from simnav.declared_process import DeclaredProcess, Factor
 from simnav.types import (
     Array,
     Datasheet,
@@ -362,10 +363,13 @@ _STATES_OF: dict[type[NavigationStates], tuple[str, ...]] = {
     TapStates: (*_STATE_ARRAYS, "angular_rate", "water_velocity"),
 }
 
+#: Fields of a datasheet that most have not.
+_OPTIONAL = ("details", "blocks", "channels", "processes")
+
 
 def _sheet(sheet: Datasheet | ImuDatasheet) -> dict[str, Any]:
-    """A datasheet as a dictionary for JSON, without ``details``, ``blocks`` and ``channels`` if they are empty."""
-    return {k: _plain(v) for k, v in asdict(sheet).items() if k not in ("details", "blocks", "channels") or v}
+    """A datasheet as a dictionary for JSON, without the fields of `_OPTIONAL` that are empty."""
+    return {k: _plain(v) for k, v in asdict(sheet).items() if k not in _OPTIONAL or v}
 
 
 def _sheets(instruments: Instruments) -> dict[str, Any]:
@@ -427,13 +431,20 @@ def _instruments(sheets: Mapping[str, Any], step: float) -> Instruments:
     aids = []
     for aid in sheets["aids"]:
         fields: dict[str, Any] = {
-            k: np.array(v, dtype=np.float64) if isinstance(v, list) and k not in ("blocks", "channels") else v
+            k: np.array(v, dtype=np.float64) if isinstance(v, list) and k not in _OPTIONAL else v
             for k, v in aid.items()
         }
         fields["blocks"] = tuple(StateBlock(**block) for block in aid.get("blocks", ()))
         fields["channels"] = tuple(aid.get("channels", ()))
+        fields["processes"] = tuple(_process(p) for p in aid.get("processes", ()))
         aids.append(Datasheet(**fields))
     return Instruments(aids, imu, step)
+
+
+def _process(given: Mapping[str, Any]) -> DeclaredProcess:
+    exact = None if given["exact"] is None else StateBlock(**given["exact"])
+    factors = tuple(Factor(**factor) for factor in given["factors"])
+    return DeclaredProcess(**{**given, "block": StateBlock(**given["block"]), "exact": exact, "factors": factors})
 
 
 def _from_arrays(meta: dict[str, Any], arrays: dict[str, Any]) -> Recording:

@@ -9,11 +9,11 @@ import os
 import warnings
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
-from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Any
 
 from simnav.compiled import Kernel, kernels, prune
+from simnav.plugins import entry_points
 
 __all__ = ["warmup"]
 
@@ -71,7 +71,7 @@ def _import_all() -> None:
                     parts = path.relative_to(folder).with_suffix("").parts
                     _try_import(".".join([package, *(p for p in parts if p != "__init__")]))
     for group in ("simnav.estimators", "simnav.instruments", "simnav.faults"):
-        for point in entry_points(group=group):
+        for point in entry_points(group):
             _try_import(point.module)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import sys
 from pathlib import Path
@@ -35,6 +36,12 @@ os.environ.pop("COLUMNS", None)
 # How long an example takes depends on the machine, and is nothing that a test asserts.
 settings.register_profile("simnav", deadline=None)
 settings.load_profile("simnav")
+
+
+def pytest_collection_finish() -> None:
+    """The tests stay to the end: no collection of garbage needs to look at their many objects again."""
+    gc.collect()
+    gc.freeze()
 
 
 @pytest.fixture

@@ -8,7 +8,7 @@ import numpy as np
 
 from simnav.compiled import kernel
 from simnav.estimators.algebra.chi_square import chi_square_limits, normal_quantile
-from simnav.estimators.models.roles import fixes_and_logs
+from simnav.estimators.models.roles import fixes_and_logs, witnesses
 from simnav.types import Array, Instruments
 
 from .base import Innovation
@@ -43,15 +43,16 @@ class PredictionTest:
     as wrong if
 
     - the recent innovations of the instrument are correlated from one to the next, and too large for R and H P H'; and
-    - no instrument of the other group (fixes, logs) is a witness against it: it is heard, and its own innovations were
-      not correlated at some time since those of the first instrument persist. So a lasting error of the fixes is found
-      if a log agrees with the prediction, and the other way round. (A filter that believes wrong fixes soon disagrees
-      with the log, too. So what the witness said at first stands until the fixes agree again); and
-    - an IMU that is noisier than its datasheet by a factor of `WORSE` would explain the innovation.
+    - no witness is against it. A witness is another instrument that would notice the same error of the prediction
+      (`simnav.estimators.models.roles.witnesses`): it is heard, and its own innovations are not correlated. So a
+      lasting error of the fixes is found if a log agrees with the prediction, and the other way round. A filter that
+      believes wrong fixes soon disagrees with the log, too. So what the log said at first stands until the fixes agree
+      again. What fixes say of a log does not stand: they see a wrong velocity only when the position has drifted.
 
-    A lasting error of the only instrument that is heard cannot be told from a wrong prediction. The instrument is then
-    believed, as in the plain filter: its error is bounded, and the error of an IMU alone is not. Without an IMU this
-    test is not made.
+    So a lasting error is blamed on an instrument only by a witness. Without one it cannot be told from a wrong
+    prediction, however large it is: a gyroscope that is disturbed for a second makes errors of any size. The instrument
+    is then believed, as in the plain filter. Its error is bounded, and the error of an IMU alone is not. Without an IMU
+    this test is not made.
 
     Parameters
     ----------
@@ -72,7 +73,6 @@ class PredictionTest:
     RECENT = 5.0  # s; what another instrument did before, or before its last three periods, does not count
     PERSISTENT = 0.99  # probability that the innovations of a white noise are not found correlated
     WHITE = 0.95  # the same for a witness, which must be beyond doubt
-    WORSE = 20.0  # largest factor on the noise of an IMU
     LARGEST, TOTAL = 100.0, 1e8
 
     def __init__(self, instruments: Instruments, together: int = 3, probability: float = 0.999):
@@ -84,8 +84,9 @@ class PredictionTest:
         self._inertial = instruments.imu is not None
         if not self._inertial and len(set(self._group.values())) < 2:
             self._group = {}
-        self._recent = {name: max(self.RECENT, 3.0 / instruments[name].rate) for name in self._group}
-        self._condemned: set[str] = set()  # instruments that a witness was against since their innovations persist
+        self._recent = {name: max(self.RECENT, 3.0 / sheet.rate) for name, sheet in instruments.items()}
+        self._witnesses = witnesses(instruments) if together and self._inertial else {}
+        self._condemned: set[str] = set()  # fixes that a log was against since their innovations persist
         self._courses: dict[str, Course] = {}
         self._failures: dict[str, tuple[int, float]] = {}
         self._first: Array | None = None
@@ -95,11 +96,13 @@ class PredictionTest:
         """Whether the prediction of this innovation is taken as wrong, by one of the tests."""
         self.disturbed = False
         name, time = innovation.measurement.instrument, innovation.measurement.time
-        if name not in self._group:
+        if name not in self._group and name not in self._witnesses:
             return False
         components = standardised(innovation.residual, innovation.predicted, innovation.noise)
-        self.disturbed = self._fails_jointly(name, time, components, len(innovation.residual))
-        return (self._inertial and self._persists(name, time, components, innovation)) or self.disturbed
+        count = len(innovation.residual)
+        if name in self._group:
+            self.disturbed = self._fails_jointly(name, time, components, count)
+        return (name in self._witnesses and self._persists(name, time, components, count)) or self.disturbed
 
     def _fails_jointly(self, name: str, time: float, components: tuple[float, float, float], count: int) -> bool:
         """Whether this instrument and one of the other group have failed often enough in a row, this time included.
@@ -117,27 +120,27 @@ class PredictionTest:
             for other, (n, t) in self._failures.items()
         )
 
-    def _persists(self, name: str, time: float, components: tuple[float, float, float], given: Innovation) -> bool:
-        """Whether the innovations of an instrument persist, no witness is against it, and an IMU would explain it."""
+    def _persists(self, name: str, time: float, components: tuple[float, float, float], count: int) -> bool:
+        """Whether the innovations of an instrument persist, and no witness is against it."""
         course = self._courses.get(name)
         if course is None:
             course = self._courses[name] = Course()
-        course.add(components, len(given.residual), time)
+        course.add(components, count, time)
         if not (course.correlated(self._persistent) and course.large(self._large)):
             self._condemned.discard(name)
             return False
-        witnesses = [
-            witness
-            for other, witness in self._courses.items()
-            if self._group[other] != self._group[name] and time - witness.time <= self._recent[other]
+        heard = [
+            self._courses[other]
+            for other in self._witnesses[name]
+            if other in self._courses and time - self._courses[other].time <= self._recent[other]
         ]
-        if not witnesses:
+        if not heard:
             self._condemned.discard(name)
-        elif name in self._condemned or not all(witness.correlated(self._white) for witness in witnesses):
-            self._condemned.add(name)
+        elif name in self._condemned or not all(witness.correlated(self._white) for witness in heard):
+            if self._group.get(name):
+                self._condemned.add(name)
             return False
-        wide = standardised(given.residual, self.WORSE**2 * given.predicted, given.noise)
-        return sum(u * u for u in wide) <= self._limits[len(given.residual)]
+        return True
 
     def inflation(self, innovation: Innovation) -> float:
         """Factor of P after a failure of the prediction: once for every ``together`` failures.

@@ -31,7 +31,7 @@ from simnav.types import KINDS, Array, Instruments, Measurement
 
 from .base import Adaptation, Innovation
 
-__all__ = ["FisherNoise", "MixtureNoise", "NominalNoise", "TrueNoise", "fisher_information", "imu_faults"]
+__all__ = ["FaultTimes", "FisherNoise", "MixtureNoise", "NominalNoise", "TrueNoise", "fisher_information", "imu_faults"]
 
 #: A component with a fault of more than this many sigma is rejected.
 LIMIT = 3.0
@@ -137,6 +137,24 @@ class TrueNoise(Adaptation):
                 return None
             noise = noise + np.diag(variance)
         return noise
+
+
+class FaultTimes(TrueNoise):
+    """The oracle that knows when a fault touches a measurement, and nothing of its size: it uses none of them.
+
+    What the best detection and exclusion of faults could reach. A wrong measurement has information for those only who
+    know how wrong it may be.
+    """
+
+    def states(self) -> list[FaultState]:
+        """An empty list, because no size is known."""
+        return []
+
+    def adapt(self, innovation: Innovation) -> Array | None:
+        """The true noise of a measurement without a fault; None with one."""
+        m = innovation.measurement
+        stream, k = self._label(m.source, m.time)
+        return None if stream.faults[k] else self._white(innovation)[0]
 
 
 class NominalNoise(TrueNoise):

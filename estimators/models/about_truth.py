@@ -20,6 +20,7 @@ in a recorded log), the estimate itself is the next nominal state, as in an exte
 - the turn-on bias beside the in-run bias, of the IMU and of each aid
 - scale factors and misalignments of the IMU: they act as a bias in proportion to the rate or force, as measured
 - the scale factor of each velocity and depth, the misalignment of a DVL, the deviation of a magnetic compass
+- the processes that a datasheet declares by name, of first or second order, with their factors
 
 If the velocity of the water is given, it is treated as known. A speed log then measures the velocity over the ground.
 
@@ -53,6 +54,7 @@ from simnav.types import (
 from .base import ErrorModel, Linearised
 from .declared_errors import errors_of, errors_of_triad
 from .equations import equation_of
+from .factors_about_truth import FactorsAboutTruth
 from .inertial import InertialModel, roll_pitch_yaw
 from .propagation import correct_inertial
 from .state_blocks import StateBlocks
@@ -75,12 +77,16 @@ class _ImuError(NamedTuple):
 
 
 class _AidErrors(NamedTuple):
-    """Places of an aid's states in y; -1 or empty where it has none. ``bias`` holds (component, place)."""
+    """Places of an aid's states in y; -1 or empty where it has none. ``bias`` holds (component, place).
+
+    ``processes`` are those that the datasheet declares by name: component, place, and factors of the state.
+    """
 
     bias: list[tuple[int, int]]
     scale: int
     misalignment: int
     deviation: int
+    processes: list[tuple[int, int, FactorsAboutTruth]]
 
 
 class AboutTruthModel(ErrorModel):
@@ -163,7 +169,7 @@ class AboutTruthModel(ErrorModel):
 
     def _aid(self, sheet: Datasheet) -> Datasheet:
         """Make the states of an aid; return its datasheet with what is left for the inertial model."""
-        name, errors, bias = sheet.name, errors_of(sheet), []
+        name, errors, bias = sheet.name, errors_of(replace(sheet, processes=())), []
         for process, component, rates in apart(errors["bias"]):
             bias.append((component, self.blocks.add(name, f"{process.name}_{component}", [rates])))
         if "current" in errors and self.water is None:  # along the keel
@@ -173,10 +179,27 @@ class AboutTruthModel(ErrorModel):
             for error in ("scale", "misalignment", "deviation")
             if error in errors and errors[error].processes
         }
-        self._aids[name] = _AidErrors(bias, *(at.get(error, -1) for error in ("scale", "misalignment", "deviation")))
+        scale, misalignment, deviation = (at.get(error, -1) for error in ("scale", "misalignment", "deviation"))
+        self._aids[name] = _AidErrors(bias, scale, misalignment, deviation, self._processes(sheet))
         none = np.zeros_like(sheet.bias)
         white = sheet.bias_instability if errors["bias"].fast else none
-        return replace(sheet, bias=none, bias_instability=white, scale=0.0, misalignment=np.zeros(3))
+        return replace(sheet, bias=none, bias_instability=white, scale=0.0, misalignment=np.zeros(3), processes=())
+
+    def _processes(self, sheet: Datasheet) -> list[tuple[int, int, FactorsAboutTruth]]:
+        """Make the states of the processes that a datasheet declares by name, each as it is."""
+        found = []
+        for process in sheet.processes:
+            factors = FactorsAboutTruth(process.factors, self.truth)
+            block = process.block if process.exact is None else process.exact
+            for component, rates in enumerate(block.rates()):
+                label = f"{process.name}_of_{component}"
+                if process.second_order and rates.variance:
+                    found.append(
+                        (component, self.blocks.add_second_order(sheet.name, label, process, component), factors)
+                    )
+                elif rates.variance or rates.noise:
+                    found.append((component, self.blocks.add(sheet.name, label, [rates]), factors))
+        return found
 
     def _anchor(self) -> None:
         """Where a step begins: go on from the truth; where it is not known, from the estimate."""
@@ -249,6 +272,7 @@ class AboutTruthModel(ErrorModel):
         phi[index, index] = decay
         for at in self.blocks.clocks:
             phi[at, at + 1] = elapsed
+        self.blocks.couple(phi, elapsed)
         if self._imu_errors:
             measured = self._measured(self.time, until)
             factor = np.append(measured, 1.0)[self._times]  # -1, for a bias, is the last
@@ -281,6 +305,9 @@ class AboutTruthModel(ErrorModel):
             jacobian[:, mine] = own.jacobian[:, theirs]
         for component, at in errors.bias:
             jacobian[component, at] = 1.0
+        for component, at, factors in errors.processes:
+            reading = measurement.value - innovation  # what it should read
+            jacobian[component, at] = factors.at(measurement.time, self.nominal, reading)[component]
         equation = equation_of(sheet)
         if equation.has_scale:
             u = measurement.value - innovation  # what it should read

@@ -8,7 +8,7 @@ section 14.2; A. Gelb (ed.), *Applied Optimal Estimation*, 1974, section 3.6).
 
 If a datasheet gives the size and the correlation time of the slow part (``bias_instability``, ``correlation_time``),
 every model of simnav has these states. Here every fix has them, with at least a given size of the slow error, because
-datasheets do not include multipath.
+datasheets do not include multipath. A datasheet that declares its coloured processes by name is taken as it is.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ def with_correlated_fixes(instruments: Instruments, slow: float, slow_time: floa
     """
     sheets = []
     for sheet in instruments.values():
-        if sheet.role == "fix":
+        if sheet.role == "fix" and not sheet.processes:
             stated, least = np.any(sheet.bias_instability), slow * sheet.sigma
             sheet = replace(
                 sheet,

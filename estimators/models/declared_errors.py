@@ -5,14 +5,16 @@ plus an in-run bias. Filter, window, full graph, smoother, sigma points, bound a
 from here, in one of the two ways of `simnav.estimators.models.sum_of_processes`: merged into one state a component, or
 apart. One more process of an error is one more block here, and nothing else.
 
-- aid: ``bias``; of a log also ``current``, which a reading of the speed through the water depends on
+- aid: ``bias``, with the processes that the datasheet names (`simnav.declared_process`); of a log also ``current``,
+  which a reading of the speed through the water depends on
 - aid with a scale factor: ``scale``; of a velocity in body axes also ``misalignment``; of a magnetic compass
   ``deviation``, the amplitudes of sine and cosine of the heading
 - three gyroscopes or accelerometers: ``bias``, ``scale`` (three) and ``misalignment`` (six: each axis to the others)
 - a lasting fault, for estimators that know the faults: its size (`error_of_fault`)
 
-What an instrument of somebody else needs beyond that it brings along in its datasheet (`Datasheet.blocks`). No
-datasheet says how well a lever arm was measured.
+What an instrument needs beyond that it brings along in its datasheet (`Datasheet.blocks`): the error of its lever arm
+if ``lever_arm_sigma`` says how well that was measured (`simnav.estimators.models.levered`), and whatever an instrument
+of somebody else depends on.
 """
 
 from __future__ import annotations
@@ -99,13 +101,14 @@ def _constant(name: str, units: str, *sigma: float) -> DeclaredError:
 
 
 def processes_of_bias(sheet: Datasheet) -> tuple[StateBlock, ...]:
-    """What the bias of an aid consists of."""
+    """What the bias of an aid consists of: two figures, and the processes that the datasheet declares by name."""
     units = tuple(component.error_unit for component in KINDS[sheet.kind].components)
     found = []
     if any(turn_on := tuple(sheet.bias.tolist())):
         found.append(StateBlock("turn_on", len(units), units, turn_on))
     if any(in_run := tuple(sheet.bias_instability.tolist())):
         found.append(_in_run(units, in_run, sheet.correlation_time))
+    found += [process.block for process in sheet.processes]
     return tuple(found)
 
 

@@ -37,6 +37,7 @@ from typing import Literal
 
 import numpy as np
 
+from simnav import blocks
 from simnav.blocks import StateBlock
 from simnav.estimator import UnsuitableScenario
 from simnav.estimator.needs import IMU, Needs
@@ -68,13 +69,14 @@ def _across(vector: Array) -> Array:
 class DvlCalibrationModel(InertialModel):
     """The model of the module; 23 states.
 
-    Datasheets give the size of a DVL's scale factor and misalignment, but not how well a lever arm was measured nor how
-    well clocks agree: those two are parameters. A second DVL counts as an instrument without states.
+    Datasheets give the size of a DVL's scale factor and misalignment, and some also say how well the lever arm was
+    measured, but none how well clocks agree: that is a parameter, and so is the lever arm where the datasheet says
+    nothing. A second DVL counts as an instrument without states.
 
     Parameters
     ----------
     lever_arm : float
-        Sigma of each component of the lever-arm error [m].
+        Sigma of each component of the lever-arm error [m], if the datasheet has no ``lever_arm_sigma``.
     delay : float
         Sigma of the DVL's time error [s].
     preset : "default" or "paper"
@@ -111,7 +113,9 @@ class DvlCalibrationModel(InertialModel):
     def _more_blocks(self) -> None:
         name, errors = self._dvl.name, errors_of(self._dvl)
         self.blocks.add(name, "misalignment", merged(errors["misalignment"]))
-        self.blocks.add(name, "lever_arm", StateBlock("lever_arm", 3, "m", self.lever_arm).rates())
+        declared = next((block for block in self._dvl.blocks if block.name == blocks.LEVER_ARM), None)
+        arm = declared or StateBlock(blocks.LEVER_ARM, 3, "m", self.lever_arm)
+        self.blocks.add(name, arm.name, arm.rates())
         self.blocks.add(name, "scale", merged(errors["scale"]))
         self.blocks.add(name, "delay", StateBlock("delay", 1, "s", self.delay).rates())
 

@@ -8,12 +8,14 @@ reading alone is a function (`simnav.estimators.models.readings`).
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from types import MappingProxyType
 from typing import ClassVar
 
 import numpy as np
 
 from simnav import kinds
+from simnav.blocks import LEVER_ARM
 from simnav.kinds import NavigationPoint
 from simnav.types import KINDS, Array, Datasheet
 
@@ -72,8 +74,10 @@ class Equation:
             Datasheet of the instrument.
         errors : mapping of str to array
             Values of its errors but the bias, by name (`simnav.estimators.models.declared_errors`). ``current``, north
-            and east, is the velocity of the water.
+            and east, is the velocity of the water; ``lever_arm`` is added to that of the datasheet.
         """
+        if LEVER_ARM in errors:
+            sheet = replace(sheet, lever_arm=sheet.lever_arm + errors[LEVER_ARM])
         if self.through_water and "current" in errors:
             point = point._replace(velocity=point.velocity - np.append(errors["current"], 0.0))
         reading = READINGS[self.name](point, sheet)

@@ -37,6 +37,7 @@ from .base import Linearised
 from .chain import Chain, Columns, chain_of
 from .declared_errors import bias_of
 from .equations import EQUATIONS, equation_of
+from .levered import is_own, with_lever_arms
 from .moving_chain import MovingChain, MovingModel
 from .own_observation import OwnObservation
 from .points import PointModel
@@ -128,6 +129,7 @@ class GeneralModel(PointModel, MovingModel):
     def begin(self, start: InitialState, instruments: Instruments) -> Array:
         """Set the state; the covariance of its error, biases and blocks included."""
         self.time = start.time
+        instruments = with_lever_arms(instruments)
         x, own = self.initial(start, instruments)
         self.x, self.n_own = np.array(x, dtype=np.float64), len(own)
         self.sheets = {name: s for name, s in instruments.items() if self.observes(s)}
@@ -141,7 +143,7 @@ class GeneralModel(PointModel, MovingModel):
                 if error in self.errors:
                     first = self.blocks.add(name, error, rates) - self.n_own
                     at[error] = slice(first, first + len(rates))
-        brought = [s for s in self.sheets.values() if KINDS[s.kind].observation is not None]
+        brought = [s for s in self.sheets.values() if is_own(s)]
         self.blocks.bring(brought)
         self.own = {s.name: OwnObservation(s, self.blocks.places(s.name, self.n_own), start.time) for s in brought}
         self.size = self.blocks.size

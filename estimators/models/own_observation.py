@@ -30,6 +30,7 @@ from simnav.plugins import place_of
 from simnav.types import KINDS, NO_SIDE, Array, Datasheet
 
 from .channels import ChannelDatasheet, whole
+from .levered import observation_of
 
 __all__ = ["OwnObservation"]
 
@@ -48,8 +49,9 @@ class OwnObservation:
     Parameters
     ----------
     sheet : Datasheet
-        Datasheet of an instrument whose kind has an observation function. For one with channels it is that of a channel
-        (`simnav.estimators.models.channels.by_channel`); the function receives that of the instrument.
+        Datasheet of an instrument that is observed by a function (`simnav.estimators.models.levered.is_own`). For one
+        with channels it is that of a channel (`simnav.estimators.models.channels.by_channel`); the function receives
+        that of the instrument.
     places : mapping of str to int, optional
         Index of the first state of each of its blocks in the array of values that `point` receives. A block without a
         place has no state: it is zero, and its uncertainty counts as noise.
@@ -66,10 +68,12 @@ class OwnObservation:
         assert not sheet.channels, "each channel has an equation of its own, see `by_channel`"
         self.sheet, self.kind, self._given = sheet, KINDS[sheet.kind], whole(sheet)
         self.channel = sheet.channel if isinstance(sheet, ChannelDatasheet) else ""
-        observation = self.kind.observation
+        observation = observation_of(sheet)
         assert observation is not None
         self._observation = observation
-        self._since = since
+        self._since, self._variance = since, sheet.sigma**2
+        #: Index of the first state of each block that has states.
+        self.places: Mapping[str, int] = {b.name: places[b.name] for b in sheet.blocks if b.name in places}
         self._slices = [
             (b.name, slice(places[b.name], places[b.name] + b.size)) for b in sheet.blocks if b.name in places
         ]
@@ -243,6 +247,20 @@ class OwnObservation:
                 noise += part @ block.covariance(max(0.0, point.time - self._since)) @ part.T
         return noise
 
+    @property
+    def has_noise(self) -> bool:
+        """Whether blocks without states add to the noise of a reading."""
+        return bool(len(self._free))
+
+    def noise_without_state(self, side: Array) -> Array | None:
+        """The (d, d) covariance of `spread` where it depends on the side information only; None if it does not.
+
+        It tells nothing about whether the state has a reading, so a kind that may have none has no such form.
+        """
+        if self.kind.observations is None or self.has_noise:
+            return None
+        return self.reading_noise(side)
+
     def reading_noise(self, side: Array) -> Array | None:
         """The (d, d) covariance of a reading with this side information minus that of the datasheet; None if equal."""
         function, d = self.kind.reading_sigma, len(self.kind.components)
@@ -253,13 +271,15 @@ class OwnObservation:
         except Exception as error:
             message = f"reading_sigma of kind {self.sheet.kind!r} raised {type(error).__name__}: {error}"
             raise ValueError(message) from error
-        if sigma.shape != (d,) or not (np.isfinite(sigma).all() and np.all(sigma >= 0.0)):
+        if sigma.shape != (d,) or not (isfinite(sigma.sum()) and sigma.min() >= 0.0):
             raise ValueError(
                 f"reading_sigma of kind {self.sheet.kind!r}, for the instrument {self.sheet.name!r} with the side "
                 f"information {side.tolist()}, should return an array of shape {(d,)}, finite and not negative, not "
                 f"{sigma.tolist()}"
             )
-        return np.diag(sigma**2 - self.sheet.sigma**2)
+        more = np.zeros((d, d))
+        more.flat[:: d + 1] = sigma**2 - self._variance
+        return more
 
     def place(self, own: Array, jacobian: Array, offset: int) -> None:
         """Write the columns of the blocks into a (d, n) Jacobian; ``offset`` is the index of the first value in it."""

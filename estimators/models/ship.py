@@ -34,6 +34,7 @@ from simnav.types import KINDS, NO_SIDE, Array, Datasheet, Estimate, InitialStat
 from .base import ErrorModel, Linearised
 from .declared_errors import bias_of
 from .equations import equation_of
+from .levered import is_own, with_lever_arms
 from .measurements import wrap
 from .moving_chain import MovingModel
 from .ship_kernels import (
@@ -140,7 +141,7 @@ class ShipModel(MovingModel):
 
     def begin(self, start: InitialState, instruments: Instruments) -> Array:
         """Set the state; UnsuitableScenario if there is nothing that gives a speed and a heading."""
-        self.instruments = instruments
+        self.instruments = instruments = with_lever_arms(instruments)
         if not any(self.observes(s) for s in instruments.values()):
             raise UnsuitableScenario("the ship model needs GNSS, a compass or a log; there is none of them")
         self.time = start.time
@@ -152,7 +153,7 @@ class ShipModel(MovingModel):
         self.scale_at: dict[str, int] = {}
         for sheet in instruments.values():
             self._calibrate(sheet)
-        self.blocks.bring(s for s in instruments.values() if KINDS[s.kind].observation is not None and self.observes(s))
+        self.blocks.bring(s for s in instruments.values() if is_own(s) and self.observes(s))
         self.size = n = self.blocks.size
         variance, decay, density = self.blocks.columns(U)
         self.decay, self.density = np.concatenate([[0.0, 0.0], decay]), np.concatenate([[0.0, 0.0], density])
@@ -192,7 +193,7 @@ class ShipModel(MovingModel):
 
     def _calibrate(self, sheet: Datasheet) -> None:
         """The states of an instrument where the compiled loops expect them: the bias of what it measures, and scale."""
-        equation, own = equation_of(sheet), KINDS[sheet.kind].observation is not None
+        equation, own = equation_of(sheet), is_own(sheet)
         if own and not self.observes(sheet):
             return
         if not own and not (equation.is_heading or equation.is_position or equation.through_water):
@@ -211,7 +212,7 @@ class ShipModel(MovingModel):
         for name, sheet in self.instruments.items():
             if not self.observes(sheet):
                 continue
-            if KINDS[sheet.kind].observation is not None:
+            if is_own(sheet):
                 bias_at, white, places = self.bias_at.get(name, -1), _white(sheet), self.blocks.places(name, 0)
                 self.own[name] = ShipObservation(sheet, places, bias_at, white, self._height_variance, self.sway**2)
             else:

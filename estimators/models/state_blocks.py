@@ -14,6 +14,7 @@ from typing import TypeAlias
 import numpy as np
 
 from simnav.blocks import Rates, StateBlock, blocks_of
+from simnav.declared_process import DeclaredProcess
 from simnav.types import Array, Datasheet, Instruments
 
 from .channels import instrument_of
@@ -69,6 +70,7 @@ class StateBlocks:
         self._names: dict[str, tuple[str, ...]] = {}
         self.clocks: list[int] = []
         self._clocks: list[tuple[int, StateBlock]] = []
+        self._coupled: list[tuple[int, int, DeclaredProcess]] = []
         self._columns: Array | None = None
         self._step: tuple[float, Array, Array] | None = None
 
@@ -82,6 +84,18 @@ class StateBlocks:
         first = self.size
         self._of.setdefault(source, {})[name] = self._append(f"{source}.{name}", rates)
         return first
+
+    def add_second_order(self, source: str, name: str, process: DeclaredProcess, component: int) -> int:
+        """Append value and rate of a second-order process; the index of the value. They move by `couple`."""
+        value, rate = process.covariance(component).diagonal().tolist()
+        first = self.add(source, name, [Rates(value, 0.0, 0.0), Rates(rate, 0.0, 0.0)])
+        self._coupled.append((first, component, process))
+        return first
+
+    def couple(self, transition: Array, elapsed: float) -> None:
+        """Write the second-order processes into an (n, n) transition matrix."""
+        for at, _, process in self._coupled:
+            transition[at : at + 2, at : at + 2] = process.transition(elapsed)
 
     def bring(self, sheets: Iterable[Datasheet]) -> None:
         """Append the blocks that instruments bring along.
@@ -171,9 +185,11 @@ class StateBlocks:
         self.add_noise(covariance, elapsed)
 
     def add_noise(self, covariance: Array, elapsed: float) -> None:
-        """Add the noise of the clocks to an (n, n) covariance, in place."""
+        """Add the noise of clocks and second-order processes to an (n, n) covariance, in place."""
         for at, block in self._clocks:
             covariance[at : at + 2, at : at + 2] += block.noise(elapsed)
+        for at, component, process in self._coupled:
+            covariance[at : at + 2, at : at + 2] += process.noise(component, elapsed)
 
     def report(self, values: Array, offset: int, covariance: Array, everything: bool) -> Reported:
         """Value and standard deviation of blocks, by label (`simnav.types.Estimate.states`).

@@ -43,9 +43,13 @@ class SageHusaKf(_Adaptive, adaptation=SageHusa):
     2
         Windows, priors and forgetting are in seconds for an instrument of more than 1 Hz. Innovations that persist
         while no other instrument contradicts them are taken as a wrong prediction, and not as noise (`PredictionTest`).
+    3
+        A lasting error is blamed on an instrument only by a witness, whatever its size. Before, one that an IMU of 20
+        times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
+        Fixes that see no error of a log at first may see it later.
     """
 
-    version = 2
+    version = 3
 
 
 @register("sage-husa-paper")
@@ -62,9 +66,13 @@ class SageHusaPaper(
     2
         Windows, priors and forgetting are in seconds for an instrument of more than 1 Hz. Innovations that persist
         while no other instrument contradicts them are taken as a wrong prediction, and not as noise (`PredictionTest`).
+    3
+        A lasting error is blamed on an instrument only by a witness, whatever its size. Before, one that an IMU of 20
+        times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
+        Fixes that see no error of a log at first may see it later.
     """
 
-    version = 2
+    version = 3
 
 
 @register("iae")
@@ -79,9 +87,13 @@ class Iae(_Adaptive, adaptation=piece(InnovationBased, source="innovation")):
     2
         Windows, priors and forgetting are in seconds for an instrument of more than 1 Hz. Innovations that persist
         while no other instrument contradicts them are taken as a wrong prediction, and not as noise (`PredictionTest`).
+    3
+        A lasting error is blamed on an instrument only by a witness, whatever its size. Before, one that an IMU of 20
+        times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
+        Fixes that see no error of a log at first may see it later.
     """
 
-    version = 2
+    version = 3
 
 
 @register("iae-fixed")
@@ -95,9 +107,13 @@ class IaeFixed(_Adaptive, adaptation=piece(FixedWindow, source="innovation")):
     2
         Windows, priors and forgetting are in seconds for an instrument of more than 1 Hz. Innovations that persist
         while no other instrument contradicts them are taken as a wrong prediction, and not as noise (`PredictionTest`).
+    3
+        A lasting error is blamed on an instrument only by a witness, whatever its size. Before, one that an IMU of 20
+        times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
+        Fixes that see no error of a log at first may see it later.
     """
 
-    version = 2
+    version = 3
     formerly = _FORMERLY
 
 
@@ -112,9 +128,13 @@ class Rae(_Adaptive, adaptation=piece(FixedWindow, source="residual", newest=Fal
     2
         Windows, priors and forgetting are in seconds for an instrument of more than 1 Hz. Innovations that persist
         while no other instrument contradicts them are taken as a wrong prediction, and not as noise (`PredictionTest`).
+    3
+        A lasting error is blamed on an instrument only by a witness, whatever its size. Before, one that an IMU of 20
+        times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
+        Fixes that see no error of a log at first may see it later.
     """
 
-    version = 2
+    version = 3
     formerly = _FORMERLY
 
 
@@ -130,9 +150,13 @@ class Adkf(_Adaptive, adaptation=AdaptiveFactor):
     2
         Innovations that persist while no other instrument contradicts them are taken as a wrong prediction, and not as
         noise or gross errors of their instrument (`PredictionTest`).
+    3
+        A lasting error is blamed on an instrument only by a witness, whatever its size. Before, one that an IMU of 20
+        times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
+        Fixes that see no error of a log at first may see it later.
     """
 
-    version = 2
+    version = 3
 
 
 @register("adkf-paper")
@@ -166,9 +190,13 @@ class Igg3(_Adaptive, adaptation=Igg3Weights):
     2
         Innovations that persist while no other instrument contradicts them are taken as a wrong prediction, and not as
         noise or gross errors of their instrument (`PredictionTest`).
+    3
+        A lasting error is blamed on an instrument only by a witness, whatever its size. Before, one that an IMU of 20
+        times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
+        Fixes that see no error of a log at first may see it later.
     """
 
-    version = 2
+    version = 3
 
 
 @register("huber-kf")
@@ -182,9 +210,13 @@ class HuberKf(_Adaptive, adaptation=HuberWeights):
     2
         Innovations that persist while no other instrument contradicts them are taken as a wrong prediction, and not as
         noise or gross errors of their instrument (`PredictionTest`).
+    3
+        A lasting error is blamed on an instrument only by a witness, whatever its size. Before, one that an IMU of 20
+        times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
+        Fixes that see no error of a log at first may see it later.
     """
 
-    version = 2
+    version = 3
 
 
 @register("gated-ekf")
@@ -199,9 +231,13 @@ class GatedEkf(_Adaptive, adaptation=ChiSquareGate):
     2
         Innovations that persist while no other instrument contradicts them are taken as a wrong prediction, and not as
         noise or gross errors of their instrument (`PredictionTest`).
+    3
+        A lasting error is blamed on an instrument only by a witness, whatever its size. Before, one that an IMU of 20
+        times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
+        Fixes that see no error of a log at first may see it later.
     """
 
-    version = 2
+    version = 3
 
 
 @register("fading-ekf")
@@ -224,9 +260,13 @@ class VbAkf(_Adaptive, adaptation=VariationalBayes):
     2
         Windows, priors and forgetting are in seconds for an instrument of more than 1 Hz. Innovations that persist
         while no other instrument contradicts them are taken as a wrong prediction, and not as noise (`PredictionTest`).
+    3
+        A lasting error is blamed on an instrument only by a witness, whatever its size. Before, one that an IMU of 20
+        times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
+        Fixes that see no error of a log at first may see it later.
     """
 
-    version = 2
+    version = 3
 
 
 @register("mckf")
@@ -240,9 +280,13 @@ class Mckf(_Adaptive, adaptation=piece(MaximumCorrentropy, smallest=1e-3)):
     2
         Innovations that persist while no other instrument contradicts them are taken as a wrong prediction, and not as
         noise or gross errors of their instrument (`PredictionTest`).
+    3
+        A lasting error is blamed on an instrument only by a witness, whatever its size. Before, one that an IMU of 20
+        times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
+        Fixes that see no error of a log at first may see it later.
     """
 
-    version = 2
+    version = 3
 
 
 @register("imm")
@@ -257,6 +301,10 @@ class Imm(Row, solver=ImmEstimator, model=Suitable):
     2
         Innovations that persist while no other instrument contradicts them are taken as a wrong prediction, and not as
         noise or gross errors of their instrument (`PredictionTest`).
+    3
+        A lasting error is blamed on an instrument only by a witness, whatever its size. Before, one that an IMU of 20
+        times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
+        Fixes that see no error of a log at first may see it later.
     """
 
-    version = 2
+    version = 3

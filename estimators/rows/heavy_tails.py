@@ -25,9 +25,13 @@ class StudentTKf(Row, solver=KalmanEstimator, model=Suitable, adaptation=Student
     2
         Innovations that persist while no other instrument contradicts them are taken as a wrong prediction, and not as
         noise or gross errors of their instrument (`PredictionTest`).
+    3
+        A lasting error is blamed on an instrument only by a witness, whatever its size. Before, one that an IMU of 20
+        times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
+        Fixes that see no error of a log at first may see it later.
     """
 
-    version = 2
+    version = 3
 
 
 @register("student-t-rts")
@@ -42,7 +46,11 @@ class StudentTRts(StudentTKf, smoother=StudentTSmoother):
     2
         Innovations that persist while no other instrument contradicts them are taken as a wrong prediction, and not as
         noise or gross errors of their instrument (`PredictionTest`).
+    3
+        A lasting error is blamed on an instrument only by a witness, whatever its size. Before, one that an IMU of 20
+        times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
+        Fixes that see no error of a log at first may see it later.
     """
 
-    version = 2
+    version = 3
     formerly = _FORMERLY

@@ -1,12 +1,17 @@
-"""Rows of several filters side by side: one for each initial heading, or for each instrument that could be wrong."""
+"""Rows of several filters side by side: for each heading, for each instrument that could be wrong, by assumption."""
 
 from simnav.estimator import register
+from simnav.estimators.adaptations.variational_bayes import VariationalBayes
 from simnav.estimators.composition import Row
 from simnav.estimators.models.suitable import Suitable
 from simnav.estimators.solvers.heading_bank import HeadingBank
+from simnav.estimators.solvers.iterated import poor_heading
+from simnav.estimators.solvers.mid_value import MidValueSelection
 from simnav.estimators.solvers.solution_separation import SolutionSeparation
+from simnav.estimators.weightings.fault_isolation import FaultIsolation
+from simnav.estimators.weightings.graduated_non_convexity import GraduatedNonConvexity
 
-__all__ = ["HeadingBankEkf", "SolutionSeparationEkf"]
+__all__ = ["HeadingBankEkf", "MidValue", "SolutionSeparationEkf"]
 
 
 @register("heading-bank")
@@ -36,3 +41,26 @@ class SolutionSeparationEkf(Row, solver=SolutionSeparation, model=Suitable):
     """
 
     version = 2
+
+
+@register("mid-value")
+class MidValue(
+    Row,
+    solver=MidValueSelection,
+    model=Suitable,
+    adaptation=VariationalBayes,
+    weighting=GraduatedNonConvexity,
+    isolation=FaultIsolation,
+    iteration=poor_heading,
+):
+    """The middle one of three solutions: ``ekf``, ``vb-akf`` and ``gnc-fgo``, with the covariance of their mixture.
+
+    The row for which the three assumptions need not hold at once: that every datasheet is right, that an instrument's
+    noise only changes its size, that wrong measurements are the fewer ones. Where two of them fail to the same side it
+    is wrong, and its covariance may be too small; so it is if all three believe the only instrument that gives the
+    position.
+
+    Source: S. Osder, *Practical view of redundancy management application and theory*, J. Guidance, Control, and
+    Dynamics 22(1), 1999; H. W. Sorenson and D. L. Alspach, *Recursive Bayesian estimation using Gaussian sums*,
+    Automatica 7(4), 1971.
+    """

@@ -5,16 +5,17 @@ O0, O1, O1 with a smoother, and O3 of the reference literature differ in what th
 - ``oracle-clairvoyant`` (O0): what each fault added; it works on the run without faults
 - ``oracle`` (O1): which measurements a fault touched, and the statistics of the faults
 - ``oracle-rts``: the same, smoothed; the reference of the post-processing track
+- ``oracle-times``: which measurements a fault touched, and nothing of the sizes of the faults
 - ``oracle-mixture`` (O3): how often gross errors come and how large they are, not which measurements they hit
 """
 
 from simnav.estimator import register
-from simnav.estimators.adaptations.truth import MixtureNoise, NominalNoise, TrueNoise
+from simnav.estimators.adaptations.truth import FaultTimes, MixtureNoise, NominalNoise, TrueNoise
 from simnav.estimators.composition import Row, piece
 from simnav.estimators.solvers.oracle import OracleEstimator
 from simnav.estimators.solvers.smoother import Smoother
 
-__all__ = ["Oracle", "OracleClairvoyant", "OracleMixture", "OracleRts"]
+__all__ = ["Oracle", "OracleClairvoyant", "OracleMixture", "OracleRts", "OracleTimes"]
 
 
 @register("oracle")
@@ -48,5 +49,15 @@ class OracleMixture(Oracle, adaptation=MixtureNoise):
 
     The realistic target of robust estimators: the schedule of the faults and their sizes are known, each hit has to be
     told from the innovation (`simnav.estimators.adaptations.truth.MixtureNoise`). The bound ``mix`` is its. Source:
+    `simnav.estimators.solvers.oracle`.
+    """
+
+
+@register("oracle-times")
+class OracleTimes(Oracle, adaptation=FaultTimes):
+    """Oracle that knows when each fault begins and ends, and not how large it is: it uses no measurement with a fault.
+
+    The limit of detection and exclusion: what a row would reach that found every wrong measurement, at once and without
+    a false alarm. A disturbance of the IMU is subtracted, as for the other oracles. Source:
     `simnav.estimators.solvers.oracle`.
     """

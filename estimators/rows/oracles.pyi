@@ -1,12 +1,12 @@
 # Of oracles.py, for type checkers and editors. Do not edit: "python -m simnav.estimators.stubs" writes it.
 
 from simnav.estimator import register
-from simnav.estimators.adaptations.truth import MixtureNoise, NominalNoise, TrueNoise
+from simnav.estimators.adaptations.truth import FaultTimes, MixtureNoise, NominalNoise, TrueNoise
 from simnav.estimators.composition import Row, piece
 from simnav.estimators.solvers.oracle import OracleEstimator
 from simnav.estimators.solvers.smoother import Smoother
 
-__all__ = ["Oracle", "OracleClairvoyant", "OracleMixture", "OracleRts"]
+__all__ = ["Oracle", "OracleClairvoyant", "OracleMixture", "OracleRts", "OracleTimes"]
 
 @register("oracle")
 class Oracle(Row, solver=piece(OracleEstimator, restore=False), adaptation=TrueNoise):
@@ -22,4 +22,8 @@ class OracleRts(Oracle, smoother=Smoother):
 
 @register("oracle-mixture")
 class OracleMixture(Oracle, adaptation=MixtureNoise):
+    def __init__(self) -> None: ...
+
+@register("oracle-times")
+class OracleTimes(Oracle, adaptation=FaultTimes):
     def __init__(self) -> None: ...

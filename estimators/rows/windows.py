@@ -63,9 +63,13 @@ class IaeFgo(Row, solver=_WINDOW, model=Suitable, adaptation=piece(InnovationBas
     2
         Windows, priors and forgetting are in seconds for an instrument of more than 1 Hz. Innovations that persist
         while no other instrument contradicts them are taken as a wrong prediction, and not as noise (`PredictionTest`).
+    3
+        A lasting error is blamed on an instrument only by a witness, whatever its size. Before, one that an IMU of 20
+        times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
+        Fixes that see no error of a log at first may see it later.
     """
 
-    version = 2
+    version = 3
 
 
 @register("iae-fgo-fixed")
@@ -80,9 +84,13 @@ class IaeFgoFixed(Row, solver=_WINDOW, model=Suitable, adaptation=piece(FixedWin
     2
         Windows, priors and forgetting are in seconds for an instrument of more than 1 Hz. Innovations that persist
         while no other instrument contradicts them are taken as a wrong prediction, and not as noise (`PredictionTest`).
+    3
+        A lasting error is blamed on an instrument only by a witness, whatever its size. Before, one that an IMU of 20
+        times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
+        Fixes that see no error of a log at first may see it later.
     """
 
-    version = 2
+    version = 3
 
 
 @register("sw-fgo-paper")

@@ -269,10 +269,11 @@ class DeadReckoningEstimator(Solver):
         full[range(3, 6), range(3, 6)] += sigma**2 + SEAWAY**2
         tilt = np.full(2, 0.03**2)
         if self._imu is not None:
-            g, a = self._imu.gyroscope, self._imu.accelerometer
-            slow = (hypot(a.bias, a.bias_instability) / 9.81) ** 2
-            drift = (hypot(g.bias, g.bias_instability) * LEVEL_TIME) ** 2
-            tilt = np.diag(start)[6:8] + slow + drift
+            turning, acceleration = (
+                merged(bias_of_triad(triad, unit))[0].variance
+                for triad, unit in ((self._imu.gyroscope, "deg_s"), (self._imu.accelerometer, "m_s2"))
+            )
+            tilt = np.diag(start)[6:8] + acceleration / 9.81**2 + turning * LEVEL_TIME**2
         full[range(6, 8), range(6, 8)] = tilt
         age = self._time - self._started
         drift_down = float(tilt.mean()) * float(v[:2] @ v[:2]) * age**2 + sigma**2 * age

@@ -23,7 +23,7 @@ from simnav.leaderboard.calls import call, option, request
 from simnav.leaderboard.campaign.confinement.attempt import chosen_confinement
 from simnav.leaderboard.campaign.confinement.privileges import PrivilegesWarning, kept_rights
 from simnav.leaderboard.campaign.confinement.session import Limits, ServerError
-from simnav.leaderboard.results import requested, store, trials
+from simnav.leaderboard.results import requested, scenario_files, store, trials
 from simnav.leaderboard.results.errors import RequestError, mistakes
 from simnav.leaderboard.results.provenance import numerics
 from simnav.leaderboard.results.versions import declared_recording, declared_variant, is_declared
@@ -256,6 +256,7 @@ def run_campaign(asked: Campaign) -> Summary:
     entrants = _entrants(asked, confinement, path)
     keyed = _keyed(asked, entrants, path)
     requested.add(path, (s.id for s in asked.scenarios), len(asked.numbers))
+    scenario_files.add(path, asked.scenarios)
     plan, again = _planned(asked, path, entrants, keyed)
     total, skipped = plan.total, len(plan.there)
     statuses: Counter[str] = Counter()

@@ -246,10 +246,10 @@ def proven(repeated: int, fields: Sequence[str]) -> str:
     Examples
     --------
     >>> proven(0, [])
-    'nothing is proven, for no repeated run holds'
+    'nothing is proven, for no run was repeated that holds'
     """
     if not repeated:
-        return "nothing is proven, for no repeated run holds"
+        return "nothing is proven, for no run was repeated that holds"
     other = f", of which {', '.join(fields)} differ from here" if fields else ""
     return f"proven: {_PROVEN}, {repeated} in all; only claimed: {', '.join(CLAIMED)}{other}"
 

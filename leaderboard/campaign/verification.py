@@ -4,19 +4,20 @@ from __future__ import annotations
 
 import random
 import warnings
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from simnav.estimator import EstimatorError
 from simnav.estimator.registry import registered
-from simnav.leaderboard.results import store
+from simnav.leaderboard.results import scenario_files, store
 from simnav.leaderboard.results.catalogued import catalogued_scenario
 from simnav.leaderboard.results.errors import RequestError, sentence
 from simnav.leaderboard.results.provenance import here
 from simnav.leaderboard.results.scratch import scratch
 from simnav.leaderboard.results.versions import declared, is_declared
+from simnav.scenario import headers
 
 from .campaign import MEMORY, run_campaign
 from .comparison import (
@@ -70,6 +71,9 @@ class Verification:
     not_repeatable : tuple of str
         Those that could not be repeated or confirmed, and why: other code, an estimator that is not here, a limit of
         time or memory that another machine meets.
+    not_here : tuple of str
+        Those that cannot be checked here, and why: the scenario or the estimator is missing. That says nothing against
+        them.
     unknown : tuple of str
         Scores of the results that are not known in this process, for a plug-in was not loaded; they were not looked at.
     claims : tuple of str
@@ -108,12 +112,17 @@ class Verification:
     unconfirmed_fields: tuple[str, ...] = ()
     claimed: tuple[str, ...] = CLAIMED
     summary: str = ""
+    not_here: tuple[str, ...] = ()
+
+    @property
+    def refuted(self) -> bool:
+        """Whether something that was looked at is not as it should be."""
+        return bool(self.other_seals or self.different or self.not_repeatable or self.claims or self.set_aside)
 
     @property
     def passed(self) -> bool:
         """Whether all that was looked at is as it should be, and something was."""
-        faults = self.other_seals or self.different or self.not_repeatable or self.claims or self.set_aside
-        return bool(self.repeated) and not faults
+        return bool(self.repeated) and not self.refuted and not self.not_here
 
     def to_dict(self) -> dict[str, Any]:
         """The fields as values that JSON can hold."""
@@ -147,14 +156,20 @@ def verify_results(
     known = {s.id: s for s in scenarios}
     requests = {e.label: e for e in estimators}
     report = progress or (lambda *_, **__: None)
-    close, different, without, unknown, same = [], [], [], dict[str, None](), 0
+    close, different, without, absent, unknown, same = [], [], [], [], dict[str, None](), 0
     pairs: list[tuple[Result, Result]] = []
     with scratch("verify") as home:
         for k, result in enumerate(chosen):
             what = f"{result.estimator} on {result.scenario}, run {result.seed}"
             report(k, len(chosen), note=what)
             try:
-                again = _repeat(result, home / "runs", seal, known, requests)  # one folder: one process
+                scenario = known.get(result.scenario) or _scenario(folder, result.scenario)
+                request = requests.get(result.estimator) or request_of(result)
+            except (RequestError, ValueError) as error:
+                absent.append(f"{what}: {sentence(error)}")
+                continue
+            try:
+                again = _repeat(result, home / "runs", seal, scenario, request)  # one folder: one process
             except (RequestError, ValueError) as error:
                 without.append(f"{what}: {sentence(error)}")
                 continue
@@ -184,7 +199,7 @@ def verify_results(
         str(folder), len(found), seal.hash, len(found) - len(mine), len(chosen), same, tuple(close),
         (*different, *too_quick(pairs)), tuple(without), tuple(unknown), tuple(said_of.different),
         tuple(said_of.unconfirmed), set_aside, missing, findable(len(mine), len(chosen)), tuple(said_of.fields),
-        summary=proven(same + len(close), said_of.fields),
+        summary=proven(same + len(close), said_of.fields), not_here=tuple(absent),
     )  # fmt: skip
 
 
@@ -211,15 +226,20 @@ def _same_address(stored: Result, again: Result) -> bool:
     return [r.key for r in declared([stored])] == [r.key for r in declared([again])]
 
 
+def _scenario(folder: Path, identity: str) -> Scenario:
+    """The scenario of the catalogue, or the one whose file came with the results."""
+    if identity not in {header.id for header in headers()} and (found := scenario_files.load(folder, identity)):
+        return found
+    return catalogued_scenario(identity)
+
+
 def _repeat(
     result: Result,
     folder: Path,
     seal: Seal,
-    known: Mapping[str, Scenario],
-    requests: Mapping[str, EstimatorRequest],
+    scenario: Scenario,
+    request: EstimatorRequest,
 ) -> Result:
-    scenario = known.get(result.scenario) or catalogued_scenario(result.scenario)
-    request = requests.get(result.estimator) or request_of(result)
     by_version = is_declared(result.recording) and not seal.secret
     folder = folder / ("by-version" if by_version else "by-digest")
     usual = time_limit(scenario)  # a run that is said to have met a tiny limit is given the usual one

@@ -20,22 +20,28 @@ from simnav.leaderboard.publishing_requests import (
     SubmitRequest,
 )
 from simnav.leaderboard.requests import (
+    AlignRequest,
     AllanRequest,
     BenchRequest,
     BoundRequest,
     CampaignRequest,
     CiteRequest,
     EvaluateRequest,
+    ExportRequest,
+    InspectRequest,
     MergeRequest,
     Parameters,
+    RealismRequest,
     RecordRequest,
     ReproduceRequest,
     RescoreRequest,
     RobustnessRequest,
     RunRequest,
     Scenarios,
+    ScoreRequest,
     SealRequest,
     SweepRequest,
+    TuneNoiseRequest,
     TuneRequest,
     VerifyRequest,
 )
@@ -105,6 +111,14 @@ class RunCommand(RunRequest):
 
 
 @request
+class ScoreCommand(ScoreRequest):
+    """Score estimates that were made elsewhere, with the scores and the page of a run."""
+
+    _: KW_ONLY
+    plot: Path | None = option(default=None, help=_FIGURE)
+
+
+@request
 class SimulateCommand(RecordRequest):
     """Write the recording of one run: measurements, labels and truth."""
 
@@ -115,9 +129,13 @@ class SimulateCommand(RecordRequest):
 
 @request
 class CheckCommand:
-    """Test an estimator against the contract: causality, shapes, determinism, missing instruments."""
+    """Test an estimator against the contract: causality, shapes, determinism, missing instruments.
+    Of a scenario with a log (a TOML file): read all recordings, and show what stops or disturbs a run.
+    """
 
-    estimator: str = option(help="my_filter.py, my_filter.py:MyFilter or a name.", argument=True, metavar="FILE")
+    estimator: str = option(
+        help="my_filter.py, my_filter.py:MyFilter or a name; or my_log.toml.", argument=True, metavar="FILE"
+    )
     parameters: Parameters = option(
         "--set", default=None, metavar="NAME=VALUE", help="Value of a parameter of the estimators."
     )
@@ -192,6 +210,18 @@ class AllanCommand(AllanRequest):
 
 
 @request
+class RealismCommand(RealismRequest):
+    """Compare the errors of simulated instruments with those of a recording: can a classifier tell them apart?
+
+    It also prints the processes that would fit the real errors best, as tables of a scenario file.
+    """
+
+    _: KW_ONLY
+    plot: Path | None = option(default=None, help=_FIGURE)
+    fit: Path | None = option("--fit", default=None, help="Write the processes that fit to this TOML file.")
+
+
+@request
 class ReferenceCommand:
     """Run the oracles over many seeds, and store the figures that errors are divided by."""
 
@@ -211,7 +241,7 @@ class ReferenceCommand:
 @request
 class VerifyCommand(VerifyRequest, BundleOptions):
     """Check results or a submission, and repeat some of the runs, bit for bit.
-    The exit code is 0 if all holds, 3 if it holds but some fields differ from here and are only claimed, 1 otherwise.
+    The exit code is 0 if all holds, 3 if nothing speaks against it but something cannot be checked here, 1 otherwise.
     """
 
 
@@ -256,6 +286,11 @@ COMMANDS: Mapping[str, tuple[type[Any], str]] = {
     "show": (ShowCommand, "show"),
     "run": (RunCommand, "run"),
     "simulate": (SimulateCommand, "simulate"),
+    "score": (ScoreCommand, "score"),
+    "export": (ExportRequest, "export"),
+    "inspect": (InspectRequest, "inspect"),
+    "align": (AlignRequest, "align"),
+    "tune-noise": (TuneNoiseRequest, "tune_noise"),
     "check": (CheckCommand, "check"),
     "bench": (BenchCommand, "bench"),
     "new-estimator": (NewEstimatorCommand, "new_estimator"),
@@ -267,6 +302,7 @@ COMMANDS: Mapping[str, tuple[type[Any], str]] = {
     "warmup": (WarmupCommand, "warmup"),
     "bound": (BoundCommand, "bound"),
     "allan": (AllanCommand, "allan"),
+    "realism": (RealismCommand, "realism"),
     "reproduce": (ReproduceRequest, "reproduce"),
     "claim": (ClaimCommand, "claim"),
     "reference": (ReferenceCommand, "reference"),
@@ -283,8 +319,9 @@ COMMANDS: Mapping[str, tuple[type[Any], str]] = {
 HEADINGS: Mapping[str, Sequence[str]] = {
     "Every day": ("list", "show", "run", "evaluate", "check", "new-estimator", "simulate", "sweep", "campaign",
                   "leaderboard"),
-    "Study and publish": ("tune", "train", "bench", "robustness", "bound", "allan", "reproduce", "claim", "rescore",
-                          "merge", "submit", "verify", "seal", "cite"),
+    "Logs and programs of others": ("inspect", "align", "tune-noise", "export", "score"),
+    "Study and publish": ("tune", "train", "bench", "robustness", "bound", "allan", "realism", "reproduce", "claim",
+                          "rescore", "merge", "submit", "verify", "seal", "cite"),
     "Maintain": ("standard", "reference", "warmup"),
 }  # fmt: skip
 

@@ -22,7 +22,7 @@ def show(out: Output, request: AuditRequest) -> None:
         f"results:   {found.folder} ({found.results}, of which {found.repeated} were repeated)",
         *(f"close:     {text}" for text in found.close),
         *(f"different: {text}" for text in found.different),
-        *(f"left:      {text}" for text in found.not_repeatable),
+        *(f"left:      {text}" for text in (*found.not_repeatable, *found.not_here)),
         f"the sample: {made.sentence()}",
     )
     out.code = 0 if made.passed else FAILED

@@ -24,7 +24,7 @@ __all__ = ["show"]
 def show(out: Output, request: VerifyCommand) -> None:
     """Check results or a submission, and repeat some of the runs, bit for bit.
 
-    The exit code is 0 if all holds, 3 if it holds but some fields differ from here and are only claimed, 1 otherwise.
+    The exit code is 0 if all holds, 3 if nothing speaks against it but something cannot be checked here, 1 otherwise.
     """
     if absolute(request.results).is_file():
         bundle = VerifyBundleRequest(
@@ -46,6 +46,7 @@ def show(out: Output, request: VerifyCommand) -> None:
     lines += [f"different: {text}" for text in (*done.different, *done.claims)]
     lines += [f"close: {text}" for text in done.close]
     lines += [f"not repeatable: {text}" for text in done.not_repeatable]
+    lines += [f"cannot be checked here: {text}" for text in done.not_here]
     lines += [f"incomplete: {text}" for text in done.missing]
     lines += [f"not confirmed: {text}" for text in done.unconfirmed]
     if done.unknown:
@@ -55,7 +56,7 @@ def show(out: Output, request: VerifyCommand) -> None:
     lines.append(f"{same} of {done.repeated} repeated runs are the same to the bit{more}")
     lines += [done.finds, done.summary]
     out.print(*lines)
-    out.code = _code(done.passed, done.unconfirmed_fields)
+    out.code = _code(not done.refuted, (*done.not_here, *done.unconfirmed_fields))
 
 
 def _code(passed: bool, unconfirmed: Sequence[str]) -> int:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from functools import cache
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
 from pydantic import TypeAdapter
@@ -115,10 +116,9 @@ class PaperPage:
         (folder / place).mkdir(parents=True, exist_ok=True)
         document = self.document
         if self.stored is not None:
-            from .figures import write_figures
-
-            drawn = write_figures(self.stored, folder / place, scores_only=True)
-            document = _document(self.stored, drawn, folder / place)
+            document, figures = _drawn(self.document.paper)
+            for name, content in figures.items():
+                write_whole(folder / place / name, content)
         else:
             for figure in document.figures:
                 shutil.copyfile(self.folder / figure.file, folder / place / figure.file)
@@ -177,6 +177,19 @@ def _stored(folder: Path, key: str) -> PaperPage | None:
         return PaperPage(_document(found, []), folder, found)
     except ValueError:
         return None
+
+
+@cache
+def _drawn(key: str) -> tuple[_Document, dict[str, bytes]]:
+    """The page from the stored results with its figures, by name: the same in each site that a process makes."""
+    from . import paper, stored
+    from .figures import write_figures
+
+    found = stored.shipped_reproduction(paper.paper_of(key))
+    with TemporaryDirectory() as folder:
+        place = Path(folder)
+        document = _document(found, write_figures(found, place, scores_only=True), place)
+        return document, {path.name: path.read_bytes() for path in sorted(place.iterdir())}
 
 
 def _render(document: _Document, place: str, site: SiteFacts) -> str:

@@ -30,6 +30,7 @@ from .rows import (
     TrackTable,
 )
 from .stored_costs import cost_of
+from .stored_robustness import worst_of
 from .summary import sentence
 
 __all__ = [
@@ -154,16 +155,25 @@ class Ranking:
         return next((s for s in self.scenarios if s.scenario == identity), None) or _missing("scenario", identity)
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain dicts and lists for JSON; numbers that are not finite become None. Each row has its stored cost."""
+        """Plain dicts and lists for JSON; numbers that are not finite become None.
+
+        Each row has its stored cost, and its worst ratio under a wrong datasheet.
+        """
         found: dict[str, Any] = as_json(vars(self))
         for board in (*found["tracks"], *found["scenarios"]):
             for row in board["rows"]:
                 row["cost"] = as_json(cost_of(row["estimator"], board["plain"], board["score"]))
+                worst = worst_of(row["estimator"], row["version"], board["plain"], board["score"])
+                row["wrong_datasheet"] = as_json(worst)
         return found
 
     def to_frame(self) -> Any:
         """A row an estimator and track, with its ratios; see `simnav.leaderboard.results.frame.frame`."""
         scenarios = [s.scenario for s in self.scenarios]
+        worst = {
+            (t.track, r.estimator): worst_of(r.estimator, r.version, t.plain, t.score)
+            for t in self.tracks for r in t.rows
+        }  # fmt: skip
         costs = {(t.track, r.estimator): cost_of(r.estimator, t.plain, t.score) for t in self.tracks for r in t.rows}
         return frame([
             {"track": t.track}
@@ -174,6 +184,7 @@ class Ranking:
                 f"cost_{k}".removesuffix("_value"): getattr(costs[t.track, row.estimator], k, math.nan)
                 for k in ("value", "low", "high")
             }
+            | {"wrong_datasheet": getattr(worst[t.track, row.estimator], "ratio", math.nan)}
             | {f"{part}_{k}": v for part in ("clean", "faulty") for k, v in vars(getattr(row, part)).items()}
             | {s: row.ratios.get(s, math.nan) for s in scenarios}
             for t in self.tracks

@@ -77,7 +77,7 @@ from .statistics import (
     unorderable,
     weighted_quantile,
 )
-from .superseded import superseded_by
+from .superseded import only_version, superseded_by
 from .tracks import Track, catalogued, tracks_of
 from .variants import families, surplus
 
@@ -385,6 +385,7 @@ def _rows(
             "peak_memory": max(c.runs.peak_memory for c in mine),
             "learned": learned_by(r for c in mine for r in c.runs.results),
             "superseded": superseded_by(n.partition("(")[0], (r for c in mine for r in c.runs.results)),
+            "version": only_version(r for c in mine for r in c.runs.results),
         })  # fmt: skip
     return rows, separation, why
 

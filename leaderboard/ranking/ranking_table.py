@@ -11,6 +11,7 @@ from simnav.scoring import SCORES
 from . import tables
 from .statistics import FAILURE
 from .stored_costs import NOT_MEASURED, cost_of, not_measured
+from .stored_robustness import worst_of
 from .summary import sentence
 
 if TYPE_CHECKING:
@@ -33,6 +34,8 @@ _CAPTION = (
 )
 
 
+#: Column of the largest ratio under a wrong datasheet.
+_DATASHEET = "wrong datasheet"
 _TITLES = {"oracle": "× oracle", "plain": "× plain row", "figure": "× reference", "": "error [m]"}
 _OVER = {
     "oracle": "that of an oracle on the same run",
@@ -99,16 +102,19 @@ def track_table(track: TrackRanking, mine: Collection[str] = ()) -> tables.Fitte
             consistency(r.clean), consistency(r.faulty), tables.percent(r.clean.coverage),
             tables.percent(r.clean.worst_coverage),
             NOT_MEASURED if cost is None else tables.interval(cost.value, cost.low, cost.high),
+            _wrong_datasheet(r, track),
             tables.duration(r.update_median), tables.size(r.peak_memory or None),
         ])  # fmt: skip
     gained = f"× {track.plain}" if track.plain else "× plain row"
     cost_title = f"cost × {track.plain}" if track.plain else "cost × plain row"
     columns = ["rank", "estimator", title, "95 % interval", "over scenarios", gained, "scenarios won", "above 1.5 ×",
                "above 10 ×", "95th perc.", "worst run", "failed", "scenarios", "NEES, no fault", "NEES, faults",
-               "95 % coverage, no fault", "worst coverage, no fault", cost_title, "wall clock", "memory"]  # fmt: skip
+               "95 % coverage, no fault", "worst coverage, no fault", cost_title, _DATASHEET, "wall clock",
+               "memory"]  # fmt: skip
     value = ["estimator", title, "rank", "95 % interval", gained, "failed", "scenarios won", "above 1.5 ×",
-             "over scenarios", "above 10 ×", cost_title, "NEES, no fault", "scenarios", "NEES, faults", "worst run",
-             "95th perc.", "95 % coverage, no fault", "memory", "worst coverage, no fault", "wall clock"]  # fmt: skip
+             "over scenarios", "above 10 ×", cost_title, _DATASHEET, "NEES, no fault", "scenarios", "NEES, faults",
+             "worst run", "95th perc.", "95 % coverage, no fault", "memory", "worst coverage, no fault",
+             "wall clock"]  # fmt: skip
     texts = ("estimator", "95 % interval", "over scenarios", gained, "NEES, no fault", "NEES, faults", cost_title)
     numeric = [c for c in columns if c not in texts]
     notes = [sentence(track), score_caption(track), *track.remarks]
@@ -149,10 +155,17 @@ def track_table(track: TrackRanking, mine: Collection[str] = ()) -> tables.Fitte
             "scenarios won": "Scenarios won: those with a smaller error than the plain row's.",
             "above 1.5 ×": "Above 1.5 ×: share of runs with more than 1.5 times the error of the plain row.",
             cost_title: f"{explained} {missing}".rstrip(),
+            _DATASHEET: "Wrong datasheet: largest error over that of the plain row when the datasheet of one "
+            "instrument is wrong and the plain row is told the same, from simnav robustness.",
             "wall clock": "Wall clock: median time of an epoch in these runs, whatever else the machine did.",
             "above 10 ×": "Above 10 ×: share of runs with more than ten times the error of the oracle.",
         },
     )
+
+
+def _wrong_datasheet(row: Row, track: TrackRanking) -> str:
+    worst = worst_of(row.estimator, row.version, track.plain, track.score)
+    return "" if worst is None else tables.number(worst.ratio)
 
 
 def _won(row: Row) -> str:

@@ -176,6 +176,8 @@ class Row:
         What it says that it learned from; empty where it learned nothing.
     superseded : str
         The version that its results are of, where simnav has a newer one; empty otherwise.
+    version : int or None
+        Declared version of the estimator in its results; None if they are of several versions.
     """
 
     estimator: str
@@ -207,6 +209,7 @@ class Row:
     peak_memory: int = 0
     learned: str = ""
     superseded: str = ""
+    version: int | None = None
 
     @property
     def ranked(self) -> bool:

@@ -20,7 +20,8 @@ from simnav.leaderboard.results.provenance import Provenance
 from .measured_file import checked_names, read_measured, save_measured, short_number
 from .plain_row import plain_rows
 
-__all__ = ["FILE", "Profile", "ProfilePoint", "Profiles", "profile_of", "profiles_of", "read", "save", "stored"]
+__all__ = ["FILE", "Profile", "ProfilePoint", "Profiles", "WorstRatio"]
+__all__ += ["profile_of", "profiles_of", "read", "save", "stored", "worst_of"]
 
 FILE = Path(__file__).parents[1] / "standard" / "robustness.json"
 
@@ -195,3 +196,42 @@ def profile_of(estimator: str, version: int | None, plain: str, score: str) -> P
     """
     mine = {p.plain: p for p in profiles_of(estimator, version)}
     return next((mine[p] for p in (plain.split(" or ") if plain else plain_rows(score)) if p in mine), None)
+
+
+@dataclass(frozen=True)
+class WorstRatio:
+    """The largest ratio of a stored profile under a wrong datasheet, as exports name it.
+
+    Attributes
+    ----------
+    plain, scenario : str
+        Label of the plain row, and versioned id of the scenario.
+    runs : int
+        Number of seeds.
+    instrument : str
+        Name of the instrument whose datasheet is wrong.
+    factor, ratio : float
+        Its figures over the true ones, and the error over that of the plain row, which is told the same.
+    """
+
+    plain: str
+    scenario: str
+    runs: int
+    instrument: str
+    factor: float
+    ratio: float
+
+
+def worst_of(estimator: str, version: int | None, plain: str, score: str) -> WorstRatio | None:
+    """What a board shows of a row in one figure; None for a plain row, and without a stored profile.
+
+    Parameters
+    ----------
+    estimator, version, plain, score
+        As for `profile_of`.
+    """
+    found = profile_of(estimator, version, plain, score)
+    if found is None or found.plain == estimator:
+        return None
+    point = found.worst
+    return WorstRatio(found.plain, found.scenario, found.runs, point.instrument, point.factor, point.ratio)

@@ -9,7 +9,7 @@ from simnav.estimator.registry import registered
 from simnav.leaderboard.campaign.request import comes_with_simnav
 from simnav.leaderboard.results.result import Result
 
-__all__ = ["superseded_by", "version_of"]
+__all__ = ["only_version", "superseded_by", "version_of"]
 
 
 def version_of(name: str) -> int | None:
@@ -42,3 +42,9 @@ def superseded_by(name: str, results: Iterable[Result]) -> str:
     if not older:
         return ""
     return f"version {' and '.join(map(str, older))}; simnav has version {today}"
+
+
+def only_version(results: Iterable[Result]) -> int | None:
+    """The declared version of the estimator in its results; None if there are several, or no result."""
+    versions = {r.estimator_version for r in results}
+    return versions.pop() if len(versions) == 1 else None

@@ -32,6 +32,7 @@ _TITLES = {
     "generalisation": "Generalisation",
     "generalisation-no-imu": "Generalisation without an IMU",
     "robustness": "Beyond the datasheets",
+    "coloured": "Errors as they are at sea",
     "recorded": "Recorded voyages",
     "papers": "Scenarios of papers",
     "other": "Other scenarios",

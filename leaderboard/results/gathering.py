@@ -15,7 +15,7 @@ from collections.abc import Collection, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from . import requested, store
+from . import requested, scenario_files, store
 from .admission import is_scenario_id, label_fault, lookalikes
 from .errors import StoreError
 from .folder import COMPACTED, LOOSE, TRIALS, DamagedError, tables_of
@@ -53,6 +53,7 @@ def gather(output: str | os.PathLike[str], folders: Iterable[str | os.PathLike[s
     for path in paths:
         _copy(path, target, {key for key, whence in first.items() if whence == path})
     requested.copy(target, paths)
+    scenario_files.copy(target, paths)
     store.select(target, {s: (e["recording"], e["estimators"]) for s, e in current.items()})
     store.compact(target)
     return target

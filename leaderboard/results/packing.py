@@ -10,7 +10,7 @@ import hashlib
 import os
 import re
 import shutil
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -33,6 +33,7 @@ def pack(
     folder: str | os.PathLike[str],
     target: str | os.PathLike[str],
     estimators: Collection[str] | None = None,
+    runs: Mapping[str, int] | None = None,
 ) -> list[Result]:
     """Write the current results of a folder into another one, without series and trials.
 
@@ -44,6 +45,8 @@ def pack(
         New, or a folder of results, which is replaced.
     estimators : collection of str, optional
         Labels of those that are taken. Default: all.
+    runs : mapping of str to int, optional
+        Number of seeds that are taken of each scenario, by versioned id. Default: all.
 
     Returns
     -------
@@ -59,7 +62,7 @@ def pack(
     found = [
         replace(r, series={}, seconds=round(r.seconds, 3))
         for r in store.load(source, series=False)
-        if estimators is None or r.estimator in estimators
+        if (estimators is None or r.estimator in estimators) and (runs is None or r.seed < runs.get(r.scenario, 0))
     ]
     write_packed(found, place)
     return found

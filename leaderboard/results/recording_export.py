@@ -1,6 +1,7 @@
 """A recording for other programs: one file (npz), or a folder of CSV files.
 
-A folder has one file for the truth, one for the IMU, and one for each aiding instrument. Columns end in their unit;
+A folder has one file for the truth, one for the IMU, and one for each aiding instrument, and beside them what an
+estimator is told at the start: ``README.md`` for people and ``start.json`` for programs. Columns end in their unit;
 angles are in degrees. Of an instrument with channels each reading is a row, with its channel and side information.
 Nothing is rounded: a file read back holds the same numbers, up to the conversion from radians.
 """
@@ -20,11 +21,17 @@ from simnav.types import KINDS, Array
 
 from .files import write_whole
 from .formats import writes
+from .hidden import has_truth
+from .recording_mcap import write_mcap
+from .recording_nmea import write_nmea
+from .recording_readme import readme, start_text
+from .recording_tracks import write_gpx, write_kml
+from .recording_tum import write_tum
 
 if TYPE_CHECKING:
     from simnav.recording import Recording
 
-__all__ = ["write_csv", "write_npz"]
+__all__ = ["write_csv", "write_gpx", "write_kml", "write_mcap", "write_nmea", "write_npz", "write_tum"]
 
 #: Columns of the truth and of the IMU, with their units.
 _TRUTH = {
@@ -47,11 +54,17 @@ def write_npz(recording: Recording, path: Path) -> list[Path]:
 
 @writes("recording", "csv")
 def write_csv(recording: Recording, path: Path) -> list[Path]:
-    """A folder with ``truth.csv``, ``imu.csv`` and one ``<instrument>.csv`` each."""
+    """A folder with ``truth.csv``, ``imu.csv``, one ``<instrument>.csv`` each, ``README.md`` and ``start.json``.
+
+    A recording without truth has no ``truth.csv``, and its instruments no column of faults.
+    """
     path.mkdir(parents=True, exist_ok=True)
     truth, imu = recording.data.truth, recording.data.imu
-    states = np.hstack([truth.position, truth.velocity, truth.attitude])
-    written = [_table(path / "truth.csv", truth.time, _TRUTH, states)]
+    told = has_truth(recording)
+    written = []
+    if told:
+        states = np.hstack([truth.position, truth.velocity, truth.attitude])
+        written.append(_table(path / "truth.csv", truth.time, _TRUTH, states))
     if imu is not None:
         samples = np.hstack([imu.angular_rate, imu.specific_force])
         written.append(_table(path / "imu.csv", imu.time, _IMU, samples))
@@ -61,7 +74,9 @@ def write_csv(recording: Recording, path: Path) -> list[Path]:
         units = {c.name: c.unit for c in (*kind.components, *(kind.side if stream.channels else ()))}
         values = np.hstack([stream.value, stream.side]) if stream.channels else stream.value
         channels = np.array(stream.channels)[stream.channel] if stream.channels else None
-        written.append(_table(file, stream.time, units, values, stream.faults, channels))
+        written.append(_table(file, stream.time, units, values, stream.faults if told else None, channels))
+    written.append(write_whole(path / "README.md", readme(recording)))
+    written.append(write_whole(path / "start.json", start_text(recording)))
     return written
 
 

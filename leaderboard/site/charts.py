@@ -317,7 +317,7 @@ def accuracy_and_cost(name: str, y_title: str, plain: str, data: Mapping[str, An
                 "x": {**x, "field": "low"},
                 "x2": {"field": "high"},
                 "y": y,
-                "color": _front_colour(),
+                "color": front_colour(),
             },
         },
         {
@@ -327,7 +327,7 @@ def accuracy_and_cost(name: str, y_title: str, plain: str, data: Mapping[str, An
             "encoding": {
                 "x": x,
                 "y": y,
-                "color": _front_colour(),
+                "color": front_colour(),
                 "opacity": {"condition": {"test": "datum.front", "value": 1}, "value": 0.55},
                 "tooltip": _tip(
                     row="Estimator",
@@ -339,7 +339,7 @@ def accuracy_and_cost(name: str, y_title: str, plain: str, data: Mapping[str, An
                 ),
             },
         },
-        rows | _front_names({"x": x, "y": y}),
+        rows | front_names({"x": x, "y": y}),
     ]
     caption = (
         "Each point is an estimator. Those in the other colour form the Pareto front: no estimator is both more "
@@ -364,9 +364,9 @@ def detection(name: str, data: Mapping[str, Any]) -> Chart:
         {
             "params": [_ZOOM],
             "mark": {"type": "point", "filled": True, "size": 60, "clip": True},
-            "encoding": {**place, "color": _front_colour(), "tooltip": tip},
+            "encoding": {**place, "color": front_colour(), "tooltip": tip},
         },
-        _front_names(place),
+        front_names(place),
     ]
     caption = (
         "An estimator at the upper left detects every fault and raises no false alarm. Names: no other estimator "
@@ -376,12 +376,12 @@ def detection(name: str, data: Mapping[str, Any]) -> Chart:
     return Chart(name, "Detection against false alarms", caption, spec, data)
 
 
-def _front_colour() -> Spec:
+def front_colour() -> Spec:
     """Another colour for the points of a Pareto front."""
     return {"condition": {"test": "datum.front", "value": "$second"}, "value": "$strong"}
 
 
-def _front_names(place: Spec) -> Spec:
+def front_names(place: Spec) -> Spec:
     """The names of the points of a Pareto front, above them: to the left where the right edge would cut the name."""
     at = f"scale('x', datum['{place['x']['field']}'])"
     left = f"{at} > width / 2 && {at} + {_NAME_GAP} + {_LETTER} * length(datum.row) > width"

@@ -6,10 +6,9 @@ there is neither the figure on its page nor its cell on the board, and without a
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
-from simnav.leaderboard.ranking.stored_robustness import Profile, profile_of, profiles_of
+from simnav.leaderboard.ranking.stored_robustness import Profile, profiles_of, worst_of
 
 from .charts import Chart, Spec, columns
 from .columns import Column
@@ -17,9 +16,8 @@ from .rounding import short
 
 if TYPE_CHECKING:
     from simnav.leaderboard.ranking.board import TrackRanking
-    from simnav.leaderboard.ranking.runs import Runs
 
-__all__ = ["COLUMN", "cells", "profile_charts", "version_of"]
+__all__ = ["COLUMN", "cells", "profile_charts"]
 
 COLUMN = Column(
     "datasheet",
@@ -30,32 +28,16 @@ COLUMN = Column(
 )
 
 
-def version_of(label: str, runs: Iterable[Mapping[str, Runs]]) -> int | None:
-    """The declared version of a row in these runs; None if there are several, or no run.
-
-    Parameters
-    ----------
-    label : str
-        Label of the row.
-    runs : iterable of mapping
-        For each scenario the runs by label.
-    """
-    versions = {r.estimator_version for by in runs if label in by for r in by[label].results}
-    return versions.pop() if len(versions) == 1 else None
-
-
-def cells(track: TrackRanking, runs: Mapping[str, Mapping[str, Runs]]) -> dict[str, dict[str, Any]]:
+def cells(track: TrackRanking) -> dict[str, dict[str, Any]]:
     """The cells of `COLUMN` by label; none where no profile of the same version is stored."""
     found = {}
     for row in track.rows:
-        version = version_of(row.estimator, (runs[s] for s in track.scenarios))
-        profile = profile_of(row.estimator, version, track.plain, track.score)
-        if profile is not None and row.estimator != profile.plain:
-            worst = profile.worst
+        worst = worst_of(row.estimator, row.version, track.plain, track.score)
+        if worst is not None:
             found[row.estimator] = {
                 "value": short(worst.ratio),
-                "help": f"{worst.instrument}, datasheet {worst.factor:.3g} times the truth; {_seeds(profile)} of "
-                f"{profile.scenario}, beside {profile.plain}",
+                "help": f"{worst.instrument}, datasheet {worst.factor:.3g} times the truth; {_seeds(worst.runs)} of "
+                f"{worst.scenario}, beside {worst.plain}",
             }
     return found
 
@@ -65,8 +47,8 @@ def profile_charts(label: str, version: int | None) -> list[Chart]:
     return [_chart(p) for p in profiles_of(label, version) if p.plain != label]
 
 
-def _seeds(profile: Profile) -> str:
-    return f"{profile.runs} seed{'' if profile.runs == 1 else 's'}"
+def _seeds(runs: int) -> str:
+    return f"{runs} seed{'' if runs == 1 else 's'}"
 
 
 def _chart(profile: Profile) -> Chart:
@@ -96,7 +78,7 @@ def _chart(profile: Profile) -> Chart:
     ]
     caption = (
         "The figures of one datasheet after the other are multiplied; the true errors stay the same, and "
-        f"{profile.plain} is told the same. Geometric mean over {_seeds(profile)} of {profile.scenario}. "
+        f"{profile.plain} is told the same. Geometric mean over {_seeds(profile.runs)} of {profile.scenario}. "
         f"Below 1 the error is smaller than that of {profile.plain}. Command: simnav robustness {profile.estimator}"
     )
     spec = {"height": 260, "layer": layers}

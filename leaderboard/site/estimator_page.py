@@ -11,13 +11,14 @@ import numpy as np
 
 from simnav.leaderboard.ranking import tables
 from simnav.leaderboard.ranking.stored_costs import NOT_MEASURED, cost_of
+from simnav.leaderboard.ranking.superseded import only_version
 from simnav.leaderboard.results.stored_scores import score_matrix
 
 from . import charts, curves
 from .background import Background
 from .columns import SCORES_SHOWN, Column, column_dicts
 from .content import PLAIN, Fact
-from .datasheets import profile_charts, version_of
+from .datasheets import profile_charts
 from .losses import losses
 from .rounding import short, shorts
 from .scenario_page import inside_chart, track_from
@@ -154,6 +155,7 @@ def estimator_data(
             }
         )
     other = None if label == PLAIN else estimators.get(PLAIN)
+    version = only_version(r for by in runs.values() if label in by for r in by[label].results)
     return {
         "kind": "estimator",
         "label": label,
@@ -166,10 +168,7 @@ def estimator_data(
             "columns": column_dicts((*_COLUMNS, *shown)),
             "rows": rows,
         },
-        "charts": [
-            c.to_dict()
-            for c in (*_profile(label, ranking, scenarios), *profile_charts(label, version_of(label, runs.values())))
-        ],
+        "charts": [c.to_dict() for c in (*_profile(label, ranking, scenarios), *profile_charts(label, version))],
         "rows": {label: {"reference": entry.reference}},
         "first": [label],
         "worst": None if worst is None or single is None else _worst_page(label, *worst, single, scenarios),

@@ -15,6 +15,7 @@ from .charts import accuracy_and_cost, columns, detection, spread, spread_data
 from .columns import Column, column_dicts
 from .datasheets import COLUMN, cells
 from .heatmap import heatmap
+from .honesty import honesty
 from .rounding import short
 
 if TYPE_CHECKING:
@@ -274,7 +275,7 @@ def _track(
         )
         for s in track.scenarios
     ]
-    wrong = cells(track, runs)
+    wrong = cells(track)
     more = [COLUMN, *more] if wrong else more
     every = all(r.provisional for r in track.rows if r.ranked)
     rows = [
@@ -362,6 +363,8 @@ def _charts(
         unknown = not_measured(name for name, cost in measured.items() if cost is None)
         missing = " ".join(filter(None, [f"Above the chart: {beyond}." if far else "", unknown]))
         made.append(accuracy_and_cost(f"{track.track}-cost", f"Score ({title})", plain_name, data, missing))
+    honest = honesty(track, title, end, _front)
+    made += [] if honest is None else [honest]
     nees = _medians_by_scenario(track, rows, runs, "nees_horizontal")
     if nees["middles"]["row"]:
         made.append(

@@ -69,4 +69,4 @@ def audit(folder: Path, sample: int = SAMPLE, progress: Callable[..., None] | No
     if sample < 1:
         raise RequestError(f"sample = {sample}: at least one result has to be repeated")
     found = verify_results(folder, sample=sample, progress=progress)
-    return Audit(found, share_found(found.repeated - len(found.not_repeatable)))
+    return Audit(found, share_found(found.repeated - len(found.not_repeatable) - len(found.not_here)))

@@ -10,7 +10,7 @@ import subprocess
 import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from importlib.metadata import Distribution, entry_points
+from importlib.metadata import Distribution
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +20,7 @@ from simnav.leaderboard.campaign.fingerprint import named_files
 from simnav.leaderboard.campaign.request import EstimatorRequest, comes_with_simnav, file_of, request
 from simnav.leaderboard.campaign.sources import code_of, followed
 from simnav.leaderboard.results.errors import RequestError, mistakes
+from simnav.plugins import entry_points
 
 from .archive import write_archive
 from .requirement import here, requirement
@@ -95,7 +96,7 @@ def source_of(given: str, parameters: Mapping[str, Any], scratch: Path, requires
     if comes_with_simnav(cls):
         raise RequestError(f"{first.name} comes with simnav; its row is on the board already")
     point = point_of(first.name)
-    owner = next((p.dist for p in entry_points(group=GROUP) if p.value == point and p.dist is not None), None)
+    owner = next((p.dist for p in entry_points(GROUP) if p.value == point and p.dist is not None), None)
     if not point or owner is None:
         raise RequestError(f"{first.name} belongs to no installed package; submit its file instead")
     wheel = _wheel(owner, scratch)
@@ -113,7 +114,7 @@ def _points(name: str) -> set[str]:
     wanted = _normal(name)
     return {
         p.value
-        for p in entry_points(group=GROUP)
+        for p in entry_points(GROUP)
         if p.dist is not None
         and p.dist.name != "simnav"
         and wanted in (_normal(p.dist.name), _normal(p.module.partition(".")[0]))

@@ -9,12 +9,12 @@ import re
 import sys
 import warnings
 from collections.abc import Callable, Sequence
-from importlib.metadata import EntryPoint, entry_points
+from importlib.metadata import EntryPoint
 from pathlib import Path
 from typing import Any, TypeVar
 
 from simnav.estimator.contract import Estimator, EstimatorError
-from simnav.plugins import place_of
+from simnav.plugins import entry_points, place_of
 from simnav.spec import closest
 
 __all__ = [
@@ -128,7 +128,7 @@ def discover() -> None:
         return
     discover_own()
     _discovered = True
-    for point in sorted(entry_points(group=GROUP), key=lambda p: p.name):
+    for point in sorted(entry_points(GROUP), key=lambda p: p.name):
         if not _is_ours(point):
             _load(point)
 
@@ -139,7 +139,7 @@ def discover_own() -> None:
     if _own:
         return
     _own = True
-    for point in entry_points(group=GROUP):
+    for point in entry_points(GROUP):
         if _is_ours(point):
             _load(point)
 
@@ -149,7 +149,7 @@ def discover_point(value: str) -> None:
     global _discovered, _partly
     discover_own()
     _discovered = _partly = True
-    for point in entry_points(group=GROUP) if value else ():  # to look for them takes 10 ms
+    for point in entry_points(GROUP) if value else ():
         if point.value == value and not _is_ours(point):
             _load(point)
 

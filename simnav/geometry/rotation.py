@@ -17,6 +17,7 @@ from simnav.compiled import Array, kernel
 
 __all__ = [
     "cross",
+    "dcm_from_quaternion",
     "dcm_from_rotation_vector",
     "dcm_from_rpy",
     "left_jacobian",
@@ -184,6 +185,28 @@ def left_jacobian(rotation: Array) -> Array:
         [b * x * y + a * z, one + b * y * y, b * y * z - a * x],
         [b * x * z - a * y, b * y * z + a * x, one + b * z * z],
     ])  # fmt: skip
+
+
+def dcm_from_quaternion(quaternion: Array) -> Array:
+    """DCM of unit quaternions, scalar first: the inverse of `quaternion_from_dcm`.
+
+    Parameters
+    ----------
+    quaternion : (..., 4) array
+        Unit quaternions.
+
+    Returns
+    -------
+    (..., 3, 3) array
+        Rotation matrices (Groves eq. 2.34).
+    """
+    w, x, y, z = np.moveaxis(np.asarray(quaternion), -1, 0)
+    rows = [
+        [w * w + x * x - y * y - z * z, 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
+        [2.0 * (x * y + w * z), w * w - x * x + y * y - z * z, 2.0 * (y * z - w * x)],
+        [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), w * w - x * x - y * y + z * z],
+    ]
+    return np.moveaxis(np.array(rows), (0, 1), (-2, -1))
 
 
 def quaternion_from_dcm(dcm: Array) -> Array:

@@ -6,6 +6,7 @@ import math
 import os
 import re
 import warnings
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -13,16 +14,28 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from simnav.geometry.rotation import wrap_angle
-from simnav.kinds import Component, Kind, geodetic_components, speed_components
-from simnav.log.files import FileSpec
+from simnav.geometry.rotation import dcm_from_rpy, wrap_angle
+from simnav.kinds import BODY_VELOCITY, Component, Kind, geodetic_components, speed_components
+from simnav.log.files import Column, FileSpec
 from simnav.log.reader import READERS
-from simnav.log.spec import ChannelSpec, LogImuSpec, OriginSpec, RecordedSpec
+from simnav.log.row_filter import RowFilter
+from simnav.log.same_time import settle
+from simnav.log.spec import ChannelSpec, OriginSpec, RecordedSpec
 from simnav.log.table import LogError, LogWarning, Table, check_ascending
-from simnav.log.units import DIMENSIONS, LOG_UNITS, dimension
+from simnav.log.units import DIMENSIONS, dimension, factor
+from simnav.log.variation import variation_along
 from simnav.types import KINDS, Array
 
-__all__ = ["ImuSeries", "Series", "geodetic_from_local", "list_recordings", "locate", "read_channel", "read_imu"]
+__all__ = [
+    "Series",
+    "geodetic_from_local",
+    "list_recordings",
+    "locate",
+    "open_file",
+    "read_channel",
+    "skip_of",
+    "turn_to_vessel",
+]
 
 #: The parts of the reference; instruments are in `KINDS`.
 _REFERENCE = {
@@ -63,25 +76,6 @@ class Series:
     time: Array
     value: Array
     line: NDArray[np.int64]
-
-
-@dataclass(frozen=True, eq=False)
-class ImuSeries:
-    """n IMU samples as means over successive intervals.
-
-    Attributes
-    ----------
-    source : str
-        File (and sentence), for messages.
-    edge : (n + 1,) array
-        Ends of the intervals, on the clock of the log [s].
-    mean : (n, 6) array
-        Angular rate [rad/s], specific force [m/s^2]; forward, starboard, down.
-    """
-
-    source: str
-    edge: Array
-    mean: Array
 
 
 def _root(folder: str) -> Path:
@@ -149,34 +143,82 @@ def list_recordings(spec: RecordedSpec) -> tuple[str, ...]:
     )
 
 
-def _offset(spec: RecordedSpec, file: FileSpec, recording: str) -> float:
-    if not isinstance(file.offset, tuple):
-        return file.offset
+def _of_recording(spec: RecordedSpec, given: float | tuple[float, ...], recording: str, what: str) -> float:
+    """The value for a recording of a key that has one, or one for each."""
+    if not isinstance(given, tuple):
+        return given
     names = list_recordings(spec)
-    if len(file.offset) != len(names):
+    if len(given) != len(names):
         raise LogError(
-            f"the file {file.path!r} has {len(file.offset)} offsets for {len(names)} recordings ({', '.join(names)}); "
+            f"{what} has {len(given)} values for {len(names)} recordings ({', '.join(names)}); "
             f"give one, or one for each"
         )
-    return file.offset[names.index(recording)]
+    return given[names.index(recording)]
 
 
-def _open(
-    spec: RecordedSpec, key: str, recording: str, sentence: str | None = None, talker: str | None = None
+def skip_of(spec: RecordedSpec, recording: str) -> float:
+    """Time that is left out at the beginning of a recording [s].
+
+    Raises
+    ------
+    LogError
+        If the scenario has not one value for each recording.
+    """
+    return _of_recording(spec, spec.skip, recording, "skip_s of [log]")
+
+
+def open_file(
+    spec: RecordedSpec,
+    key: str,
+    recording: str,
+    sentence: str | None = None,
+    talker: str | None = None,
+    where: str = "",
 ) -> tuple[Table, Array, NDArray[np.int64]]:
-    """Table, times of its rows on the clock of the log, and the rows that count."""
+    """Open a file of a recording.
+
+    Parameters
+    ----------
+    spec : RecordedSpec
+        The ``[log]`` table.
+    key : str
+        The file, by its name in ``[log.files]``.
+    recording : str
+        Name of the recording.
+    sentence, talker : str or None
+        See `ChannelSpec`.
+    where : str
+        Condition on the rows that count.
+
+    Returns
+    -------
+    Table, (n,) array, (m,) int array
+        All rows, their times on the clock of the log [s], and the rows that count, with ascending times.
+
+    Raises
+    ------
+    LogError
+        If the file cannot be used, no row counts, or times do not ascend.
+    """
     file = spec.files[key]
     reader = READERS.get(file.format)
     assert reader is not None  # `RecordedSpec`
     found = reader.read(locate(spec, file, recording), file, sentence, talker)
-    table = found.table
+    table, time = found.table, found.time
     counts = np.arange(len(table)) if found.counts is None else found.counts
-    check_ascending(found.time[counts], Table(table.source, {}, table.line[counts]), found.clock)
+    if where:
+        fits = RowFilter(where).rows(table)
+        counts = counts[fits[counts]]
+        if not len(counts):
+            raise LogError(f"{table.source}: none of {len(table)} rows fulfils where = {where!r}")
+    time, counts = settle(time, counts, table, file.same_time or ("first" if reader.sentences else "refuse"))
+    check_ascending(time[counts], Table(table.source, {}, table.line[counts]), found.clock)
     if file.spacing is not None:
         stamps = np.arange(found.first, found.first + len(table)) * file.spacing
     else:
-        stamps = found.time * file.scale
-    return table, np.asarray(stamps + _offset(spec, file, recording), dtype=np.float64), counts
+        stamps = time * file.scale
+    offset = _of_recording(spec, file.offset, recording, f"offset_s of the file {file.path!r}")
+    return table, np.asarray(stamps + offset, dtype=np.float64), counts
 
 
 def read_channel(spec: RecordedSpec, channel: ChannelSpec, what: str, recording: str) -> Series:
@@ -206,11 +248,12 @@ def read_channel(spec: RecordedSpec, channel: ChannelSpec, what: str, recording:
     """
     kind = _REFERENCE.get(what) or KINDS[what]
     names = kind.values
-    table, time, rows = _open(spec, channel.file, recording, channel.sentence, channel.talker)
+    table, time, rows = open_file(spec, channel.file, recording, channel.sentence, channel.talker, channel.where)
+    time = time + channel.offset
     rows = rows[:: channel.every]
     if channel.hold_out is not None:
         rows = np.delete(rows, np.s_[:: channel.hold_out])
-    columns = channel.columns or kind.log_columns or names
+    columns = _columns(channel, kind, table)
     if len(columns) != len(names):
         raise LogError(
             f"{table.source}: {what} needs {len(names)} columns ({', '.join(names)}), but {len(columns)} are given"
@@ -223,9 +266,14 @@ def read_channel(spec: RecordedSpec, channel: ChannelSpec, what: str, recording:
     given = np.ones(len(rows), dtype=bool)
     for i, (column, unit) in enumerate(zip(columns, units, strict=True)):
         sign, values = table.column(column)
-        value[:, i] = sign * values[rows] * LOG_UNITS[unit]
+        value[:, i] = sign * values[rows] * factor(unit)
         if not (isinstance(column, str) and column.startswith("=")):
             given &= np.isfinite(value[:, i])
+    if not given.any() and kind.role == "heading" and "heading_magnetic" in table.columns:
+        raise LogError(
+            f"{table.source}: its heading is magnetic, and neither it nor another sentence of the file has a "
+            "variation; give variation_deg, or variation_model = 'wmm'"
+        )
     if not given.all():
         first = table.line[rows][~given][0]
         message = f"{table.source}: {np.sum(~given)} rows without {what} are left out, the first is line {first}"
@@ -239,10 +287,60 @@ def read_channel(spec: RecordedSpec, channel: ChannelSpec, what: str, recording:
             raise LogError(f"{table.source}: frame = {channel.frame!r} is for positions, and {what} is none")
         value = geodetic_from_local(value, spec.origin, channel.frame)[:, : len(names)]
     _check_range(value, kind, columns, table, rows)
+    if channel.drop_repeated:
+        fresh = np.concatenate([[True], np.any(np.diff(value, axis=0) != 0.0, axis=1)])
+        rows, value = rows[fresh], value[fresh]
+    if channel.variation is not None or channel.variation_model is not None:
+        if kind.role != "heading":
+            raise LogError(f"{table.source}: variation_deg and variation_model are for headings, and {what} is none")
+        value = value + _variation(spec, channel, recording, time[rows])[:, None]
+    if any(channel.mounting):
+        value = _mounted(value, kind, channel.mounting, f"{table.source}: mounting_deg of {what}")
     for i, component in enumerate(kind.components):
         if component.cyclic and not (kind.geodetic and i < 2):
             value[:, i] = wrap_angle(value[:, i])
     return Series(table.source, time[rows], value, table.line[rows])
+
+
+def _columns(channel: ChannelSpec, kind: Kind, table: Table) -> tuple[Column, ...]:
+    """The columns of a channel; where none are named those of the sentence, magnetic if a variation is added."""
+    if channel.columns:
+        return channel.columns
+    magnetic = channel.variation is not None or channel.variation_model is not None
+    if magnetic and kind.role == "heading" and "heading_magnetic" in table.columns:
+        return ("heading_magnetic",)
+    return kind.log_columns or kind.values
+
+
+def _variation(spec: RecordedSpec, channel: ChannelSpec, recording: str, time: Array) -> Array:
+    """(n,) magnetic variation at n times [rad], constant or along the reference by the model."""
+    if channel.variation is not None:
+        return np.full(len(time), channel.variation)
+    track = read_channel(spec, spec.reference.position, "position", recording)
+    return variation_along(track.time, track.value, time)
+
+
+def turn_to_vessel(vectors: Array, mounting: Sequence[float]) -> Array:
+    """(n, 3) vectors in the axes of the vessel, of vectors in the axes of an instrument.
+
+    Parameters
+    ----------
+    vectors : (n, 3) array
+        In the axes of the instrument.
+    mounting : sequence of 3 floats
+        Roll, pitch, yaw of the instrument relative to the vessel [rad].
+    """
+    return np.asarray(vectors @ dcm_from_rpy(np.asarray(mounting, dtype=np.float64)).T)
+
+
+def _mounted(value: Array, kind: Kind, mounting: Sequence[float], label: str) -> Array:
+    if kind.equation == BODY_VELOCITY:
+        return turn_to_vessel(value, mounting)
+    if kind.role == "heading" and value.shape[1] == 1 and not any(mounting[:2]):
+        return value - mounting[2]
+    raise LogError(
+        f"{label}: it is for velocities in body axes, and for headings with roll and pitch 0; turn other values before"
+    )
 
 
 def _check_units(
@@ -252,7 +350,7 @@ def _check_units(
     for component, column, unit in zip(kind.components, columns, units, strict=True):
         own = "m" if local and kind.geodetic else component.unit
         wanted = dimension(own)
-        if unit != "1" and dimension(unit) != wanted:
+        if unit.rpartition(" ")[2] != "1" and dimension(unit) != wanted:
             right = f"a unit of {wanted} is wanted ({', '.join(DIMENSIONS[wanted])})" if wanted else f"it is in {own!r}"
             raise LogError(f"{source}, column {column!r}: {component.name} of {what} in {unit!r}; {right}")
 
@@ -271,56 +369,6 @@ def _check_range(
                 f"{table.source}, line {table.line[rows[bad[0]]]}, column {columns[i]!r}: {component.name} would be "
                 f"{value[bad[0], i]:.6g} rad; is its unit 'deg'?"
             )
-
-
-def read_imu(spec: RecordedSpec, imu: LogImuSpec, recording: str) -> ImuSeries:
-    """Read the IMU of a recording, converted to means over intervals.
-
-    Raises
-    ------
-    LogError
-        As `read_channel`; or if there is a hole longer than ``max_gap``, or the mean specific force is nowhere near
-        gravity, pointing up.
-    """
-    table, time, rows = _open(spec, imu.file, recording)
-    raw = np.empty((len(rows), 6))
-    columns = (*imu.angular_rate, *imu.specific_force)
-    units = (imu.angular_rate_unit,) * 3 + (imu.specific_force_unit,) * 3
-    for i, (column, unit) in enumerate(zip(columns, units, strict=True)):
-        sign, values = table.column(column)
-        raw[:, i] = sign * values[rows] * LOG_UNITS[unit]
-        bad = np.flatnonzero(~np.isfinite(raw[:, i]))
-        if bad.size:
-            raise LogError(f"{table.source}, line {table.line[rows[bad[0]]]}, column {column!r}: the value is missing")
-    time = time[rows]
-    if len(time) < 2:
-        raise LogError(f"{table.source}: {len(time)} row is too short for an IMU")
-    interval = np.diff(time)
-    holes = np.flatnonzero(interval > imu.max_gap)
-    if holes.size:
-        k = int(holes[0])
-        raise LogError(
-            f"{table.source}, line {table.line[rows[k + 1]]}: {interval[k]:.3f} s without the IMU; leave out the part "
-            f"before (skip_rows of its file) or allow it (max_gap_s of [log.imu], now {imu.max_gap:g})"
-        )
-    if imu.samples == "instantaneous":
-        edge, mean = time, 0.5 * (raw[1:] + raw[:-1])
-    else:
-        interval = np.concatenate([[np.median(interval)], interval])
-        edge = np.concatenate([[time[0] - interval[0]], time])
-        mean = raw / interval[:, None] if imu.samples == "increments" else raw
-    force = mean[:, 3:].mean(axis=0)
-    if not 8.0 < float(np.linalg.norm(force)) < 12.0:
-        raise LogError(
-            f"{table.source}: the mean specific force is {np.linalg.norm(force):.4g} m/s^2 where gravity is 9.8; check "
-            f"specific_force_unit = {imu.specific_force_unit!r} and samples = {imu.samples!r}"
-        )
-    if force[2] > 4.0:
-        raise LogError(
-            f"{table.source}: the mean specific force points down ({force[2]:.4g} m/s^2), but at rest it points up; "
-            f"the third axis is down: put a minus before {imu.specific_force[2]!r} (and check the others)"
-        )
-    return ImuSeries(table.source, edge, mean)
 
 
 def geodetic_from_local(value: Array, origin: OriginSpec, frame: str) -> Array:

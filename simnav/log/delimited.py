@@ -5,20 +5,24 @@ from __future__ import annotations
 import contextlib
 import io
 import os
+import re
+import warnings
 from collections.abc import Iterable
+from datetime import UTC, datetime
 from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from simnav.log.binary import refuse_binary
 from simnav.log.files import FileSpec
 from simnav.log.reader import Rows, register_reader
-from simnav.log.table import LogError, Table, utc_seconds
-from simnav.log.units import LOG_UNITS
+from simnav.log.table import LogError, LogWarning, Table, utc_seconds
+from simnav.log.units import factor
 from simnav.types import Array
 
-__all__ = ["read_csv"]
+__all__ = ["date_and_time", "read_csv", "rows_of"]
 
 _DELIMITERS = (",", ";", "\t", " ")
 _MISSING = ["", "nan", "NaN", "NAN", "NA", "null"]
@@ -30,14 +34,69 @@ def _read(path: Path, file: FileSpec, sentence: str | None, talker: str | None) 
     if len(table) <= file.skip_rows:
         raise LogError(f"{table.source}: {len(table)} rows, of which skip_rows = {file.skip_rows} leaves none")
     table = table.without_first(file.skip_rows)  # before anything is taken for a number: it may be a row of units
+    return rows_of(table, file)
+
+
+def rows_of(table: Table, file: FileSpec) -> Rows:
+    """The rows of a table with the times of its time column, or of its columns of date and time of day.
+
+    Raises
+    ------
+    LogError
+        If there is no such column, or a cell is no time.
+    """
+    if isinstance(file.time, tuple):
+        date, clock = (table.resolve(c)[1] for c in file.time)
+        return Rows(table, date_and_time(table, date, clock), f"{date} {clock}", first=file.skip_rows)
     _, column = table.resolve(file.time)
     return Rows(table, _time(table, file, column), column, first=file.skip_rows)
 
 
+_DATE = re.compile(r"(\d{4})[-/.]?(\d{1,2})[-/.]?(\d{1,2})(?:\.0)?")
+_TIME_OF_DAY = re.compile(r"(\d{1,2}):?(\d{2}):?(\d{2}(?:\.\d*)?)Z?")
+
+
+def date_and_time(table: Table, date: str, clock: str) -> Array:
+    """Seconds since 1970 from a column of dates and one of times of day, both in UTC.
+
+    Dates are like ``2024-05-01``, ``2024/05/01`` or ``20240501``, times like ``10:00:00.25`` or ``100000.25``.
+
+    Raises
+    ------
+    LogError
+        If a cell is neither.
+    """
+    days: dict[str, float] = {}
+    out = np.empty(len(table))
+    dates, clocks = table.columns[date], table.columns[clock]
+    packed = clocks.dtype != object  # 1.5 is 00:00:01.5: leading zeros are lost
+    for k in range(len(table)):
+        day = str(dates[k]).strip()
+        if day not in days:
+            match = _DATE.fullmatch(day)
+            try:
+                year, month, first = (int(x) for x in match.groups()) if match else (0, 0, 0)
+                days[day] = datetime(year, month, first, tzinfo=UTC).timestamp()
+            except ValueError:
+                raise LogError(
+                    f"{table.source}, line {table.line[k]}, column {date!r}: {day!r} is not a date like 2024-05-01, "
+                    "2024/05/01 or 20240501"
+                ) from None
+        text = f"{clocks[k]:013.6f}" if packed and np.isfinite(clocks[k]) else str(clocks[k]).strip()
+        match = _TIME_OF_DAY.fullmatch(text)
+        if match is None or int(match[1]) > 23 or int(match[2]) > 59 or float(match[3]) >= 61.0:
+            raise LogError(
+                f"{table.source}, line {table.line[k]}, column {clock!r}: {text!r} is not a time of day like "
+                "10:00:00.25 or 100000.25"
+            )
+        out[k] = days[day] + 3600.0 * int(match[1]) + 60.0 * int(match[2]) + float(match[3])
+    return out
+
+
 def _time(table: Table, file: FileSpec, column: str) -> Array:
     if file.time_unit != "iso":
-        sign, values = table.column(file.time)
-        return sign * values * LOG_UNITS[file.time_unit]
+        sign, values = table.column(column)
+        return sign * values * factor(file.time_unit)
     moments = np.empty(len(table))
     for k, cell in enumerate(table.columns[column]):
         try:
@@ -82,6 +141,7 @@ def _read_csv(path: Path, comment: str, _mtime: int, _size: int) -> Table:
     import pyarrow as pa
     from pyarrow import csv
 
+    refuse_binary(path, "csv")
     content, mark = _utf8(path), comment.encode()
     first, blank = "", 0
     for raw in io.BytesIO(content):
@@ -100,7 +160,7 @@ def _read_csv(path: Path, comment: str, _mtime: int, _size: int) -> Table:
     if len(set(names)) != len(names):
         raise LogError(f"{path}, line {blank + 1}: two columns share a name: {', '.join(names)}")
     begin = blank + int(header)  # lines before the data
-    text = b"".join(content.split(b"\n", begin)[begin:])
+    text = _without_cut_row(b"".join(content.split(b"\n", begin)[begin:]), path, delimiter, len(names), mark)
     if not text.strip():
         raise LogError(f"{path}: there are no rows of data")
     numbers: NDArray[np.int64] | None = None
@@ -133,6 +193,21 @@ def _read_csv(path: Path, comment: str, _mtime: int, _size: int) -> Table:
     if numbers is None:
         numbers = np.arange(begin + 1, begin + 1 + data.num_rows)
     return Table(str(path), columns, numbers[: data.num_rows])
+
+
+def _without_cut_row(text: bytes, path: Path, delimiter: str, width: int, mark: bytes) -> bytes:
+    """The rows without the last one if it has too few cells: the logger was switched off while it wrote it."""
+    whole = text.rstrip(b"\r\n")
+    before, _, last = whole.rpartition(b"\n")
+    cells = len(last.split()) if delimiter == " " else last.count(delimiter.encode()) + 1
+    if not before.strip() or not last.strip() or _marked(last, mark) or cells >= width:
+        return text
+    warnings.warn(
+        f"{path}: the last row has {cells} cells where the first line has {width}; it is incomplete, and left out",
+        LogWarning,
+        4,
+    )
+    return before + b"\n"
 
 
 def _is_number(cell: str) -> bool:

@@ -2,17 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
+from simnav.log.same_time import SameTime
 from simnav.log.units import check_dimension, check_units
 from simnav.spec import Positive, Spec, quantity
 
-__all__ = ["Column", "FileSpec"]
+__all__ = ["Column", "FileSpec", "without_later"]
 
 #: A column: its header, or its number counted from 1; a minus before it flips the sign; ``"=0.0"`` is a constant.
 Column = int | str
+
+
+def without_later(table: dict[str, Any], later: Mapping[str, Any]) -> dict[str, Any]:
+    """A dumped specification without the keys that were added later and that have their default.
+
+    Digests of scenarios count what is there: so a new key changes no digest of a scenario that does not use it.
+    """
+    return {k: v for k, v in table.items() if k not in later or v != later[k]}
 
 
 class FileSpec(Spec):
@@ -25,10 +35,11 @@ class FileSpec(Spec):
     format : str
         ``csv`` is any table of numbers, with or without a header, separated by comma, semicolon, tab or blank; ``nmea``
         is NMEA 0183; others are registered (`simnav.log.reader`).
-    time : int or str
-        CSV: the column of the time.
+    time : int or str, or two of them
+        CSV: the column of the time; or the columns of the date and of the time of day.
     time_unit : str
-        CSV: unit of the time column, or ``iso`` for dates like ``2014-08-01T00:00:00.124Z``.
+        CSV: unit of the time column, or ``iso`` for dates like ``2014-08-01T00:00:00.124Z``. Without a meaning for two
+        columns.
     clock : {"logger", "sentence"}
         NMEA: the stamp that the logger put before each line, or the UTC time inside the sentence (a sentence without
         one has that of the last sentence before it in the file that has one).
@@ -42,13 +53,16 @@ class FileSpec(Spec):
         CSV: rows after the header to leave out at the beginning, for example one of units.
     comment : str
         CSV: lines that begin with it are left out, wherever they stand.
+    same_time : {"refuse", "first", "last", "spread"} or None
+        What is done with rows that have the time of the row before: an error, the first or the last of them counts, or
+        they are spread evenly up to the next time. None: ``first`` for NMEA, ``refuse`` for tables.
     options : dict
         Formats of others: what their reader wants to know.
     """
 
     path: str
     format: str = "csv"
-    time: Column = 1
+    time: Column | tuple[Column, Column] = 1
     time_unit: str = "s"
     clock: Literal["logger", "sentence"] = "logger"
     spacing: Positive | None = quantity("s", None)
@@ -56,15 +70,13 @@ class FileSpec(Spec):
     offset: float | tuple[float, ...] = quantity("s", 0.0)
     skip_rows: Annotated[int, Field(ge=0)] = 0
     comment: str = ""
+    same_time: SameTime | None = None
     options: dict[str, Any] = Field(default_factory=dict)
 
     @model_serializer(mode="wrap")
     def _without_empty(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """No options are no part of the content: digests of scenarios count what is there."""
-        table: dict[str, Any] = handler(self)
-        if not self.options:
-            table.pop("options", None)
-        return table
+        """See `without_later`."""
+        return without_later(handler(self), {"options": {}, "same_time": None})
 
     @model_validator(mode="after")
     def _check(self) -> Self:

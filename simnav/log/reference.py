@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from simnav.geometry.earth import displace, earth_rate, relative_position
 from simnav.geometry.rotation import dcm_from_rpy, wrap_angle
-from simnav.log.channel import ImuSeries, Series
+from simnav.log.channel import Series
+from simnav.log.imu_series import ImuSeries
 from simnav.types import Array, NavigationStates, TapStates
 
 if TYPE_CHECKING:
@@ -112,6 +113,14 @@ class Reference:
         """Velocity and acceleration, north-east-down, differentiated from the positions."""
         time = np.asarray(time, dtype=np.float64)
         return self._position(time, 1), self._position(time, 2)
+
+    def velocity_ahead(self, time: Array, span: float) -> Array:
+        """(n, 2) velocity north and east over the next ``span`` seconds [m/s], less at the end of the reference.
+
+        It is that of the way between two positions, so that the noise of fixes of a vessel that lies still is no speed.
+        """
+        later = np.minimum(time + span, self.time[-1])
+        return np.asarray((self._position(later) - self._position(time))[:, :2] / span)
 
     def taps(self, time: Array) -> TapStates:
         """What a simulated instrument sees at n times, holes interpolated.

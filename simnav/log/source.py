@@ -8,18 +8,21 @@ from __future__ import annotations
 
 import math
 import warnings
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from simnav.geometry.earth import gravity
-from simnav.log.channel import ImuSeries, Series, list_recordings, read_channel, read_imu
+from simnav.kinds import HEADING
+from simnav.log.channel import Series, list_recordings, read_channel, skip_of
+from simnav.log.imu_series import ImuSeries, read_imu
 from simnav.log.reference import Reference
 from simnav.log.table import LogError, LogWarning
 from simnav.recording import AidStream, Block, ImuLabels
 from simnav.sensors import build_layers, labels
-from simnav.types import Array, ImuSamples, NavigationStates
+from simnav.types import KINDS, Array, ImuSamples, NavigationStates, TapStates
 from simnav.world.initial_state import draw_start
 
 if TYPE_CHECKING:
@@ -33,6 +36,12 @@ __all__ = ["LogSource"]
 _TOLERANCE = 0.5e-6
 #: Below this speed the course says nothing about the heading [m/s].
 _LEAST_SPEED = 1.0
+#: A vessel moves if it has this speed over so long [s].
+_MOVING = 5.0
+#: A heading is unknown where its initial standard deviation is at least this [rad].
+_UNKNOWN_HEADING = math.radians(90.0)
+#: How late the first measured heading may be, to be that of a vessel that lies still [s].
+_EARLY = 60.0
 #: How long the accelerometers are averaged for roll and pitch [s].
 _LEVELLING = 2.0
 
@@ -57,6 +66,8 @@ class LogSource:
         Name of the recording.
     note : str
         Which recording this is, and what in it is not measured.
+    surroundings : Surroundings
+        The surroundings of the run.
     instruments, start, initial_truth, faults, duration, step
         As of the simulator. Components that the reference lacks are NaN in ``initial_truth`` and in the truth of the
         blocks; in ``start`` they are made from the motion and the accelerometers.
@@ -80,7 +91,7 @@ class LogSource:
         self.step = float(scenario.step)
         imu = None if log.imu is None else read_imu(log, log.imu, self.recording)
         reference = _reference(log, self.recording, imu)
-        begin = _begin(log, reference, imu)
+        begin = _begin(log, self.recording, reference, imu)
         end = min(reference.time[-1], math.inf if imu is None else imu.edge[-1])
         self.duration = self._length(scenario.duration, float(end - begin))
         self._reference, self._begin, self._now = reference, begin, 0.0
@@ -90,10 +101,14 @@ class LogSource:
             self._imu, resampled = _regrid(imu, begin, self.instruments.imu.rate, self.duration)  # type: ignore[union-attr]
             notes.append(f"IMU samples were {log.imu.samples}" + (", resampled" if resampled else ""))
         self.initial_truth = self._states(np.zeros(1))
-        true_start, made = _start(reference, self.initial_truth, imu, begin)
+        self.surroundings = scenario.surround(seed)
+        self._aids = self._measure(scenario, log, root, self.surroundings)
+        heading = _measured_heading(self._aids)
+        if heading is None and scenario.initial_error.attitude[2] >= _UNKNOWN_HEADING:
+            heading = 0.0, "unknown"
+        true_start, made = _start(reference, self.initial_truth, imu, begin, heading)
         if made:
             notes.append(f"start {' and '.join(made)} not from the reference")
-        self._aids = self._measure(scenario, log, root, scenario.surround(seed))
         simulated = [n for n, i in log.instruments.items() if i.source == "reference"]
         if simulated:
             notes.append(f"simulated from the reference: {', '.join(simulated)}")
@@ -122,8 +137,16 @@ class LogSource:
         warnings.warn(message, LogWarning, 3)
         return length
 
+    def taps(self, time: Array) -> TapStates:
+        """What an instrument should see at n times of the run [s]; ValueError if the reference has no attitude."""
+        return replace(self._reference.taps(self._begin + time), time=time)
+
     def _states(self, time: Array) -> NavigationStates:
         return replace(self._reference.states(self._begin + time), time=time)
+
+    def reference_states(self, time: Array) -> NavigationStates:
+        """The reference at n times on the clock of the log [s]; NaN where it has nothing to say."""
+        return self._reference.states(time)
 
     def _measure(
         self, scenario: Scenario, log: RecordedSpec, seed: int, surroundings: Surroundings
@@ -138,7 +161,7 @@ class LogSource:
                 count = math.floor((self.duration - spec.phase) * spec.rate + 1e-9) + 1
                 time = spec.phase + np.arange(first, count) / spec.rate
                 try:
-                    tap = replace(self._reference.taps(self._begin + time), time=time)
+                    tap = self.taps(time)
                 except ValueError as error:
                     raise LogError(f"instruments.{name}: {error}") from None
                 streams[name] = spec.actual().install(name, seed, surroundings).sense(tap)
@@ -206,9 +229,9 @@ def _reference(log: RecordedSpec, recording: str, imu: ImuSeries | None) -> Refe
     return Reference(position, series("velocity"), series("attitude"), spec.max_gap, spec.lever_arm, imu)
 
 
-def _begin(log: RecordedSpec, reference: Reference, imu: ImuSeries | None) -> float:
+def _begin(log: RecordedSpec, recording: str, reference: Reference, imu: ImuSeries | None) -> float:
     """The first epoch of the reference that the IMU covers and at which all that it has is there."""
-    earliest = float(reference.time[0] if imu is None else imu.edge[0]) + log.skip
+    earliest = float(reference.time[0] if imu is None else imu.edge[0]) + skip_of(log, recording)
     time = reference.time[reference.time >= earliest - _TOLERANCE]
     if imu is not None:
         time = time[time < imu.edge[-1]]
@@ -224,6 +247,14 @@ def _begin(log: RecordedSpec, reference: Reference, imu: ImuSeries | None) -> fl
             f"the clocks of the reference ({reference.time[0]:.3f} to {reference.time[-1]:.3f} s){other} have no epoch "
             f"in common that has all parts of the reference; check scale, offset_s, spacing_s and skip_s"
         )
+    if log.begin == "moving":
+        speed = np.hypot(*reference.velocity_ahead(time, _MOVING).T)
+        whole &= speed >= _LEAST_SPEED
+        if not whole.any():
+            raise LogError(
+                f"[log] begin = 'moving': the reference never moves by {_LEAST_SPEED:g} m/s (at most "
+                f"{np.max(speed, initial=0.0):.2g} m/s); leave 'begin' out"
+            )
     return float(time[whole][0])
 
 
@@ -249,23 +280,47 @@ def _regrid(imu: ImuSeries, begin: float, rate: float, duration: float) -> tuple
     return ImuSamples(grid[1:], interval, rates, forces), resampled
 
 
+def _measured_heading(aids: Mapping[str, AidStream]) -> tuple[float, str] | None:
+    """The first heading that an instrument measured in the first minute, and its name."""
+    for name, stream in aids.items():
+        if KINDS[stream.kind].equation == HEADING and len(stream) and stream.time[0] <= _EARLY:
+            return float(stream.value[0, 0]), name
+    return None
+
+
 def _start(
-    reference: Reference, truth: NavigationStates, imu: ImuSeries | None, begin: float
+    reference: Reference,
+    truth: NavigationStates,
+    imu: ImuSeries | None,
+    begin: float,
+    heading: tuple[float, str] | None,
 ) -> tuple[NavigationStates, list[str]]:
-    """The state at time 0, complete, and what of it is not the reference's."""
+    """The state at time 0, complete, and what of it is not the reference's.
+
+    The heading is that of the reference, else the course of a vessel that moves, else the one that is given.
+    """
     velocity, attitude, made = truth.velocity[0].copy(), truth.attitude[0].copy(), []
     derived = reference.motion(np.array([begin]))[0][0]
     if not np.isfinite(velocity[:2]).all():
         made.append("velocity (differentiated positions)")
     velocity = np.where(np.isfinite(velocity), velocity, derived)
     if not np.isfinite(attitude[2]):
-        if np.hypot(velocity[0], velocity[1]) < _LEAST_SPEED:
+        ahead = reference.velocity_ahead(np.array([begin]), _MOVING)[0]
+        way = velocity if np.hypot(velocity[0], velocity[1]) >= _LEAST_SPEED else ahead
+        speed = float(np.hypot(way[0], way[1]))
+        if speed >= _LEAST_SPEED:
+            attitude[2] = math.atan2(way[1], way[0])
+            made.append("heading (course over ground)")
+        elif heading is not None:
+            attitude[2] = heading[0]
+            made.append(f"heading ({heading[1]})")
+        else:
             raise LogError(
-                "the reference has no attitude, and the vessel is too slow at the start for a heading from its course; "
-                "leave out the part before by skip_s"
+                f"the reference has no attitude, the vessel is too slow at the start for a heading from its course "
+                f"({speed:.2g} m/s, {_LEAST_SPEED:g} are wanted), and no instrument measures one; leave out the part "
+                f"before by begin = 'moving' or skip_s of [log], or give the estimators an unknown heading: "
+                f"attitude_deg = [., ., 180] of [initial_error]"
             )
-        attitude[2] = math.atan2(velocity[1], velocity[0])
-        made.append("heading (course over ground)")
     if not np.isfinite(attitude[:2]).all():
         attitude[:2] = 0.0
         if imu is not None:

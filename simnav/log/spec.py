@@ -6,12 +6,14 @@ unit; the IMU, the aiding instruments and the reference are channels. Nothing he
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, Self
+from collections.abc import Mapping
+from typing import Annotated, Any, ClassVar, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
-from simnav.log.files import Column, FileSpec
+from simnav.log.files import Column, FileSpec, without_later
 from simnav.log.reader import READERS
+from simnav.log.row_filter import RowFilter
 from simnav.log.units import check_dimension, check_units
 from simnav.spec import NonNegative, Positive, Spec, Vector, closest, quantity
 
@@ -26,9 +28,31 @@ __all__ = [
 ]
 
 _Every = Annotated[int, Field(ge=1)]
+_LEVEL: Vector = (0.0, 0.0, 0.0)
 
 
-class ChannelSpec(Spec):
+class _Grown(Spec):
+    """Base of specifications that have got more keys; see `without_later`."""
+
+    later: ClassVar[Mapping[str, Any]] = {}
+
+    @model_serializer(mode="wrap")
+    def _without_later(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        return without_later(handler(self), self.later)
+
+
+#: The keys that channels got later, with their defaults.
+_OF_CHANNELS: Mapping[str, Any] = {
+    "offset": 0.0,
+    "where": "",
+    "mounting": _LEVEL,
+    "drop_repeated": False,
+    "variation": None,
+    "variation_model": None,
+}
+
+
+class ChannelSpec(_Grown):
     """Columns of a file, in the order that the instrument wants them.
 
     Attributes
@@ -41,15 +65,30 @@ class ChannelSpec(Spec):
         Names or numbers (from 1), ``-`` before a name flips its sign, ``"=0"`` is a constant; empty for what the
         sentence holds of this instrument.
     units : str or tuple of str
-        Of the columns, one or one each (keys of `LOG_UNITS`); SI and radians where left out, as in NMEA sentences once
-        they are read.
+        Of the columns, one or one each (keys of `LOG_UNITS`, also with a factor before, like ``"1e-7 deg"``); SI and
+        radians where left out, as in NMEA sentences once they are read.
     frame : {"geodetic", "enu", "ned"}
         Of a position: latitude, longitude, height, or local Cartesian around ``[log.origin]``.
     every : int
         Take only the rows 0, every, 2 every, ...
     hold_out : int or None
         Leave out the rows 0, hold_out, 2 hold_out, ...
+    offset : float
+        Added to the times, after that of the file: the delay of this instrument, negative if it is late [s].
+    where : str
+        Only rows that fulfil this condition count, like ``Q == 1 and sdn < 0.5`` (`simnav.log.row_filter`).
+    mounting : (float, float, float)
+        Roll, pitch, yaw of the instrument in the vessel [rad]: its readings are turned to the axes of the vessel. For
+        velocities in body axes and, by the yaw, for headings.
+    drop_repeated : bool
+        Leave out rows whose values are all those of the row before: a logger that repeats the last value.
+    variation : float or None
+        Magnetic variation that is added to a magnetic heading [rad], positive east. None: that of the sentences.
+    variation_model : str or None
+        ``wmm``: the variation is that of the World Magnetic Model at the place and time of the reference.
     """
+
+    later: ClassVar[Mapping[str, Any]] = _OF_CHANNELS
 
     file: str
     sentence: str | None = None
@@ -59,9 +98,19 @@ class ChannelSpec(Spec):
     frame: Literal["geodetic", "enu", "ned"] = "geodetic"
     every: _Every = 1
     hold_out: Annotated[int, Field(ge=2)] | None = None
+    offset: float = quantity("s", 0.0)
+    where: str = ""
+    mounting: Vector = quantity("deg", _LEVEL)
+    drop_repeated: bool = False
+    variation: float | None = quantity("deg", None)
+    variation_model: Literal["wmm"] | None = None
 
     @model_validator(mode="after")
     def _check(self) -> Self:
+        if self.where:
+            RowFilter(self.where)
+        if self.variation is not None and self.variation_model is not None:
+            raise ValueError("variation_deg and variation_model exclude each other; give one")
         check_units((self.units,) if isinstance(self.units, str) else self.units)
         if isinstance(self.units, tuple) and len(self.units) not in (0, len(self.columns)):
             raise ValueError(
@@ -70,16 +119,19 @@ class ChannelSpec(Spec):
         return self
 
 
-class LogInstrumentSpec(Spec):
+class LogInstrumentSpec(_Grown):
     """Where the measurements of one aiding instrument come from.
 
     Attributes
     ----------
     source : {"file", "reference"}
         ``reference``: simulated from the reference with the instrument's own error model.
-    file, sentence, talker, columns, units, frame, every, hold_out
+    file, sentence, talker, columns, units, frame, every, hold_out, offset, where, mounting, drop_repeated, variation,
+    variation_model
         As in `ChannelSpec`, for ``source = "file"``.
     """
+
+    later: ClassVar[Mapping[str, Any]] = _OF_CHANNELS
 
     source: Literal["file", "reference"] = "file"
     file: str | None = None
@@ -90,6 +142,12 @@ class LogInstrumentSpec(Spec):
     frame: Literal["geodetic", "enu", "ned"] = "geodetic"
     every: _Every = 1
     hold_out: Annotated[int, Field(ge=2)] | None = None
+    offset: float = quantity("s", 0.0)
+    where: str = ""
+    mounting: Vector = quantity("deg", _LEVEL)
+    drop_repeated: bool = False
+    variation: float | None = quantity("deg", None)
+    variation_model: Literal["wmm"] | None = None
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -106,7 +164,7 @@ class LogInstrumentSpec(Spec):
         return ChannelSpec(**self.model_dump(exclude={"source"}))
 
 
-class LogImuSpec(Spec):
+class LogImuSpec(_Grown):
     """The columns of the IMU.
 
     Attributes
@@ -121,9 +179,19 @@ class LogImuSpec(Spec):
         Columns in the order forward, starboard, down; ``-`` before a name flips its sign.
     angular_rate_unit, specific_force_unit : str
         Keys of `LOG_UNITS`; of increments the unit of the increment.
-    max_gap : float
-        Longest hole between two rows that is bridged [s].
+    max_gap : float or None
+        Longest hole between two rows that is bridged with the value of the row after it [s]. None: ten times the usual
+        spacing, at least 1 s; holes above 0.1 s and twice the usual spacing are counted in a warning.
+    mounting : (float, float, float)
+        Roll, pitch, yaw of the IMU in the vessel [rad]: its readings are turned to the axes of the vessel.
+    specific_force_file : str or None
+        A key of ``[log.files]``: the file of the specific force, where it is another one, with a clock of its own. Its
+        integral is interpolated to the times of the angular rate.
+    where : str
+        As in `ChannelSpec`.
     """
+
+    later: ClassVar[Mapping[str, Any]] = {"mounting": _LEVEL, "specific_force_file": None, "where": ""}
 
     file: str
     samples: Literal["means", "increments", "instantaneous"] = "means"
@@ -131,10 +199,23 @@ class LogImuSpec(Spec):
     specific_force: tuple[Column, Column, Column]
     angular_rate_unit: str = "rad_s"
     specific_force_unit: str = "m_s2"
-    max_gap: Positive = quantity("s", 0.1)
+    max_gap: Positive | None = quantity("s", None)
+    mounting: Vector = quantity("deg", _LEVEL)
+    specific_force_file: str | None = None
+    where: str = ""
+
+    @model_serializer(mode="wrap")
+    def _without_later(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        table = without_later(handler(self), self.later)
+        if table.get("max_gap", 0.0) is None:
+            # The default was 0.1 s, and a log with a longer gap did not run: the digest of the others stays.
+            table["max_gap"] = 0.1
+        return table
 
     @model_validator(mode="after")
     def _check(self) -> Self:
+        if self.where:
+            RowFilter(self.where)
         check_units((self.angular_rate_unit, self.specific_force_unit))
         increments = self.samples == "increments"  # "rad_s" and "m_s2" are the defaults, and in SI like "rad" and "m_s"
         check_dimension("angular_rate_unit", self.angular_rate_unit, "angular rate", *["angle"] * increments)
@@ -174,7 +255,7 @@ class ReferenceSpec(Spec):
     max_gap: Positive | None = quantity("s", None)
 
 
-class RecordedSpec(Spec):
+class RecordedSpec(_Grown):
     """The ``[log]`` table of a recorded scenario.
 
     Attributes
@@ -195,9 +276,14 @@ class RecordedSpec(Spec):
         The trajectory that estimates are scored against.
     origin : OriginSpec or None
         Origin of local Cartesian positions.
-    skip : float
-        Seconds to leave out at the beginning.
+    skip : float or tuple of float
+        Seconds to leave out at the beginning; one for each recording, or one for all.
+    begin : {"first", "moving"}
+        The run begins at the first epoch of the reference, or at the first one at which the vessel moves by at least
+        1 m/s: then its course gives the heading of a reference without attitude.
     """
+
+    later: ClassVar[Mapping[str, Any]] = {"begin": "first"}
 
     folder: str = ""
     recordings: str | tuple[str, ...] = "*"
@@ -206,7 +292,8 @@ class RecordedSpec(Spec):
     instruments: dict[str, LogInstrumentSpec] = Field(default_factory=dict)
     reference: ReferenceSpec
     origin: OriginSpec | None = None
-    skip: NonNegative = quantity("s", 0.0)
+    skip: NonNegative | tuple[NonNegative, ...] = quantity("s", 0.0)
+    begin: Literal["first", "moving"] = "first"
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -225,6 +312,9 @@ class RecordedSpec(Spec):
         ]
         if self.imu is not None:
             channels.append(("imu", self.imu))
+            other = self.imu.specific_force_file
+            if other is not None and other not in self.files:
+                raise ValueError(f"imu.specific_force_file = {other!r} is not in [log.files]{_near(other, self)}")
         for key, file in self.files.items():
             if READERS.get(file.format) is None:
                 near = closest(file.format, list(READERS.items()))

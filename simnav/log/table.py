@@ -116,20 +116,31 @@ def check_ascending(time: Array, table: Table, column: str) -> None:
         if not np.isfinite(time[k]) or not np.isfinite(time[k - 1]):
             k = k if not np.isfinite(time[k]) else k - 1
             raise LogError(f"{table.source}, line {table.line[k]}, column {column!r}: the time is missing")
-        what = "is the same as" if time[k] == time[k - 1] else "is before"
+        same = time[k] == time[k - 1]
+        what = "is the same as" if same else "is before"
+        right = (
+            "say what to do with such rows: same_time = 'first', 'last' or 'spread' of the file"
+            if same
+            else "sort the file, or choose the rows of one instrument by 'where'"
+        )
         raise LogError(
             f"{table.source}, line {table.line[k]}, column {column!r}: the time {what} that of line "
-            f"{table.line[k - 1]} ({time[k]:.6f} s after {time[k - 1]:.6f} s); sort the file and drop duplicates"
+            f"{table.line[k - 1]} ({time[k]:.6f} s after {time[k - 1]:.6f} s); {right}"
         )
 
 
 def utc_seconds(text: str) -> float:
-    """Seconds since 1970 of a date like ``2014-08-01T00:00:00.124Z``; UTC where it names no zone.
+    """Seconds since 1970 of a date like ``2014-08-01T00:00:00.124Z`` or ``2014/08/01 00:00:00.124``.
+
+    UTC where it names no zone.
 
     Raises
     ------
     ValueError
         If it is not one.
     """
-    moment = datetime.fromisoformat(text.strip())
+    text = text.strip()
+    if text[4:5] == "/" and text[7:8] == "/":
+        text = text[:10].replace("/", "-") + text[10:]
+    moment = datetime.fromisoformat(text)
     return (moment if moment.tzinfo else moment.replace(tzinfo=UTC)).timestamp()

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections import ChainMap
 from collections.abc import Mapping
 
 from simnav.spec import UNITS, closest
 
-__all__ = ["DIMENSIONS", "LOG_UNITS", "check_dimension", "check_units", "dimension"]
+__all__ = ["DIMENSIONS", "LOG_UNITS", "check_dimension", "check_units", "dimension", "factor"]
 
 #: Factor to SI of every unit that a column of a log may have: those of TOML keys, and some that only logs have.
 LOG_UNITS: Mapping[str, float] = ChainMap(
@@ -35,19 +36,53 @@ DIMENSIONS: Mapping[str, tuple[str, ...]] = {
 }
 
 
+def _parts(unit: str) -> tuple[float, str]:
+    """The number before a unit, 1 where there is none, and the unit."""
+    number, blank, name = unit.strip().partition(" ")
+    if not blank:
+        return 1.0, unit
+    try:
+        scale = float(number)
+    except ValueError:
+        scale = math.nan
+    if not math.isfinite(scale) or scale == 0.0:
+        raise ValueError(f"unit {unit!r}: a number other than 0 and a unit are wanted, like '1e-7 deg'")
+    return scale, name.strip()
+
+
+def factor(unit: str) -> float:
+    """Factor of a unit to SI; a number may stand before its name.
+
+    Raises
+    ------
+    ValueError
+        If there is no such unit.
+
+    Examples
+    --------
+    >>> factor("km"), factor("0.1 m")
+    (1000.0, 0.1)
+    """
+    scale, name = _parts(unit)
+    if name not in LOG_UNITS:
+        raise ValueError(f"unknown unit {name!r}{closest(name, list(LOG_UNITS))}")
+    return scale * LOG_UNITS[name]
+
+
 def dimension(unit: str) -> str:
     """What a unit measures: a key of `DIMENSIONS`, or empty where none of them."""
-    return next((name for name, units in DIMENSIONS.items() if unit in units), "")
+    name = _parts(unit)[1]
+    return next((what for what, units in DIMENSIONS.items() if name in units), "")
 
 
 def check_dimension(key: str, unit: str, *wanted: str) -> None:
     """ValueError where a unit is of none of these dimensions; "1" is SI and always fits."""
-    if unit != "1" and dimension(unit) not in wanted:
+    if _parts(unit)[1] != "1" and dimension(unit) not in wanted:
         known = ", ".join(name for dimension in wanted for name in DIMENSIONS[dimension])
         raise ValueError(f"{key} = {unit!r} is no unit of {' or '.join(wanted)} ({known})")
 
 
 def check_units(units: tuple[str, ...]) -> None:
+    """ValueError where one of them is unknown."""
     for unit in units:
-        if unit not in LOG_UNITS:
-            raise ValueError(f"unknown unit {unit!r}{closest(unit, list(LOG_UNITS))}")
+        factor(unit)

@@ -17,12 +17,18 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from simnav.plugins import entry_points
+
 __all__ = ["NAME", "Header", "ScenarioWarning", "headers"]
 
 _GROUP = "simnav.scenarios"
 
 #: Names of scenarios: kebab-case.
 NAME = re.compile(r"[a-z][a-z0-9]*(-[a-z0-9]+)*")
+
+
+#: The heads that were read, by path, time of the last change [ns] and size of the file.
+_known: dict[tuple[Path, int, int], Header] = {}
 
 
 class ScenarioWarning(UserWarning):
@@ -106,7 +112,7 @@ def headers() -> list[Header]:
 def _folders() -> Iterator[Path]:
     """The folder of each pack, the project's own first."""
     # Metadata on sys.path twice (a source tree that is also installed) must not count twice.
-    points = {(p.name, p.value): p for p in importlib.metadata.entry_points(group=_GROUP)}
+    points = {(p.name, p.value): p for p in entry_points(_GROUP)}
     for point in sorted(points.values(), key=lambda p: (not _own(p), p.name)):
         if _own(point):
             yield (Path(__file__).parents[1] / "scenarios").resolve()
@@ -134,6 +140,19 @@ def _own(point: importlib.metadata.EntryPoint) -> bool:
 
 
 def _header(path: Path) -> Header | None:
+    """The head of a file, read again if the file has changed; None, and a warning, if it has an error."""
+    try:
+        state = path.stat()
+        key = (path, state.st_mtime_ns, state.st_size)
+    except OSError as error:
+        _warn(f"{path}: left out, cannot be read: {error.strerror}")
+        return None
+    if key not in _known and (header := _read(path)) is not None:
+        _known[key] = header
+    return _known.get(key)
+
+
+def _read(path: Path) -> Header | None:
     try:
         text = path.read_text(encoding="utf-8")
         table = _head(text)

@@ -10,11 +10,13 @@ import numpy as np
 from pydantic import Field, field_validator, model_validator
 
 import simnav.log.own_track  # noqa: F401 (it registers vessels)
+from simnav.declared_process import DeclaredProcess
 from simnav.log.spec import RecordedSpec
 from simnav.scenario.catalogue import NAME, gym_id
 from simnav.sensors import AidSpec, AnyFault, AnyInstrument, ImuSpec
+from simnav.sensors.error_processes import in_sea
 from simnav.spec import Positive, Spec, entries, quantity
-from simnav.types import Array, Instruments
+from simnav.types import Array, Datasheet, Instruments
 from simnav.world import AnySurrounding, AnyVessel, Current, Manoeuvre, Sea, Ship, Start, Surroundings, Vessel, Voyage
 from simnav.world.surroundings import surround
 
@@ -210,12 +212,21 @@ class Description(Spec):
     def actual_sheet(self) -> Instruments | None:
         """The datasheets with the true figures; None if those of `instruments_sheet` are true.
 
-        Their details include the figures that are in no datasheet (`AidSpec.unstated`), if they are not zero.
+        Their details include the figures that are in no datasheet (`AidSpec.unstated`), if they are not zero. Processes
+        that depend on the wave height have the size of this scenario's sea.
         """
         actual = self.actual()
         unstated = {name: {u: getattr(s, u) for u in s.unstated if getattr(s, u)} for name, s in actual.aids.items()}
-        if actual is self and not any(unstated.values()):
+        waves = any(f.name == "wave_height" for s in actual.aids.values() for p in s.processes for f in p.factors())
+        if actual is self and not any(unstated.values()) and not waves:
             return None
         sheet = actual.instruments_sheet()
-        aids = [replace(s, details={**s.details, **unstated[s.name]}) for s in sheet.values()]
+        aids = [
+            replace(s, details={**s.details, **unstated[s.name]}, processes=self._in_sea(s)) for s in sheet.values()
+        ]
         return Instruments(aids, sheet.imu, sheet.step)
+
+    def _in_sea(self, sheet: Datasheet) -> tuple[DeclaredProcess, ...]:
+        """The processes of a datasheet with the size that they have in the waves of this scenario."""
+        height = 0.0 if self.sea is None else self.sea.significant_height
+        return tuple(in_sea(process, height) for process in sheet.processes)

@@ -11,7 +11,7 @@ from typing import Protocol, Self
 
 import numpy as np
 
-from simnav.blocks import StateBlock
+from simnav.blocks import LEVER_ARM, StateBlock
 from simnav.kinds import Kind
 from simnav.spec import SpecError
 from simnav.streams import stream
@@ -112,7 +112,7 @@ def check_blocks(spec: Declares, source: str) -> None:
         blocks = spec.blocks()
     except ValueError as error:
         raise SpecError(f"{source}: {error}") from None
-    if blocks and spec.definition.observation is None:
+    if any(block.name != LEVER_ARM for block in blocks) and spec.definition.observation is None:
         raise SpecError(f"{source} brings blocks of states; its equation should be a function that uses them")
     fields = [field for field in vars(spec) if field.startswith("bias")]
     if fields and any(block.name == "bias" for block in blocks):

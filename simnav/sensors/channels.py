@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simnav.recording import AidStream
+from simnav.sensors.error_processes import TotalError
 from simnav.sensors.instrument import AidSpec, Instrument, InstrumentError, label_of, raised
 from simnav.sensors.processes import GaussMarkov
 from simnav.streams import stream
@@ -42,6 +43,8 @@ class ChannelInstrument(Instrument):
         Identifiers of the channels.
     bias : (c, d) array
         Turn-on bias of each channel in this run.
+    totals : list of TotalError
+        The further processes of each channel; empty without any.
     """
 
     def __init__(self, spec: AidSpec, name: str, seed: int):
@@ -55,6 +58,11 @@ class ChannelInstrument(Instrument):
                 for c in self.channels
             ]
             if sheet.bias_instability.any()
+            else []
+        )
+        self.totals = (
+            [TotalError(spec.processes, spec.definition, seed, name, c) for c in self.channels]
+            if spec.processes
             else []
         )
         self.bias = np.zeros((len(self.channels), len(sheet.sigma))) + spec.figure("fixed_bias")
@@ -140,9 +148,16 @@ class ChannelInstrument(Instrument):
         added, variates = self.ahead(tap.time)
         if self._noises:
             added += sigma * variates
+        for j, total in enumerate(self.totals):
+            more = total.at(tap, value[:, j], self.surroundings)
+            added[:, j] += more.error
+            sigma[:, j] = np.sqrt(sigma[:, j] ** 2 + more.variance)
+            there[:, j] &= ~more.lost
         row, channel = np.nonzero(there)
         lost, lost_channel = np.nonzero(~there)
-        value = self.definition.add_error(value[there], added[there])
+        for j, total in enumerate(self.totals):
+            value[:, j] = total.rounded(self.definition.add_error(value[:, j], added[:, j]))
+        value = value[there] if self.totals else self.definition.add_error(value[there], added[there])
         n = len(value)
         return AidStream(
             self.name,

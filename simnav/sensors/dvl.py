@@ -70,6 +70,7 @@ class Dvl(AidSpec):
     scale: NonNegative = quantity("percent", 0.0)
     misalignment: SigmaTriple = quantity("deg", ZERO)
     lever_arm: Vector = quantity("m", ZERO)
+    lever_arm_sigma: SigmaTriple = quantity("m", ZERO)
     minimum_altitude: NonNegative = quantity("m", 0.0)
     maximum_altitude: Positive = quantity("m", inf)
     fixed_bias: Triple = quantity("m_s", ZERO)

@@ -42,6 +42,7 @@ class GnssPosition(AidSpec):
     bias: SigmaTriple = quantity("m", ZERO)
     bias_instability: SigmaTriple = quantity("m", ZERO)
     lever_arm: Vector = quantity("m", ZERO)
+    lever_arm_sigma: SigmaTriple = quantity("m", ZERO)
     fixed_bias: Triple = quantity("m", ZERO)
 
     def build(self, name: str, seed: int) -> Instrument:
@@ -75,6 +76,7 @@ class GnssVelocity(AidSpec):
     bias: SigmaTriple = quantity("m_s", ZERO)
     bias_instability: SigmaTriple = quantity("m_s", ZERO)
     lever_arm: Vector = quantity("m", ZERO)
+    lever_arm_sigma: SigmaTriple = quantity("m", ZERO)
     fixed_bias: Triple = quantity("m_s", ZERO)
 
     def build(self, name: str, seed: int) -> Instrument:

@@ -5,7 +5,8 @@ The model of a measurement is ::
     value = observe(truth) + b + g + w
 
 ``observe`` is the geometry of the instrument with its deterministic errors, b the turn-on bias, which is constant in a
-run, g the in-run bias, a first-order Gauss-Markov process, and w white noise. Errors of a position are in metres. The
+run, g the in-run bias, a first-order Gauss-Markov process, and w white noise. Further processes are named in the tables
+``[[instruments.NAME.error]]`` (`simnav.sensors.error_processes`). Errors of a position are in metres. The
 turn-on values are drawn at the start of a run from the datasheet's one-sigma figures. ``fixed_*`` are constant errors
 that are added; estimators do not receive them. Every process has its own random stream and draws at every sample,
 delivered or not.
@@ -18,57 +19,43 @@ from __future__ import annotations
 
 import re
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from functools import partial, wraps
 from math import inf
-from typing import Annotated, Any, ClassVar, Self, TypeVar
+from typing import Any, ClassVar, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BeforeValidator, Field, model_validator
+from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
-from simnav.blocks import StateBlock
+from simnav.blocks import LEVER_ARM, StateBlock
 from simnav.kinds import INSTRUMENTS, Kind
 from simnav.plugins import PluginError, registered_kind, with_named_errors
 from simnav.recording import AidStream
 from simnav.sensors.block_values import BlockValues, check_blocks
+from simnav.sensors.error_processes import AnyErrorProcess, TotalError, declared_processes, labels_of, white_of
 from simnav.sensors.errors import InstrumentError, label_of, raised
+from simnav.sensors.figures import (
+    PROCESSES,
+    ZERO,
+    Pair,
+    SigmaPair,
+    SigmaTriple,
+    Triple,
+    figures_of,
+    times_datasheet,
+)  # fmt: skip
 from simnav.sensors.processes import GaussMarkov
 from simnav.sensors.turning import turn_to_body, turn_to_ned
-from simnav.spec import (
-    UNITS,
-    NonNegative,
-    Positive,
-    Spec,
-    SpecError,
-    Vector,
-    closest,
-    quantity,
-    unit_of,
-)
+from simnav.spec import UNITS, NonNegative, Positive, Spec, SpecError, closest, entries, quantity, unit_of
 from simnav.streams import stream
 from simnav.types import Array, Datasheet, TapStates
 from simnav.world.surroundings import Surroundings
 
 __all__ = [
-    "ZERO",
-    "AidSpec",
-    "Instrument",
-    "InstrumentError",
-    "Pair",
-    "SigmaPair",
-    "SigmaTriple",
-    "Triple",
-    "figures_of",
-    "label_of",
-    "raised",
-    "register_instrument",
-    "times_datasheet",
-    "turn_to_body",
-    "turn_to_ned",
-]
-
-T = TypeVar("T", bound=Spec)
+    "ZERO", "AidSpec", "Instrument", "InstrumentError", "Pair", "SigmaPair", "SigmaTriple", "Triple", "figures_of",
+    "label_of", "raised", "register_instrument", "times_datasheet", "turn_to_body", "turn_to_ned",
+]  # fmt: skip
 
 #: Names with another meaning, which no instrument may have: parts of an environment's observation and of a reference.
 _RESERVED = ("imu", "interval", "position", "velocity", "attitude")
@@ -77,45 +64,14 @@ _BY_COMPONENT = ("sigma", "bias", "bias_instability", "fixed_bias")
 #: What the identifier of a channel looks like (it stands in tables, in the TOML of faults, and after a colon), and the
 #: largest number of channels of an instrument.
 _CHANNEL, _MOST_CHANNELS = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.+-]*"), 1000
-#: Default of a vector.
-ZERO: Vector = (0.0, 0.0, 0.0)
-
-
-def _spread(n: int) -> BeforeValidator:
-    return BeforeValidator(lambda x: (x,) * n if isinstance(x, (int, float)) and not isinstance(x, bool) else x)
-
-
-#: Two or three numbers, one for each axis; TOML may have one number for all axes. One-sigma figures are not negative.
-Pair = Annotated[tuple[float, float], _spread(2)]
-Triple = Annotated[Vector, _spread(3)]
-SigmaPair = Annotated[tuple[NonNegative, NonNegative], _spread(2)]
-SigmaTriple = Annotated[tuple[NonNegative, NonNegative, NonNegative], _spread(3)]
-
-
-def figures_of(cls: type[Spec], errors: Sequence[str]) -> list[str]:
-    """The fields of a specification whose datasheet value may be wrong (``times_datasheet``)."""
-    stems = tuple(errors)
-    return [n for n in cls.model_fields if n in stems or any(n.startswith(f"{stem}_") for stem in stems)]
-
-
-def times_datasheet(spec: T) -> T:
-    """A specification with its figures multiplied by its ``times_datasheet``; the same object without them."""
-    factors: Mapping[str, float] = getattr(spec, "times_datasheet", {})
-    if not factors:
-        return spec
-    changes: dict[str, Any] = {"times_datasheet": {}}
-    for name, factor in factors.items():
-        value = getattr(spec, name)
-        changes[name] = tuple(factor * v for v in value) if isinstance(value, tuple) else factor * value
-    return spec.model_copy(update=changes)
 
 
 class AidSpec(Spec):
     """Base class of the specifications of aiding instruments.
 
     Subclasses declare ``sigma`` and, as far as they apply, ``bias``, ``bias_instability``, ``scale``,
-    ``misalignment``, ``lever_arm`` and their ``fixed_`` forms, each with its unit. If the components of a
-    measurement have different units, each has a field of its own: ``sigma_range``, ``sigma_bearing``.
+    ``misalignment``, ``lever_arm``, ``lever_arm_sigma`` and their ``fixed_`` forms, each with its unit. If the
+    components of a measurement have different units, each has a field of its own: ``sigma_range``, ``sigma_bearing``.
 
     Attributes
     ----------
@@ -132,7 +88,14 @@ class AidSpec(Spec):
 
     definition: ClassVar[Kind]
     example: ClassVar[Mapping[str, Any]]
-    errors: ClassVar[tuple[str, ...]] = ("sigma", "bias", "bias_instability", "scale", "misalignment")
+    errors: ClassVar[tuple[str, ...]] = (
+        "sigma",
+        "bias",
+        "bias_instability",
+        "scale",
+        "misalignment",
+        "lever_arm_sigma",
+    )
     unstated: ClassVar[tuple[str, ...]] = ()
 
     kind: str
@@ -142,6 +105,7 @@ class AidSpec(Spec):
     times_datasheet: dict[str, Positive] = Field(
         {}, description="figures that really are so many times what the datasheet says, like `sigma = 2.5`"
     )
+    processes: tuple[AnyErrorProcess, ...] = entries("error", (), description="further processes of the error")
 
     @model_validator(mode="after")
     def _correlated(self) -> Self:
@@ -168,23 +132,54 @@ class AidSpec(Spec):
             if name.removeprefix("fixed_") in names:
                 value = getattr(self, name)
                 changes[name] = (0.0,) * len(value) if isinstance(value, tuple) else 0.0
-        return self.model_copy(update=changes)
+        return self.model_copy(update={**changes, "processes": ()})
+
+    @model_serializer(mode="wrap")
+    def _without_empty(self, serialize: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """The digest of a scenario that names no processes and no sigma of a lever arm is what it was before these."""
+        table: dict[str, Any] = serialize(self)
+        if not self.processes:
+            table.pop("processes", None)
+        if not any(np.atleast_1d(self.figure("lever_arm_sigma"))):
+            table.pop("lever_arm_sigma", None)
+        return table
+
+    @model_validator(mode="after")
+    def _fitting_processes(self) -> Self:
+        if not self.processes:
+            return self
+        if self.sources():
+            raise ValueError(
+                f"error: an instrument of kind {self.kind!r} has the errors of {' and '.join(self.sources())}, which "
+                "it reads; name the processes there"
+            )
+        for name, process in zip(labels_of(self.processes), self.processes, strict=True):
+            try:
+                process.check(self.definition)
+            except ValueError as error:
+                raise ValueError(f"error {name!r}: {error}") from None
+        return self
 
     @model_validator(mode="after")
     def _known_figures(self) -> Self:
-        valid = figures_of(type(self), self.errors)
+        valid = [*figures_of(type(self), self.errors), *([PROCESSES] if self.processes else [])]
         for name in self.times_datasheet:
             if name not in valid:
                 raise ValueError(f"times_datasheet.{name}: there is no such figure{closest(name, valid)}")
         return self
 
     def blocks(self) -> tuple[StateBlock, ...]:
-        """The states that this instrument brings along, from its fields; none, unless a subclass says so.
+        """The states that this instrument brings along, from its fields.
+
+        These are three of its lever arm if a figure says how well that is known (``lever_arm_sigma``), and what a
+        subclass adds.
 
         The figures of a block are fields of the specification that ``errors`` names, so that an ideal instrument has
         none of them, and ``times_datasheet`` may change them.
         """
-        return ()
+        if not any(sigma := np.atleast_1d(self.figure("lever_arm_sigma")).tolist()):
+            return ()
+        return (StateBlock(LEVER_ARM, 3, "m", tuple(sigma)),)
 
     def channels(self) -> tuple[str, ...]:
         """The identifiers of the channels of this instrument (satellites, beams, beacons); none, unless a subclass says
@@ -218,8 +213,12 @@ class AidSpec(Spec):
         return self
 
     def actual(self) -> Self:
-        """The instrument with its true figures: those of the datasheet times ``times_datasheet``."""
-        return times_datasheet(self)
+        """The instrument with its true figures, those of the datasheet times ``times_datasheet``, and all processes."""
+        actual = times_datasheet(self)
+        if all(process.stated for process in self.processes):
+            return actual
+        stated = tuple(process.model_copy(update={"stated": True}) for process in actual.processes)
+        return actual.model_copy(update={"processes": stated})
 
     def datasheet(self, name: str) -> Datasheet:
         """The datasheet that an estimator receives.
@@ -229,11 +228,14 @@ class AidSpec(Spec):
         name : str
             Name of the instrument in its scenario.
         """
+        sigma, definition = np.asarray(self.figure("sigma"), dtype=np.float64), self.definition
+        if self.processes:
+            sigma = np.sqrt(sigma**2 + white_of(self.processes, definition))
         return Datasheet(
             name,
             self.kind,
             self.rate,
-            np.asarray(self.figure("sigma"), dtype=np.float64),
+            sigma,
             self.phase,
             np.asarray(self.figure("bias"), dtype=np.float64),
             np.asarray(self.figure("bias_instability"), dtype=np.float64),
@@ -241,9 +243,10 @@ class AidSpec(Spec):
             float(self.figure("scale")),
             np.broadcast_to(np.asarray(self.figure("misalignment"), dtype=np.float64), (3,)).copy(),
             np.broadcast_to(np.asarray(self.figure("lever_arm"), dtype=np.float64), (3,)).copy(),
-            {detail: getattr(self, detail) for detail in self.definition.datasheet},
+            {detail: getattr(self, detail) for detail in definition.datasheet},
             self.blocks(),
             self.channels(),
+            declared_processes(self.processes, definition),
         )
 
     def build(self, name: str, seed: int) -> Instrument:
@@ -398,6 +401,8 @@ class Instrument(ABC):
         Properties of its kind.
     sigma, bias : (d,) array
         Standard deviation of the white noise, and turn-on bias of this run.
+    total : TotalError or None
+        The processes of the tables ``[[instruments.NAME.error]]``; None without any.
     scale : float
         Scale-factor error of this run [-].
     lever_arm : (3,) array
@@ -418,6 +423,11 @@ class Instrument(ABC):
         self._seed = seed
         sheet = spec.datasheet(name)
         self.sigma = sheet.sigma
+        self.total: TotalError | None = None
+        if spec.processes:
+            self.sigma = np.broadcast_to(np.asarray(spec.figure("sigma"), np.float64), self.sigma.shape).copy()
+            if not spec.channels():
+                self.total = TotalError(spec.processes, spec.definition, seed, name)
         self.lever_arm = sheet.lever_arm
         self.bias = self.drawn("bias", sheet.bias) + spec.figure("fixed_bias")
         self.scale = float(self.drawn("scale", np.array([sheet.scale]))[0] + spec.figure("fixed_scale"))
@@ -426,8 +436,10 @@ class Instrument(ABC):
         if sheet.bias_instability.any():
             rng = stream(seed, "instrument", name, "bias_instability")
             self._instability = GaussMarkov(sheet.bias_instability, sheet.correlation_time, rng)
-        self.levered = bool(self.lever_arm.any())
         self._blocks = {block.name: BlockValues(block, block.label(name), seed) for block in sheet.blocks}
+        if LEVER_ARM in self._blocks:
+            self.lever_arm = sheet.lever_arm + self.block(LEVER_ARM, np.zeros(1))[0]
+        self.levered = bool(self.lever_arm.any())
 
     def block(self, name: str, time: Array) -> Array:
         """The true values of a block of states at n times.
@@ -537,7 +549,13 @@ class Instrument(ABC):
         error, variates = self.ahead(tap.time)
         if self._noise is not None:
             error += sigma * variates
+        if self.total is not None:
+            more = self.total.at(tap, value, self.surroundings)
+            error, sigma = error + more.error, np.sqrt(sigma**2 + more.variance)
+            there = ~more.lost if there is None else there & ~more.lost
         value = self.definition.add_error(value, error)
+        if self.total is not None:
+            value = self.total.rounded(value)
         time, dropped = tap.time, np.empty(0)
         if there is not None and not there.all():
             time, dropped, value, sigma = time[there], time[~there], value[there], sigma[there]

@@ -1,4 +1,4 @@
-"""The error processes of instruments: Gauss-Markov, random walk, quantization.
+"""The error processes of instruments: Gauss-Markov of first and second order, random walk, quantization.
 
 Every process is a state machine. It receives the times of successive blocks and gives the same numbers, bit for bit,
 for any division into blocks. Times may be irregular. Each process has its own generator (`simnav.streams.stream`) and
@@ -10,14 +10,15 @@ House 2013, sections 4.4 and 14.2; A. Gelb (ed.), *Applied Optimal Estimation*, 
 
 from __future__ import annotations
 
-from math import exp, expm1, floor, isinf, sqrt
+from math import exp, expm1, floor, isinf, pi, sqrt
 
 import numpy as np
 
 from simnav.compiled import kernel
+from simnav.declared_process import oscillation
 from simnav.types import Array
 
-__all__ = ["GaussMarkov", "HeldGaussMarkov", "quantize_scalar", "ready"]
+__all__ = ["GaussMarkov", "HeldGaussMarkov", "SecondOrder", "quantize_scalar", "ready"]
 
 
 @kernel()
@@ -56,6 +57,39 @@ def _gauss_markov(
         for j in range(len(state)):
             state[j] = a * state[j] + b * sigma[j] * variates[i, j]
             variates[i, j] = state[j]
+    return True
+
+
+@kernel("b1(f8[:, :, ::1], f8[:, ::1], f8[::1], f8, f8, f8)")
+def _second_order(
+    variates: Array, state: Array, time: Array, previous: float, frequency: float, damping: float
+) -> bool:
+    """Convert (n, d, 2) unit variates into value and rate / w of the process x, in place. False as of `_gauss_markov`.
+
+    With the transition matrix Phi of (x, x' / w) the noise of a step has the covariance I - Phi Phi', of which the
+    lower Cholesky factor is taken.
+    """
+    step = -1.0
+    a, b, c, d = 1.0, 0.0, 0.0, 1.0
+    l11, l21, l22 = 0.0, 0.0, 0.0
+    for i in range(len(time)):
+        dt = time[i] - previous
+        previous = time[i]
+        if not dt >= 0.0:
+            return False
+        if dt != step:
+            step = dt
+            a, b, c, d = oscillation(dt, frequency, damping)
+            b, c = b * frequency, c / frequency
+            l11 = sqrt(max(1.0 - a * a - b * b, 0.0))
+            l21 = -(a * c + b * d) / l11 if l11 > 0.0 else 0.0
+            l22 = sqrt(max(1.0 - c * c - d * d - l21 * l21, 0.0))
+        for j in range(len(state)):
+            x, v = state[j, 0], state[j, 1]
+            first, second = variates[i, j, 0], variates[i, j, 1]
+            state[j, 0] = a * x + b * v + l11 * first
+            state[j, 1] = c * x + d * v + l21 * first + l22 * second
+            variates[i, j, 0], variates[i, j, 1] = state[j, 0], state[j, 1]
     return True
 
 
@@ -129,6 +163,39 @@ class GaussMarkov:
                 raise ValueError("the times of an error process run backwards; sort the measurements by time")
             self._time = float(t[-1])
         return x
+
+
+class SecondOrder:
+    """Stationary second-order Gauss-Markov process (`simnav.declared_process`).
+
+    Parameters
+    ----------
+    sigma : (d,) array
+        Standard deviation of each component.
+    period : float
+        Natural period [s].
+    damping : float
+        Damping ratio.
+    rng : numpy.random.Generator
+        Random stream that only this process uses.
+    """
+
+    def __init__(self, sigma: Array | float, period: float, damping: float, rng: np.random.Generator):
+        self.sigma = _vector(sigma)
+        self._frequency, self._damping, self._rng = 2.0 * pi / period, float(damping), rng
+        self._state = rng.standard_normal((len(self.sigma), 2))
+        self._time: float | None = None
+
+    def sample(self, time: Array) -> Array:
+        """The process at the times of the next block. See `GaussMarkov.sample`."""
+        x = self._rng.standard_normal((len(time), len(self.sigma), 2))
+        if len(time):
+            t = ready(time)
+            first = min(0.0, float(t[0])) if self._time is None else self._time
+            if not _second_order(x, self._state, t, first, self._frequency, self._damping):
+                raise ValueError("the times of an error process run backwards; sort the measurements by time")
+            self._time = float(t[-1])
+        return np.asarray(self.sigma * x[:, :, 0])
 
 
 class HeldGaussMarkov:

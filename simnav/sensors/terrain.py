@@ -6,7 +6,7 @@ from typing import Literal
 
 from simnav import kinds
 from simnav.kinds import Kind, geodetic_components
-from simnav.sensors.instrument import ZERO, AidSpec, Instrument, Pair, SigmaPair, register_instrument
+from simnav.sensors.instrument import ZERO, AidSpec, Instrument, Pair, SigmaPair, SigmaTriple, register_instrument
 from simnav.sensors.observation import HORIZONTAL_POSITION, CompiledInstrument
 from simnav.spec import Vector, quantity
 
@@ -28,6 +28,7 @@ class TerrainFix(AidSpec):
     bias: SigmaPair = quantity("m", (0.0, 0.0))
     bias_instability: SigmaPair = quantity("m", (0.0, 0.0))
     lever_arm: Vector = quantity("m", ZERO)
+    lever_arm_sigma: SigmaTriple = quantity("m", ZERO)
     fixed_bias: Pair = quantity("m", (0.0, 0.0))
 
     def build(self, name: str, seed: int) -> Instrument:

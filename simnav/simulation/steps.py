@@ -5,8 +5,8 @@ stretch), by the classes of the block form (`Simulator.advance`), from the same 
 `simnav.world.motion.advance` and `sense`, compute all that depends on the motion, for all runs. The numbers are those
 of the block form, bit for bit.
 
-Vessels, instruments and faults of third parties have the block form only, and so have instruments with channels. A run
-with one of them is advanced in blocks of one step.
+Vessels, instruments and faults of third parties have the block form only, and so have instruments with channels or with
+named error processes. A run with one of them is advanced in blocks of one step.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class SteppedRuns:
     ----------
     simulators : list of Simulator
         The simulator of each run; its vessel may be steered if it can.
-    x : (n, 59) array
+    x : (n, 71) array
         States of the worlds (`simnav.world.motion`), for runs whose trajectory is a `simnav.world.World`.
     step : (n,) int array
         Number of steps of each run so far.
@@ -93,7 +93,7 @@ class SteppedRuns:
         world = simulator.trajectory
         known = (
             isinstance(world, World)
-            and all(isinstance(a, CompiledInstrument) and a.in_kernel for a in aids.values())
+            and all(isinstance(a, CompiledInstrument) and a.in_kernel and a.total is None for a in aids.values())
             and all(layer.operation is not None for layer in simulator.layers)
             and (simulator.imu is None or simulator.imu.effects is None)
         )

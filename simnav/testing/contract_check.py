@@ -63,6 +63,10 @@ accelerometer = { bias_ug = 200.0, random_walk_ug_sqrt_hz = 50.0 }
 """
 
 _HALF = 30.0  # s
+#: How much of the recording an estimator without one of its instruments runs over [s].
+_THIRD = 20.0
+#: Interval of the readings of an instrument with channels: a reading of n channels costs as much as n others [s].
+_CHANNELS_EVERY = 5.0
 
 #: How far the first estimate may be from the initial state: multiples of its sigma, and the motion of one second.
 _SIGMAS, _CHANGE = 6.0, {"velocity": 1.0, "attitude": 0.1}
@@ -301,7 +305,10 @@ def _contract_scenario(specs: Sequence[type[AidSpec]]) -> Scenario:
     from simnav.scenario import Scenario
 
     table = tomllib.loads(SCENARIO)
-    table["instruments"] |= {cls.model_fields["kind"].default: cls.example for cls in specs}
+    for cls in specs:
+        kind = cls.model_fields["kind"].default
+        rare = {"rate_hz": 1.0 / _CHANNELS_EVERY} if cls.from_toml({**cls.example, "kind": kind}).channels() else {}
+        table["instruments"][kind] = {**cls.example, **rare}
     return Scenario.from_toml(table, source="the contract test")
 
 
@@ -443,10 +450,10 @@ def _silence(candidate: Candidate, recording: Recording) -> tuple[bool, str]:
 @_demand("missing instruments")
 def _missing(candidate: Candidate, recording: Recording) -> tuple[bool, str]:
     """Without an instrument the estimator works, or its `needs` name the instrument; it refuses no other scenario."""
-    names = list(recording.instruments)
+    names, beginning = list(recording.instruments), _until(recording, _THIRD)
     needed: list[str] = []
     for absent in (["imu"], *([n] for n in names), names, [*names, "imu"]):
-        trial = run_trial(candidate.factory(), _without(recording, absent))
+        trial = run_trial(candidate.factory(), _without(beginning, absent))
         label = absent[0] if len(absent) == 1 else "instruments" if "imu" in absent else "aiding instruments"
         if trial.status not in ("ok", "unsuitable"):
             return False, f"without {label}: {trial.status}: {trial.reason}"
@@ -539,6 +546,13 @@ def _altered(recording: Recording, after: float) -> Recording:
 def _rows(stream: AidStream, keep: NDArray[np.bool_]) -> AidStream:
     columns = ("time", "value", "faults", "fault_error", "sigma", *(("channel", "side") if stream.channels else ()))
     return replace(stream, **{c: getattr(stream, c)[keep] for c in columns})
+
+
+def _until(recording: Recording, end: float) -> Recording:
+    """The recording up to a time."""
+    data, whole = _silenced(recording, end, imu=False).data, recording.data.truth
+    truth = whole[: int(np.searchsorted(whole.time, end + 1e-6))]
+    return replace(recording, data=replace(data, end=float(truth.time[-1]), truth=truth))
 
 
 def _silenced(recording: Recording, after: float, imu: bool) -> Recording:

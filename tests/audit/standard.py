@@ -15,9 +15,9 @@ def rows() -> Iterator[tuple[str, str, str, bool]]:
     """What, figure, promised, kept."""
     made = publishing.audit_standard(sample=SAMPLE)
     found = made.verification
-    for text in (*found.different, *found.not_repeatable):
+    for text in (*found.different, *found.not_repeatable, *found.not_here):
         print(f"  {text}", file=sys.stderr)
-    wrong = len(found.different) + len(found.not_repeatable)
+    wrong = len(found.different) + len(found.not_repeatable) + len(found.not_here)
     figure = f"{found.repeated - wrong} of {found.repeated}"
     yield "results of the standard result that come out as stored", figure, "all", made.passed
     what = f"share of wrong results that such a sample finds ({CONFIDENCE:.0%})"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import re
+from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -187,6 +188,12 @@ VANDALS: dict[str, tuple[str, set[str]]] = {
 
 
 #: Those that only a sandbox keeps from the processes and folders of the campaign's user.
+#: Those that only answer badly: how they are confined plays no part.
+ANSWERS = {
+    "raises-in-constructor", "writes-garbage", "answers-early", "floods-stdout", "endless-diagnostics", "giant-answer",
+    "many-names", "ragged-diagnostics", "large-once", "nothing-in-a-shape", "empty-but-large", "many-dimensions",
+    "a-name-twice", "odd-names", "odd-reason", "odd-covariance",
+}  # fmt: skip
 _CONTAINED = {"deletes-results", "kills-worker", "opens-a-socket"}
 
 
@@ -236,12 +243,16 @@ def cheats(folder: Path, confinement: str = "auto", seeds: int = 2) -> list[str]
     return gained
 
 
-def vandals(folder: Path, confinement: str = "auto", workers: int = 2, seeds: int = 2) -> Harm:
-    """All `VANDALS` and two rows of simnav in one campaign, and these without them."""
+def vandals(
+    folder: Path, confinement: str = "auto", workers: int = 2, seeds: int = 2, without: Collection[str] = ()
+) -> Harm:
+    """The `VANDALS`, ``without`` some, and two rows of simnav in one campaign, and these without them."""
     results, mark = folder / "results", f"simnav-vandal-{os.getpid()}"
     requests = []
     tried = {
-        name: v for name, v in VANDALS.items() if name not in _CONTAINED or (confinement != "none" and contained())
+        name: v
+        for name, v in VANDALS.items()
+        if name not in without and (name not in _CONTAINED or (confinement != "none" and contained()))
     }
     for name, (mischief, _) in tried.items():
         text = _VANDAL.replace("{mischief}", mischief).replace(

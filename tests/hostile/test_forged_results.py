@@ -115,7 +115,7 @@ def test_a_label_that_is_a_path_imports_nothing(folder: Path, tmp_path: Path, la
 def test_a_parameter_that_names_a_file_is_not_opened(folder: Path, tmp_path: Path, scenario: Scenario) -> None:
     (tmp_path / "policy.npz").write_bytes(b"of somebody else")
     forge(folder, fields(parameters={"file": str(tmp_path / "policy.npz")}))
-    said = verified(folder, scenario).not_repeatable
+    said = verified(folder, scenario).not_here
     assert len(said) == 2
     assert "a parameter of the result names a file; give the estimator with --estimator" in said[0]
 
@@ -187,7 +187,9 @@ def test_a_forgery_is_found(folder: Path, scenario: Scenario, forgery: str) -> N
         changes = {"score_update_median": 0.03 * median}
     forge(folder, fields(**changes))
     found = verified(folder, scenario)
-    words = " | ".join((*found.different, *found.claims, *found.unconfirmed, *found.not_repeatable, *found.set_aside))
+    words = " | ".join(
+        (*found.different, *found.claims, *found.unconfirmed, *found.not_repeatable, *found.not_here, *found.set_aside)
+    )
     assert said in words
     assert found.passed == (forgery in CLAIMS)
     if forgery in CLAIMS:

@@ -207,6 +207,7 @@ OF_THE_RESULT = {
     "bench": {"every", "output"},  # of all rows: simnav.costs
     "bound": {"csv"},
     "allan": {"plot", "csv"},
+    "realism": {"plot", "fit"},
     "verify": {"present", "tolerance"},  # of a bundle: simnav.verify_bundle
     "cite": {"text"},
     "tune": {"output", "plot", "parameters"},  # parameters that are held are a pair with the estimator

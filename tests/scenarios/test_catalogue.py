@@ -68,6 +68,7 @@ def test_every_scenario_tells_its_reader_what_it_is(header: Header):
         "recorded",
         "papers",
         "robustness",
+        "coloured",
     }
     assert scenario.track in tracks | {"training"}
     assert scenario.training == header.training == (scenario.track == "training")

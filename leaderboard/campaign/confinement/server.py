@@ -24,12 +24,12 @@ import subprocess
 import sys
 import tempfile
 import time
-from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Any
 
 from simnav.kinds import INSTRUMENTS
 from simnav.leaderboard.results.scratch import scratch
+from simnav.plugins import entry_points
 
 from . import privileges, seccomp
 from .estimator_process import LIBRARIES, live
@@ -103,7 +103,7 @@ def _load_kernels() -> None:
     discover_own()
     importlib.import_module("simnav.leaderboard.campaign.entrant")  # or each estimator process would
     importlib.import_module("numpy.random")
-    if all(point.value == INSTRUMENTS.home for point in entry_points(group=INSTRUMENTS.group)):  # no code of others
+    if all(point.value == INSTRUMENTS.home for point in entry_points(INSTRUMENTS.group)):  # no code of others
         INSTRUMENTS.discover()  # to look for them takes 7 ms
     source, target = os.environ.pop(COPY_FROM, ""), cache_directory()
     if source and target is not None and "kernels" in sys.argv[2:]:

@@ -54,7 +54,7 @@ _START = 900.0  # for a server to be ready; on a slow and busy machine compiling
 _END = 20.0  # for a server to look after what is left of an estimator process [s]
 _PIECE = 1 << 16
 _TICK = 1000.0  # the longest wait between two looks at the clock [ms]
-_STALL = 50.0  # of a step, or of all since answers were last judged: then they are judged before the next [ms]
+_LONGEST_HELD = 50.0  # of a step, or of all since answers were last judged: then they are judged before the next [ms]
 _STEPS = 64  # whose answers are judged together at most
 _BYTES = 1 << 20  # of answers that are judged together
 _STATE = 160  # bytes of a smoothed state, and as much again
@@ -419,7 +419,7 @@ class RemoteSession:
                     sent = 0
                 except OSError:
                     raise self._gone() from None
-                if sent != len(packet) or not ready(_STALL):
+                if sent != len(packet) or not ready(_LONGEST_HELD):
                     self._silent = True
                     log.settle()
                     self._send(packet[sent:])
@@ -436,7 +436,7 @@ class RemoteSession:
                     self._refuse(reply)
                 put(reply, now - started)
                 held += len(reply)
-                if held > _BYTES or now - began > _STALL / 1e3:
+                if held > _BYTES or now - began > _LONGEST_HELD / 1e3:
                     log.settle()
                     self._check_time()
                     began, held = now, 0

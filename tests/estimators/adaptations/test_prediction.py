@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -15,10 +13,12 @@ from simnav.estimators.adaptations.prediction import PredictionTest
 from simnav.estimators.adaptations.sage_husa import SageHusa
 from simnav.estimators.adaptations.variational_bayes import VariationalBayes
 from simnav.estimators.algebra.chi_square import normal_quantile
-from simnav.scenario import parse
+from simnav.estimators.models.roles import witnesses
+from simnav.scenario import load
 from simnav.scoring import score
 from simnav.source import record
 from simnav.trial import run_trial
+from simnav.types import KINDS as ERRORS
 from simnav.types import Datasheet, ImuDatasheet, Instruments, Measurement, TriadDatasheet
 
 SHEETS = (
@@ -27,7 +27,6 @@ SHEETS = (
 )
 IMU = ImuDatasheet(100.0, TriadDatasheet(), TriadDatasheet())
 KINDS = {"gnss": "gnss_position", "dvl": "dvl"}
-CASES = Path(__file__).parents[2] / "cases"
 S99 = normal_quantile(0.99)
 
 
@@ -125,11 +124,44 @@ def test_a_white_noise_without_a_witness_is_that_of_the_fixes():
     assert np.mean(judged(True, lambda k: noise[k], lambda k: noise[k], dvl_until=3.0)[15:]) < 0.2
 
 
-def test_an_innovation_that_no_imu_explains_is_not_that_of_the_prediction():
-    """Nor is any without an IMU."""
+def test_without_a_witness_an_error_of_any_size_is_that_of_the_prediction():
+    """A disturbed gyroscope makes errors of any size. Without an IMU the test is not made."""
     off = 30.0 * np.ones(3)
-    assert not any(judged(True, lambda k: off, lambda k: off, dvl_until=-1.0, predicted=1e-3))
+    assert all(judged(True, lambda k: off, lambda k: off, dvl_until=-1.0, predicted=1e-3)[15:])
     assert not any(judged(False, lambda k: off, lambda k: off, dvl_until=-1.0))
+
+
+def depth_judged(with_dvl: bool) -> list[bool]:
+    """The verdicts on 30 depths that are wrong by five sigma, with or without a sound DVL beside them."""
+    sheet = Datasheet("depth", "depth", 1.0, np.ones(1))
+    test = PredictionTest(Instruments((*SHEETS, sheet), IMU))
+    rng, found = np.random.default_rng(6), []
+    for k in range(30):
+        if with_dvl:
+            test.fails(given(rng.standard_normal(3), k, "dvl"))
+        m = Measurement(k + 0.5, "depth", "depth", np.zeros(1))
+        found.append(test.fails(Innovation(m, np.array([5.0]), 0.5 * np.eye(1), np.eye(1))))
+    return found
+
+
+def test_a_depth_sensor_is_believed_unless_a_dvl_is_a_witness():
+    """Before, a depth sensor beside a wrong accelerometer lost its weight, and the height was left to the IMU."""
+    assert all(depth_judged(with_dvl=False)[15:])
+    assert not any(depth_judged(with_dvl=True))
+
+
+def test_who_notices_whom():
+    kinds = {
+        "gnss": "gnss_position", "usbl": "terrain_fix", "dvl": "dvl", "log": "speed_log", "depth": "depth",
+        "compass": "gyrocompass",
+    }  # fmt: skip
+    found = witnesses(
+        Instruments(tuple(Datasheet(n, k, 1.0, np.ones(len(ERRORS[k].errors))) for n, k in kinds.items()))
+    )
+    assert found["gnss"] == found["usbl"] == ("dvl", "log")
+    assert found["dvl"] == found["log"] == ("gnss", "usbl")
+    assert found["depth"] == ("gnss", "dvl")
+    assert "compass" not in found
 
 
 @pytest.mark.parametrize("adaptation", [InnovationBased(), FixedWindow(), VariationalBayes(), SageHusa()])
@@ -154,7 +186,7 @@ def voyages():
     """A lone DVL and one second of a disturbed gyroscope; GNSS as the only aid, with an IMU eight times too noisy."""
     found = {}
     for name, seed in (("lone-dvl", 4), ("sole-gnss", 4)):
-        recording = record(parse((CASES / f"{name}.toml").read_text(encoding="utf-8")), seed)
+        recording = record(load(name), seed)
         found[name] = recording, error(recording, "ekf")
     return found
 

@@ -144,8 +144,9 @@ def test_every_solver_works_with_it_and_they_agree(model, plugins, text, near):
         "points": SigmaPointEstimator(model()),
         "window": WindowEstimator(model()),
         "folded": WindowEstimator(model(), window=5, spacing=2.5),
-        "full": FullGraph(model()),
     }
+    if text == PLAIN:  # with the delay it takes ten seconds
+        solvers["full"] = FullGraph(model())
     trials = {name: run_trial(solver, recording) for name, solver in solvers.items()}
     assert {t.status for t in trials.values()} == {"ok"}, {n: t.reason for n, t in trials.items()}
     smoothed = {
@@ -162,7 +163,8 @@ def test_every_solver_works_with_it_and_they_agree(model, plugins, text, near):
     assert rmse["folded"] == pytest.approx(rmse["ekf"], rel=0.2), rmse
     assert rmse["ekf"] < 1.5, rmse  # a fix has 2 m, and may be 0.5 s times 6 m/s late
     assert rmse["smoother"] < 0.9 * rmse["ekf"], rmse
-    assert rmse["full"] == pytest.approx(rmse["smoother"], rel=5.0 * near), rmse
+    if "full" in rmse:
+        assert rmse["full"] == pytest.approx(rmse["smoother"], rel=0.1), rmse
     truth = true_blocks(scenario, 1, trials["ekf"].time).get("fix.delay")
     for trial in trials.values() if truth is not None else ():
         z = (trial.diagnostics["state.fix.delay"] - truth)[-1] / trial.diagnostics["sigma.fix.delay"][-1]

@@ -16,10 +16,10 @@ import simnav
 from simnav.leaderboard.cli.application import app
 from simnav.leaderboard.ranking import stored_robustness
 from simnav.leaderboard.ranking.ranking import rank
-from simnav.leaderboard.ranking.runs import group
+from simnav.leaderboard.ranking.ranking_table import track_table
 from simnav.leaderboard.ranking.stored_robustness import Profile, ProfilePoint, profile_of, read, save
 from simnav.leaderboard.results.errors import RequestError
-from simnav.leaderboard.site.datasheets import COLUMN, cells, profile_charts, version_of
+from simnav.leaderboard.site.datasheets import COLUMN, cells, profile_charts
 from simnav.leaderboard.sweep import datasheets
 from simnav.leaderboard.sweep.datasheets import bases, checked_factors, profiles, settings
 from simnav.source import record
@@ -153,16 +153,28 @@ def test_a_file_that_is_none_is_named(tmp_path: Path, change, message):
 def test_boards_show_the_profile_of_the_same_version_only(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(stored_robustness, "stored", lambda: (ROW,))
     results = campaign({"one-v1": {"oracle": 1.0, "ekf": 2.0, "sw-fgo": 1.5}}, seeds=12)
-    runs = group(results)
-    assert version_of("sw-fgo", runs.values()) == 1
-    (track, *_) = rank(results).tracks
-    assert cells(track, runs)["sw-fgo"]["value"] == 3.25
-    assert "imu, datasheet 4 times the truth; 4 seeds" in cells(track, runs)["sw-fgo"]["help"]
+    ranking = rank(results)
+    (track, *_) = ranking.tracks
+    assert {r.version for r in track.rows} == {1}
+    assert cells(track).keys() == {"sw-fgo"}
+    assert cells(track)["sw-fgo"]["value"] == 3.25
+    assert "imu, datasheet 4 times the truth; 4 seeds" in cells(track)["sw-fgo"]["help"]
+    exported = {r["estimator"]: r["wrong_datasheet"] for r in ranking.to_dict()["tracks"][0]["rows"]}
+    assert exported["ekf"] is None
+    assert (exported["sw-fgo"]["ratio"], exported["sw-fgo"]["instrument"], exported["sw-fgo"]["factor"]) == (
+        3.25, "imu", 4.0
+    )  # fmt: skip
+    table = track_table(track)
+    column = table.columns.index("wrong datasheet")
+    assert {row[table.columns.index("estimator")]: row[column] for row in table.rows}["sw-fgo"] == "3.25"
     (chart,) = profile_charts("sw-fgo", 1)
     assert chart.data["points"]["ratio"] == [1.1, 1.0, 1.4, 0.9, 1.0, 3.25]
     assert COLUMN.key == "datasheet"
-    newer = group([replace(r, estimator_version=2) for r in results])
-    assert cells(track, newer) == {}
+    newer = rank([replace(r, estimator_version=2) for r in results])
+    assert cells(newer.tracks[0]) == {}
+    assert all(r["wrong_datasheet"] is None for r in newer.to_dict()["tracks"][0]["rows"])
+    mixed = rank([replace(r, estimator_version=1 + r.seed % 2) for r in results])
+    assert {r.version for r in mixed.tracks[0].rows} == {None}
     assert profile_charts("sw-fgo", 2) == []
     assert profile_of("sw-fgo", 1, "ship-ekf", "horizontal_rmse") is None
     assert profile_of("sw-fgo", 1, "ekf or ship-ekf", "horizontal_rmse") == ROW

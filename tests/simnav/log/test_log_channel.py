@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from simnav.log.channel import geodetic_from_local, list_recordings, read_channel, read_imu
+from simnav.log.channel import geodetic_from_local, list_recordings, read_channel
+from simnav.log.imu_series import read_imu
 from simnav.log.spec import ChannelSpec, OriginSpec, RecordedSpec
 from simnav.log.table import LogError, LogWarning
 from simnav.plugins import load_plugin
@@ -66,7 +67,7 @@ def test_offsets_by_recording(tiny):
     channel = ChannelSpec(file="dvl", columns=(2, 3, 4))
     assert read_channel(log(tiny), channel, "dvl", "2").time[0] == pytest.approx(4999.5)
     tiny.replace("[0.25, -0.5]", "[0.25, -0.5, 0.1]")
-    with pytest.raises(LogError, match=r"3 offsets for 2 recordings \(1, 2\); give one, or one for each"):
+    with pytest.raises(LogError, match=r"3 values for 2 recordings \(1, 2\); give one, or one for each"):
         read_channel(log(tiny), channel, "dvl", "2")
 
 
@@ -160,13 +161,22 @@ def test_bad_imu_mappings(tiny, old, new, message):
 
 
 def test_a_hole_in_the_imu(tiny):
+    """A short one is bridged and counted; the message on a long one names the key."""
     for _ in range(8):
         tiny.edit("imu1.csv", 101, None)
     spec = log(tiny)
-    with pytest.raises(LogError, match=r"imu1\.csv, line 101: 0\.180 s without the IMU"):
+    with pytest.warns(LogWarning, match=r"1 holes, together 0\.18 s, .* before line 101.*max_gap_s of \[log.imu\]"):
+        assert len(read_imu(spec, spec.imu, "1").mean) == 2000 - 8
+    spec = log(tiny.replace('samples = "means"', 'samples = "means"\nmax_gap_s = 0.15'))
+    with pytest.raises(LogError, match=r"line 101: 0\.180 s without the IMU, where 0\.15 s .*\(max_gap_s of \[log"):
         read_imu(spec, spec.imu, "1")
-    spec = log(tiny.replace('samples = "means"', 'samples = "means"\nmax_gap_s = 0.2'))
-    assert len(read_imu(spec, spec.imu, "1").mean) == 2000 - 8
+
+
+def test_an_imu_with_samples_every_second(tiny):
+    for name in ("imu1.csv",):
+        lines = (tiny.folder / name).read_text().splitlines()
+        (tiny.folder / name).write_text("\n".join([lines[0], *lines[1::75]]) + "\n")  # every 1.5 s
+    assert len(read_imu(log(tiny), log(tiny).imu, "1").mean) == 27
 
 
 def test_a_missing_imu_value(tiny):

@@ -195,6 +195,22 @@ GOOD = {
     "DPT": "20.5,1.2",
     "PSXN,23": "0.35,-1.74,218.26,0.58",
     "PUHAW,UVH": "-5.0,0.0,270.0",
+    "GNS": "000000.25,2230.0000,S,01745.6000,W,AAN,12,0.9,33.6,-2.6,,",
+    "GST": "000000.25,1.1,0.8,0.6,45.0,0.7,0.65,1.2",
+    "HDG": "98.3,0.5,E,12.6,W",
+    "HDM": "98.3,M",
+    "ROT": "-3.5,A",
+    "DBT": "36.4,f,11.1,M,6.0,F",
+    "MTW": "12.5,C",
+    "PASHR": "000000.25,218.5,T,0.35,-1.74,0.58,0.02,0.02,0.1,2,1",
+    "PRDID": "-1.74,0.35,218.26",
+    "PNORBT6": "TIME=1452244916.7508,DT1=1.234,DT2=-1.234,VX=0.5,VY=-0.1,VZ=0.02,FOM=0.004,"
+    "D1=23.45,D2=23.4,D3=23.5,D4=23.6",
+    "PNORBT7": "1452244916.7508,1.234,-1.234,0.5,-0.1,0.02,0.004,23.45,23.4,23.5,23.6",
+    "PNORBT8": "TIME=1452244916.7508,DT1=1.234,DT2=-1.234,VX=0.5,VY=-0.1,VZ=0.02,FOM=0.004,"
+    "D1=23.45,D2=23.4,D3=23.5,D4=23.6,BATT=23.4,SS=1500.0,PRESS=1.2,TEMP=12.3,STAT=0x000FFFFF",
+    "PNORBT9": "1452244916.7508,1.234,-1.234,0.5,-0.1,0.02,0.004,23.45,23.4,23.5,23.6,23.4,1500.0,1.2,12.3,0x000FFFFF",
+    "PSIMSSB": "000000.25,M23,A,,C,H,M,-100.10,50.50,200.20,1.436,N,,",
 }
 #: What Python reads as a number, or fails on, and no instrument sends.
 STRANGE = ("inf", "-inf", "Infinity", "nan", "1e400", "1e5", "1_0", "\xb2", "0x10", "9" * 5000, "--1", ".")
@@ -222,5 +238,37 @@ def test_no_strange_number_is_taken_or_stops_the_reading(tmp_path, sentence):
             if len(table) == 1:
                 refused += bool(said)
             for column, values in table.columns.items():
+                if values.dtype == object:
+                    continue  # a name: any text
                 assert values[-1] == pytest.approx(expected[column], nan_ok=True), (column, strange)
     assert refused >= len(STRANGE)  # at least one field of each type is a number
+
+
+def test_a_magnetic_heading_becomes_true_by_the_last_variation(tmp_path):
+    place = "2230.0000,S,01745.6000,W"
+    path = write(
+        tmp_path / "log",
+        "$HCHDM,100.0,M",  # nothing is known yet
+        f"$GPRMC,000000.25,A,{place},10.0,210.0,010814,12.5,W,A",
+        "$HCHDM,100.0,M",
+        "$HCHDG,101.0,1.0,W,10.0,E",
+        "$HCHDG,101.0,,,,",
+    )
+    hdm = read_nmea(path).table("HDM").columns
+    assert np.isnan(hdm["heading"][0])
+    assert np.degrees(hdm["heading"][1]) == pytest.approx(87.5)
+    assert np.degrees(read_nmea(path).table("HDG").columns["heading"]) == pytest.approx([110.0, 111.0])
+
+
+def test_a_usbl_fix_has_the_axes_that_it_says(tmp_path):
+    path = write(
+        tmp_path / "log",
+        "$PSIMSSB,000000.25,M23,A,,C,H,M,-100.0,50.0,200.0,1.4,N,,",
+        "$PSIMSSB,000001.25,M23,A,,C,E,M,-100.0,50.0,200.0,1.4,N,,*",
+        "$PSIMSSB,000002.25,M23,V,,C,H,M,-100.0,50.0,200.0,1.4,N,,",
+    )
+    found = read_nmea(path).table("PSIMSSB").columns
+    assert [found[n][0] for n in ("forward", "starboard", "depth")] == [50.0, -100.0, 200.0]
+    assert [found[n][1] for n in ("north", "east")] == [100.0, 50.0]
+    assert len(found["depth"]) == 2
+    assert list(found["transponder"]) == ["M23", "M23"]

@@ -11,7 +11,8 @@ import pytest
 from simnav.geometry.earth import relative_position
 from simnav.geometry.rotation import dcm_from_rpy, rotation_vector_from_dcm
 from simnav.log import LogSource, LogWarning
-from simnav.log.channel import read_channel, read_imu
+from simnav.log.channel import read_channel
+from simnav.log.imu_series import read_imu
 from simnav.log.nmea import read_nmea
 from simnav.log.reference import Reference
 from simnav.scenario import load
@@ -86,7 +87,7 @@ def test_what_is_simulated_is_said():
 
 @needs_nbp1406
 def test_the_ship():
-    with pytest.warns(LogWarning, match="2 sentences at the time of the one before"):
+    with pytest.warns(LogWarning, match="2 of 5000 rows at the time of the one before"):
         source = LogSource(load("ship-nbp1406"), 0)
     block = source.advance(source.duration)
     assert block.imu is None

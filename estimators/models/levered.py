@@ -1,0 +1,122 @@
+"""Instruments with a compiled measurement equation of which the lever arm is not known well.
+
+Their datasheet brings a block of states ``lever_arm`` along (`simnav.sensors.AidSpec.blocks`). The compiled loops have
+no place for it. So here the equation is a function with states, like that of a kind of somebody else
+(`simnav.estimators.models.own_observation`). The scale factor and the misalignment become blocks, too.
+
+With position p, velocity v, direction cosine matrix C, lever arm l and body rate w relative to the Earth, the
+derivatives by the error of the lever arm are (Groves 2013, section 14.3): ``C`` for a position, ``C [w x]`` for a
+velocity north-east-down, ``[w x]`` for one in body axes, and the last row of ``C`` for a depth.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from simnav import kinds
+from simnav.blocks import LEVER_ARM, NAVIGATION
+from simnav.kinds import NavigationPoint, Observation
+from simnav.types import KINDS, Array, Datasheet, Instruments
+
+from .declared_errors import errors_of
+from .equations import equation_of
+
+__all__ = ["is_own", "observation_of", "with_lever_arms"]
+
+
+def is_own(sheet: Datasheet) -> bool:
+    """Whether an instrument is observed by a function, and not by a compiled equation."""
+    return KINDS[sheet.kind].observation is not None or _is_levered(sheet)
+
+
+def observation_of(sheet: Datasheet) -> Observation | None:
+    """The function that predicts the reading of an instrument; None if its equation is compiled, or there is none."""
+    return _observe if _is_levered(sheet) else KINDS[sheet.kind].observation
+
+
+def _is_levered(sheet: Datasheet) -> bool:
+    return KINDS[sheet.kind].observation is None and any(block.name == LEVER_ARM for block in sheet.blocks)
+
+
+def with_lever_arms(instruments: Instruments) -> Instruments:
+    """The datasheets, with scale factor and misalignment as blocks where the lever arm is one."""
+    if not any(_is_levered(sheet) for sheet in instruments.values()):
+        return instruments
+    sheets = [_with_blocks(sheet) if _is_levered(sheet) else sheet for sheet in instruments.values()]
+    return Instruments(sheets, instruments.imu, instruments.step)
+
+
+def _with_blocks(sheet: Datasheet) -> Datasheet:
+    errors = errors_of(sheet)
+    more = [block for name in ("scale", "misalignment") if name in errors for block in errors[name].processes]
+    return replace(sheet, blocks=(*sheet.blocks, *more), scale=0.0, misalignment=np.zeros(3))
+
+
+def _observe(point: NavigationPoint, sheet: Datasheet) -> tuple[Array, Mapping[str, Array]] | None:
+    """The reading and its Jacobian by block."""
+    equation, errors = equation_of(sheet), point.blocks
+    arm = sheet.lever_arm + errors[LEVER_ARM]
+    reading = equation.read(point, sheet, errors)
+    if reading is None:
+        return None
+    navigation, by_arm = _DERIVATIVES[sheet.equation](point, arm)
+    blocks = {NAVIGATION: navigation, LEVER_ARM: by_arm}
+    known = sum(block.size for block in sheet.blocks if block.name in ("scale", "misalignment"))
+    if known:
+        bare = equation.read(point, sheet, {LEVER_ARM: errors[LEVER_ARM]})
+        assert bare is not None, "it has a reading with its other errors"
+        if "scale" in errors:
+            blocks["scale"] = bare[:, None]
+        if "misalignment" in errors:
+            blocks["misalignment"] = _across(bare)
+    return reading, blocks
+
+
+def _across(vector: Array) -> Array:
+    """``[vector x]``."""
+    x, y, z = vector.tolist()
+    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+
+
+def _position(point: NavigationPoint, arm: Array) -> tuple[Array, Array]:
+    jacobian = np.zeros((3, 9))
+    jacobian[:, :3] = np.eye(3)
+    jacobian[:, 6:] = -_across(point.dcm @ arm)
+    return jacobian, point.dcm
+
+
+def _horizontal_position(point: NavigationPoint, arm: Array) -> tuple[Array, Array]:
+    jacobian, by_arm = _position(point, arm)
+    return jacobian[:2], by_arm[:2]
+
+
+def _depth(point: NavigationPoint, arm: Array) -> tuple[Array, Array]:
+    jacobian, by_arm = _position(point, arm)
+    return jacobian[2:], by_arm[2:]
+
+
+def _velocity(point: NavigationPoint, arm: Array) -> tuple[Array, Array]:
+    jacobian, turning = np.zeros((3, 9)), _across(point.angular_rate)
+    jacobian[:, 3:6] = np.eye(3)
+    jacobian[:, 6:] = -_across(point.dcm @ (turning @ arm))
+    return jacobian, point.dcm @ turning
+
+
+def _body_velocity(point: NavigationPoint, arm: Array) -> tuple[Array, Array]:
+    jacobian, to_body = np.zeros((3, 9)), point.dcm.T
+    jacobian[:, 3:6] = to_body
+    jacobian[:, 6:] = to_body @ _across(point.velocity)
+    return jacobian, _across(point.angular_rate)
+
+
+#: The Jacobians of a reading without scale factor and misalignment, which change them in second order only.
+_DERIVATIVES: Mapping[str, Callable[[NavigationPoint, Array], tuple[Array, Array]]] = {
+    kinds.POSITION: _position,
+    kinds.HORIZONTAL_POSITION: _horizontal_position,
+    kinds.VELOCITY: _velocity,
+    kinds.BODY_VELOCITY: _body_velocity,
+    kinds.DEPTH: _depth,
+}
