@@ -72,9 +72,9 @@ class InvariantEkf(Row, solver=InvariantKalmanEstimator, model=InertialModel):
 class Kf(Row, solver=LinearKalmanEstimator, model=InertialModel):
     """Linear 15-state error-state KF, open loop: free inertial navigation, corrected by its estimated error.
 
-    The states of ``ekf``. It leaves its linear range where free inertial navigation does, and does not notice it: of 258
-    runs of the board with more than ten times the error of ``ekf``, 30 % have neither a covariance nor a status that
-    admits it (``python -m tests.audit silence``).
+    The states of ``ekf``. It leaves its linear range where free inertial navigation does, and does not notice it: of
+    258 runs of the board with more than ten times the error of ``ekf``, 30 % have neither a covariance nor a status
+    that admits it (``python -m tests.audit silence``).
 
     Source: P. S. Maybeck, *Stochastic Models, Estimation, and Control*, vol. 1, 1979.
     """
@@ -126,8 +126,8 @@ class GnssOnly(Row, solver=KalmanEstimator, model=KinematicModel):
     """GNSS alone: fixes (and velocities, if any) smoothed by a constant-velocity Kalman filter.
 
     Between fixes and in an outage the ship goes on as she went. It does not notice a turn there: of 240 runs of the
-    board with more than ten times the error of ``ekf``, 4 % do not admit it. Source: Y. Bar-Shalom, X. R. Li and T. Kirubarajan,
-    *Estimation with Applications to Tracking and Navigation*, 2001, section 6.2.
+    board with more than ten times the error of ``ekf``, 4 % do not admit it. Source: Y. Bar-Shalom, X. R. Li and T.
+    Kirubarajan, *Estimation with Applications to Tracking and Navigation*, 2001, section 6.2.
     """
 
 
