@@ -79,6 +79,10 @@ class SageHusaPaper(
 class Iae(_Adaptive, adaptation=piece(InnovationBased, source="innovation")):
     """Innovation-based adaptive estimation of the measurement noise over a window that adapts its length.
 
+    Beside an IMU that is poorer than its datasheet, 1 of 39 voyages (``training-poor-imu``) had more than 1.5 times the
+    error of ``ekf``, 6.8 times at most: where a slow log is left alone, what it says in the first seconds of a
+    disturbance gets no weight.
+
     Source: G. Mao, K. Wang, T. Fu, *Robust GNSS/INS integrated navigation algorithm based on adaptive factor graph
     optimization*, 2025, eqs. 16-20.
 
@@ -142,6 +146,10 @@ class Rae(_Adaptive, adaptation=piece(FixedWindow, source="residual", newest=Fal
 class Adkf(_Adaptive, adaptation=AdaptiveFactor):
     """Adaptive robust filter: R or P over a factor that falls with a statistic of the innovation.
 
+    Beside an IMU that is poorer than its datasheet, 3 of 39 voyages (``training-poor-imu``) had more than 1.5 times the
+    error of ``ekf``, 6.5 times at most: where a slow log is left alone, what it says in the first seconds of a
+    disturbance gets no weight.
+
     Source: Z. Zhan, C. Liu, K. Jin et al., *GNSS/SINS/DVL integrated navigation algorithm based on adaptive
     differential Kalman filtering*, PLoS One 21(2), 2026.
 
@@ -181,6 +189,10 @@ class Adkf23(Row, solver=KalmanEstimator, model=DvlCalibrationModel, adaptation=
 @register("igg3")
 class Igg3(_Adaptive, adaptation=Igg3Weights):
     """IGG-III equivalent weights: full weight up to k0 sigma, almost none from k1 sigma on.
+
+    Beside an IMU that is poorer than its datasheet, 2 of 39 voyages (``training-poor-imu``) had more than 1.5 times the
+    error of ``ekf``, 6.3 times at most: where a slow log is left alone, what it says in the first seconds of a
+    disturbance gets no weight.
 
     Source: Y. Yang, L. Song and T. Xu, *Robust estimator for correlated observations based on bifactor equivalent
     weights*, J. Geodesy 76, 2002.
@@ -223,6 +235,10 @@ class HuberKf(_Adaptive, adaptation=HuberWeights):
 class GatedEkf(_Adaptive, adaptation=ChiSquareGate):
     """Chi-square gating: measurements that fail the test are left out; a filter that fails for long is doubted.
 
+    Beside an IMU that is poorer than its datasheet, 3 of 39 voyages (``training-poor-imu``) had more than 1.5 times the
+    error of ``ekf``, 4.0 times at most: where a slow log is left alone, what it says in the first seconds of a
+    disturbance gets no weight.
+
     Source: Y. Bar-Shalom, X. R. Li and T. Kirubarajan, *Estimation with Applications to Tracking and Navigation*, 2001,
     section 5.4.
 
@@ -251,6 +267,10 @@ class FadingEkf(_Adaptive, adaptation=FadingMemory):
 @register("vb-akf")
 class VbAkf(_Adaptive, adaptation=VariationalBayes):
     """Variational-Bayes adaptive filter: state and noise variances estimated together.
+
+    Beside an IMU that is poorer than its datasheet, 4 of 39 voyages (``training-poor-imu``) had more than 1.5 times the
+    error of ``ekf``, 8.5 times at most: where a slow log is left alone, what it says in the first seconds of a
+    disturbance gets no weight.
 
     Source: S. Särkkä and A. Nummenmaa, *Recursive noise adaptive Kalman filtering by variational Bayesian
     approximations*, IEEE TAC 54(3), 2009.
@@ -292,6 +312,10 @@ class Mckf(_Adaptive, adaptation=piece(MaximumCorrentropy, smallest=1e-3)):
 @register("imm")
 class Imm(Row, solver=ImmEstimator, model=Suitable):
     """Interacting multiple models: the noise of each instrument jumps between levels.
+
+    Beside an IMU that is poorer than its datasheet, 5 of 39 voyages (``training-poor-imu``) had more than 1.5 times the
+    error of ``ekf``, 8.1 times at most: where a slow log is left alone, what it says in the first seconds of a
+    disturbance gets no weight.
 
     Source: H. A. P. Blom and Y. Bar-Shalom, *The interacting multiple model algorithm for systems with Markovian
     switching coefficients*, IEEE TAC 33(8), 1988.
