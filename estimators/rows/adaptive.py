@@ -46,7 +46,6 @@ class SageHusaKf(_Adaptive, adaptation=SageHusa):
     3
         A lasting error is blamed on an instrument only by a witness, whatever its size. Before, one that an IMU of 20
         times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
-        Fixes that see no error of a log at first may see it later.
     """
 
     version = 3
@@ -69,7 +68,6 @@ class SageHusaPaper(
     3
         A lasting error is blamed on an instrument only by a witness, whatever its size. Before, one that an IMU of 20
         times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
-        Fixes that see no error of a log at first may see it later.
     """
 
     version = 3
@@ -94,7 +92,6 @@ class Iae(_Adaptive, adaptation=piece(InnovationBased, source="innovation")):
     3
         A lasting error is blamed on an instrument only by a witness, whatever its size. Before, one that an IMU of 20
         times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
-        Fixes that see no error of a log at first may see it later.
     """
 
     version = 3
@@ -114,7 +111,6 @@ class IaeFixed(_Adaptive, adaptation=piece(FixedWindow, source="innovation")):
     3
         A lasting error is blamed on an instrument only by a witness, whatever its size. Before, one that an IMU of 20
         times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
-        Fixes that see no error of a log at first may see it later.
     """
 
     version = 3
@@ -135,7 +131,6 @@ class Rae(_Adaptive, adaptation=piece(FixedWindow, source="residual", newest=Fal
     3
         A lasting error is blamed on an instrument only by a witness, whatever its size. Before, one that an IMU of 20
         times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
-        Fixes that see no error of a log at first may see it later.
     """
 
     version = 3
@@ -161,7 +156,6 @@ class Adkf(_Adaptive, adaptation=AdaptiveFactor):
     3
         A lasting error is blamed on an instrument only by a witness, whatever its size. Before, one that an IMU of 20
         times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
-        Fixes that see no error of a log at first may see it later.
     """
 
     version = 3
@@ -205,7 +199,6 @@ class Igg3(_Adaptive, adaptation=Igg3Weights):
     3
         A lasting error is blamed on an instrument only by a witness, whatever its size. Before, one that an IMU of 20
         times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
-        Fixes that see no error of a log at first may see it later.
     """
 
     version = 3
@@ -225,7 +218,6 @@ class HuberKf(_Adaptive, adaptation=HuberWeights):
     3
         A lasting error is blamed on an instrument only by a witness, whatever its size. Before, one that an IMU of 20
         times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
-        Fixes that see no error of a log at first may see it later.
     """
 
     version = 3
@@ -250,7 +242,6 @@ class GatedEkf(_Adaptive, adaptation=ChiSquareGate):
     3
         A lasting error is blamed on an instrument only by a witness, whatever its size. Before, one that an IMU of 20
         times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
-        Fixes that see no error of a log at first may see it later.
     """
 
     version = 3
@@ -283,7 +274,6 @@ class VbAkf(_Adaptive, adaptation=VariationalBayes):
     3
         A lasting error is blamed on an instrument only by a witness, whatever its size. Before, one that an IMU of 20
         times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
-        Fixes that see no error of a log at first may see it later.
     """
 
     version = 3
@@ -303,7 +293,6 @@ class Mckf(_Adaptive, adaptation=piece(MaximumCorrentropy, smallest=1e-3)):
     3
         A lasting error is blamed on an instrument only by a witness, whatever its size. Before, one that an IMU of 20
         times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
-        Fixes that see no error of a log at first may see it later.
     """
 
     version = 3
@@ -328,7 +317,6 @@ class Imm(Row, solver=ImmEstimator, model=Suitable):
     3
         A lasting error is blamed on an instrument only by a witness, whatever its size. Before, one that an IMU of 20
         times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
-        Fixes that see no error of a log at first may see it later.
     """
 
     version = 3
