@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from simnav.scenario import Scenario
 
 __all__ = [
+    "AlignRequest",
     "AllanRequest",
     "BenchRequest",
     "BoundRequest",
@@ -31,6 +32,7 @@ __all__ = [
     "CostsRequest",
     "EvaluateRequest",
     "ExportRequest",
+    "InspectRequest",
     "MergeRequest",
     "RankRequest",
     "RealismRequest",
@@ -42,6 +44,7 @@ __all__ = [
     "ScoreRequest",
     "SealRequest",
     "SweepRequest",
+    "TuneNoiseRequest",
     "TuneRequest",
     "VerifyRequest",
 ]
@@ -111,6 +114,33 @@ class ExportRequest:
         help="Neither truth, nor labels, nor seeds: for estimates that 'campaign --external' ranks; with --sealed.",
     )
     sealed: PathLike | None = option("--sealed", default=None, metavar="KEYFILE", help=_SEALED_RUNS)
+
+
+@request
+class AlignRequest:
+    """Compare every instrument of a log with the reference: delay, lever arm, offset, scale, each with its sigma."""
+
+    scenario: ScenarioLike = option(help=_SCENARIO, more=_SCENARIO_MORE, argument=True, metavar="SCENARIO")
+    seed: int = option(default=0, help="Number of the recording.", least=0)
+
+
+@request
+class TuneNoiseRequest:
+    """Propose noise figures for the datasheets of a log, from its reference and the stillest stretches of its IMU."""
+
+    scenario: ScenarioLike = option(help=_SCENARIO, more=_SCENARIO_MORE, argument=True, metavar="SCENARIO")
+    seed: int = option(default=0, help="Number of the recording.", least=0)
+
+
+@request
+class InspectRequest:
+    """Show what the files of a log hold, and write a scenario to begin with."""
+
+    files: Iterable[PathLike] = option(help="Files or folders.", argument=True, metavar="FILES", cli=list[Path])
+    _: KW_ONLY
+    output: PathLike | None = option(
+        "--output", "-o", default=None, help="Write a scenario to begin with to this TOML file."
+    )
 
 
 @request

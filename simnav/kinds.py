@@ -17,6 +17,7 @@ from types import MappingProxyType
 from typing import Any, Literal, NamedTuple, get_args
 
 import numpy as np
+from numpy.typing import NDArray
 
 from simnav.blocks import StateBlock
 from simnav.compiled import Array, kernel
@@ -41,7 +42,9 @@ __all__ = [
     "Datasheet",
     "Kind",
     "NavigationPoint",
+    "NavigationPoints",
     "Observation",
+    "Observations",
     "Role",
     "add_error_scalar",
     "geodetic_components",
@@ -114,6 +117,37 @@ class NavigationPoint(NamedTuple):
     side: Array = NO_SIDE
 
 
+class NavigationPoints(NamedTuple):
+    """The states at which n readings are predicted, an entry for each.
+
+    Attributes
+    ----------
+    time : (n,) array
+        Times of validity [s].
+    position, velocity : (n, 3) array
+        As of `NavigationPoint`.
+    dcm : (n, 3, 3) array
+        As of `NavigationPoint`.
+    angular_rate : (n, 3) array
+        As of `NavigationPoint`.
+    blocks : mapping of str to array
+        Values (n, k) of the states that the instrument brings along, by the name of their block.
+    channel : (n,) int array
+        Place of the channel in `Datasheet.channels`.
+    side : (n, s) array
+        Side information of the readings.
+    """
+
+    time: Array
+    position: Array
+    velocity: Array
+    dcm: Array
+    angular_rate: Array
+    blocks: Mapping[str, Array]
+    channel: NDArray[np.intp]
+    side: Array
+
+
 @kernel()
 def add_error_scalar(positions: int, cyclic: int, value: Array, error: Array) -> None:
     """Add an error to one measurement, in place. This is the compiled form of `Kind.add_error`.
@@ -154,6 +188,11 @@ def _add_errors(positions: int, cyclic: int, values: Array, errors: Array) -> No
 #: reading at the state.
 Observation = Callable[[NavigationPoint, "Datasheet"], "tuple[Array, Array | Mapping[str, Array]] | Array | None"]
 
+
+#: The same for n readings of channels at one time, which costs a window a small part of n calls: (n, d) readings, and
+#: their whole Jacobian by block, arrays of the shapes (n, d, 9) and (n, d, k). Each state has a reading.
+#: The `ReadingSigma` of such a kind also takes (n, s) side information, and returns (n, d).
+Observations = Callable[[NavigationPoints, "Datasheet"], tuple[Array, Mapping[str, Array]]]
 
 #: The standard deviation (d,) of the white noise of one reading, from its (s,) side information and the datasheet: for
 #: an instrument whose noise differs from reading to reading in a way that it knows, like that of a satellite with its
@@ -237,6 +276,8 @@ class Kind:
         without a unit); names differ from those of ``components``.
     reading_sigma : callable or None
         The sigma of a reading from its side information (`ReadingSigma`). None: it is that of the datasheet.
+    observations : callable or None
+        The equation for many readings at one time (`Observations`), for a kind whose equation is a function.
 
     Raises
     ------
@@ -254,6 +295,7 @@ class Kind:
     log_columns: tuple[str, ...] = ()
     side: tuple[Component, ...] = ()
     reading_sigma: ReadingSigma | None = None
+    observations: Observations | None = None
     _limits: tuple[float, ...] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -284,6 +326,8 @@ class Kind:
                 )
         if self.reading_sigma is not None and not callable(self.equation):
             raise PluginError("a kind with a reading_sigma has an equation of its own: a function, not a compiled one")
+        if self.observations is not None and not callable(self.equation):
+            raise PluginError("a kind with observations has an equation of its own: a function, not a compiled one")
         if self.geodetic and self.values[:2] != ("latitude", "longitude"):
             raise PluginError("the first components of a geodetic kind are latitude and longitude")
         # An angle equal to its limit is still plausible; another quantity equal to its limit is not.

@@ -13,7 +13,7 @@ from simnav.types import Array
 
 from .cholesky import factorise, solve_factor
 
-__all__ = ["joseph_update", "project"]
+__all__ = ["joseph_sequence", "joseph_update", "project"]
 
 
 @kernel("void(f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1])")
@@ -121,3 +121,46 @@ def joseph_update(
             covariance[r, c] = x
             covariance[c, r] = x
     return nis
+
+
+@kernel("void(f8[:, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, :, ::1], f8[::1], f8[::1], f8[::1])")
+def joseph_sequence(
+    covariance: Array, residual: Array, jacobian: Array, noise: Array, correction: Array, nis: Array, size: Array
+) -> None:
+    """Apply `joseph_update` with k independent measurements, one after the other, linearised at one state.
+
+    Parameters
+    ----------
+    covariance : (n, n) array
+        Covariance P of the state's error, updated.
+    residual : (k, m) array
+        The measurements minus their predictions at the state.
+    jacobian : (k, m, n) array
+        Jacobians H of the predictions.
+    noise : (k, m, m) array
+        Covariances R of the noise.
+    correction : (n,) array
+        Overwritten with the correction of the state by all of them.
+    nis, size : (k,) array
+        Overwritten with the normalised square of each innovation given those before it, -1 for a measurement that was
+        not used because its covariance is singular, and with its norm.
+    """
+    k, m, n = jacobian.shape
+    innovation, cross, predicted, step = np.empty(m), np.empty((n, m)), np.empty((m, m)), np.empty(n)
+    correction[:] = 0.0
+    for j in range(k):
+        squared = 0.0
+        for i in range(m):
+            x = residual[j, i]
+            for c in range(n):
+                x -= jacobian[j, i, c] * correction[c]
+            innovation[i] = x
+            squared += x * x
+        project(covariance, jacobian[j], cross, predicted)
+        for i in range(m):
+            for c in range(m):
+                predicted[i, c] += noise[j, i, c]
+        nis[j], size[j] = joseph_update(covariance, cross, predicted, innovation, step), np.sqrt(squared)
+        if nis[j] >= 0.0:
+            for c in range(n):
+                correction[c] += step[c]

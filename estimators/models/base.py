@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import ClassVar, NamedTuple
 
@@ -23,6 +23,7 @@ from simnav.types import (
     Measurement,
 )
 
+from .many_readings import ManyReadings
 from .own_observation import OwnObservation
 
 __all__ = ["ErrorModel", "Linearised", "Observation"]
@@ -70,11 +71,14 @@ class ErrorModel(ABC):
         Time of the state [s].
     own : mapping of str to OwnObservation
         The observed instruments whose kind has a measurement equation of its own.
+    many : sequence of ManyReadings
+        Of these, the instruments with channels whose kind can predict many readings at one time.
     """
 
     size: int
     time: float
     own: Mapping[str, OwnObservation] = MappingProxyType({})
+    many: Sequence[ManyReadings] = ()
     #: Whether `estimate` reports all states of instruments (`simnav.types.Estimate.states`), or only the blocks that
     #: instruments bring along.
     reports_all: bool = False
@@ -209,6 +213,26 @@ class ErrorModel(ABC):
         (float, float) or None
             Normalised innovation squared (-1 if nothing was changed), and the norm of the innovation. None if the
             model has no faster implementation than `innovate` and `absorb`.
+        """
+        return None
+
+    def assimilate_together(
+        self, measurements: Sequence[Measurement], covariance: Array, correction: Array
+    ) -> tuple[Array, Array] | None:
+        """Use measurements of one time, each with its nominal noise, linearised at the state before the first.
+
+        Parameters
+        ----------
+        measurements : sequence of Measurement
+            Readings of channels of one instrument (`many`).
+        covariance, correction
+            As of `assimilate`; the correction is that by all of them.
+
+        Returns
+        -------
+        nis, size : (k,) array
+            As of `assimilate`, each given the measurements before it. None in place of both where the measurements have
+            to be taken one by one.
         """
         return None
 

@@ -289,6 +289,7 @@ class Chain(ABC):
         self._sides = max((len(own.kind.side) for own in front.own.values()), default=0)
         if self._sides:
             self.aids.add(side=(self._sides,))
+        self._many = [(many, many.channels(self.names)) for many in front.many]
         self.folds = Columns(node=np.int64, time=(), transition=(n, n), noise=(n, n), shift=(n,), jacobian=(n, n))
         self.folds.add(**{name: getattr(front, name).shape for name in self._kept})
         self.folds.add(**{f"now_{name}": getattr(front, name).shape for name in front.state})
@@ -497,6 +498,18 @@ class Chain(ABC):
         """
         aids, own = self.aids, self.front.own
         of_its_own = np.array([name in own for name in self.names])
+        here, among = row[first:] >= 0, aids["instrument"][first:]
+        for many, channel in self._many:
+            if not len(rows := first + np.flatnonzero(here & (channel[among] >= 0))):
+                continue
+            of_its_own &= channel < 0
+            d, s = len(many.kind.components), len(many.kind.side)
+            aids["residual"][rows], jacobian[rows], aids["components"][rows] = 0.0, 0.0, d
+            aids["residual"][rows, :d], jacobian[rows, :d] = many.linearise(
+                aids["time"][rows], aids["value"][rows, :d], channel[aids["instrument"][rows]],
+                [column[row[rows]] for column in state], aids["side"][rows, :s],
+                jacobian.shape[2] - state[-1].shape[1],
+            )  # fmt: skip
         for i in first + np.flatnonzero(of_its_own[aids["instrument"][first:]] & (row[first:] >= 0)):
             name = self.names[aids["instrument"][i]]
             d = len(own[name].kind.components)

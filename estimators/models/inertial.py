@@ -42,6 +42,7 @@ from numpy.typing import NDArray
 from simnav.compiled import kernel
 from simnav.estimator import UnsuitableScenario
 from simnav.estimator.needs import AID, IMU, Needs
+from simnav.estimators.algebra.joseph import joseph_sequence
 from simnav.geometry.rotation import dcm_from_rpy
 from simnav.types import (
     KINDS,
@@ -61,6 +62,7 @@ from .declared_errors import CURRENT, bias_of, bias_of_triad
 from .equations import EQUATIONS, equation_of
 from .inertial_update import absorb_inertial, assimilate_inertial, innovate_inertial
 from .levered import is_own, with_lever_arms
+from .many_readings import of_instruments
 from .measurements import (
     HEADING,
     Aid,
@@ -265,6 +267,7 @@ class InertialModel(ErrorModel):
             self.blocks.bring(own)
         for sheet in own:
             self.own[sheet.name] = OwnObservation(sheet, self.blocks.places(sheet.name, _NAV), self.time)
+        self.many = of_instruments(self.own, self.bias_at)
         self._fused = set(self.noise) - self.uncalibrated - set(self.own) if self.fused else set()
 
     def _more_blocks(self) -> None:
@@ -394,6 +397,8 @@ class InertialModel(ErrorModel):
         name = measurement.instrument
         if name in self._fused and self.aid_parameters[name][0] != HEADING:  # which may say nothing
             return self.noise[name]
+        if name in self.own and (more := self.own[name].noise_without_state(measurement.side)) is not None:
+            return self.noise[name] + more
         return super().nominal_noise(measurement)
 
     def innovate(self, measurement: Measurement, covariance: Array) -> Observation | None:
@@ -430,6 +435,29 @@ class InertialModel(ErrorModel):
             self.aid_parameters[name], measurement.value.astype(np.float64), self._state(), covariance,
             self.noise[name], correction,
         )  # fmt: skip
+        return nis, size
+
+    def assimilate_together(
+        self, measurements: Sequence[Measurement], covariance: Array, correction: Array
+    ) -> tuple[Array, Array] | None:
+        """As `ErrorModel.assimilate_together`, where a kind predicts many readings at one time."""
+        names = [m.instrument for m in measurements]
+        many = next((many for many in self.many if names[0] in many.sources), None)
+        if many is None or not self.fused:
+            return None
+        if self.own[names[0]].has_noise:
+            return None
+        k, sides, sheet = len(names), np.array([m.side for m in measurements]), self.instruments[names[0]]
+        unit = np.eye(len(sheet.sigma))
+        noise = self.noise[names[0]] - sheet.sigma**2 * unit + many.noise(sides)[:, :, None] * unit
+        state = [np.broadcast_to(array, (k, *array.shape)) for array in self._state()]
+        residual, jacobian = many.linearise(
+            np.array([m.time for m in measurements]), np.array([m.value for m in measurements]), many.channels(names),
+            state, sides, _NAV,
+        )  # fmt: skip
+        nis, size = np.empty(k), np.empty(k)
+        joseph_sequence(covariance, residual, jacobian, noise, correction, nis, size)
+        self.correct(correction)
         return nis, size
 
     def correct(self, dx: Array) -> None:

@@ -71,7 +71,9 @@ class OwnObservation:
         observation = observation_of(sheet)
         assert observation is not None
         self._observation = observation
-        self._since = since
+        self._since, self._variance = since, sheet.sigma**2
+        #: Index of the first state of each block that has states.
+        self.places: Mapping[str, int] = {b.name: places[b.name] for b in sheet.blocks if b.name in places}
         self._slices = [
             (b.name, slice(places[b.name], places[b.name] + b.size)) for b in sheet.blocks if b.name in places
         ]
@@ -245,6 +247,20 @@ class OwnObservation:
                 noise += part @ block.covariance(max(0.0, point.time - self._since)) @ part.T
         return noise
 
+    @property
+    def has_noise(self) -> bool:
+        """Whether blocks without states add to the noise of a reading."""
+        return bool(len(self._free))
+
+    def noise_without_state(self, side: Array) -> Array | None:
+        """The (d, d) covariance of `spread` where it depends on the side information only; None if it does not.
+
+        It tells nothing about whether the state has a reading, so a kind that may have none has no such form.
+        """
+        if self.kind.observations is None or self.has_noise:
+            return None
+        return self.reading_noise(side)
+
     def reading_noise(self, side: Array) -> Array | None:
         """The (d, d) covariance of a reading with this side information minus that of the datasheet; None if equal."""
         function, d = self.kind.reading_sigma, len(self.kind.components)
@@ -255,13 +271,15 @@ class OwnObservation:
         except Exception as error:
             message = f"reading_sigma of kind {self.sheet.kind!r} raised {type(error).__name__}: {error}"
             raise ValueError(message) from error
-        if sigma.shape != (d,) or not (np.isfinite(sigma).all() and np.all(sigma >= 0.0)):
+        if sigma.shape != (d,) or not (isfinite(sigma.sum()) and sigma.min() >= 0.0):
             raise ValueError(
                 f"reading_sigma of kind {self.sheet.kind!r}, for the instrument {self.sheet.name!r} with the side "
                 f"information {side.tolist()}, should return an array of shape {(d,)}, finite and not negative, not "
                 f"{sigma.tolist()}"
             )
-        return np.diag(sigma**2 - self.sheet.sigma**2)
+        more = np.zeros((d, d))
+        more.flat[:: d + 1] = sigma**2 - self._variance
+        return more
 
     def place(self, own: Array, jacobian: Array, offset: int) -> None:
         """Write the columns of the blocks into a (d, n) Jacobian; ``offset`` is the index of the first value in it."""

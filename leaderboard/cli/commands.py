@@ -20,6 +20,7 @@ from simnav.leaderboard.publishing_requests import (
     SubmitRequest,
 )
 from simnav.leaderboard.requests import (
+    AlignRequest,
     AllanRequest,
     BenchRequest,
     BoundRequest,
@@ -27,6 +28,7 @@ from simnav.leaderboard.requests import (
     CiteRequest,
     EvaluateRequest,
     ExportRequest,
+    InspectRequest,
     MergeRequest,
     Parameters,
     RealismRequest,
@@ -39,6 +41,7 @@ from simnav.leaderboard.requests import (
     ScoreRequest,
     SealRequest,
     SweepRequest,
+    TuneNoiseRequest,
     TuneRequest,
     VerifyRequest,
 )
@@ -285,6 +288,9 @@ COMMANDS: Mapping[str, tuple[type[Any], str]] = {
     "simulate": (SimulateCommand, "simulate"),
     "score": (ScoreCommand, "score"),
     "export": (ExportRequest, "export"),
+    "inspect": (InspectRequest, "inspect"),
+    "align": (AlignRequest, "align"),
+    "tune-noise": (TuneNoiseRequest, "tune_noise"),
     "check": (CheckCommand, "check"),
     "bench": (BenchCommand, "bench"),
     "new-estimator": (NewEstimatorCommand, "new_estimator"),
@@ -313,7 +319,7 @@ COMMANDS: Mapping[str, tuple[type[Any], str]] = {
 HEADINGS: Mapping[str, Sequence[str]] = {
     "Every day": ("list", "show", "run", "evaluate", "check", "new-estimator", "simulate", "sweep", "campaign",
                   "leaderboard"),
-    "Logs and programs of others": ("score", "export"),
+    "Logs and programs of others": ("inspect", "align", "tune-noise", "export", "score"),
     "Study and publish": ("tune", "train", "bench", "robustness", "bound", "allan", "realism", "reproduce", "claim",
                           "rescore", "merge", "submit", "verify", "seal", "cite"),
     "Maintain": ("standard", "reference", "warmup"),

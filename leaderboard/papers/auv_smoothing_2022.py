@@ -44,6 +44,11 @@ _LESS = (
     "a federated filter that resets its local filters is as good as the central one. Against one that does not reset "
     "them the gain is there, on the second set of intervals (see the claims)"
 )
+_WHITE_LESS = (
+    "white noise as small as printed adds almost nothing to the inertial navigation between fixes, so neither waiting "
+    "nor the missing reset costs much. With the slow bias of auv-survey-sparse the gain is there against a filter "
+    "without reset"
+)
 _MORE = "the paper does not print its information-sharing factors or the time of its fusion"
 _TERRAIN = (
     "the gain of smoothing depends on the drift of a filter during the outages, and so on the noise of DVL and terrain "
@@ -79,10 +84,10 @@ def _as_printed() -> tuple[Row, ...]:
     """The gains with white IMU noise, on both sets of intervals, against both federated filters."""
     rows: list[Row] = []
     for scenario in (_WHITE, _SPARSE_WHITE):
-        for than, lower in (("Federated KF", _LESS), ("Federated KF, no reset", _MORE)):
+        for than in ("Federated KF", "Federated KF, no reset"):
             for axis, gain in (("north", 0.3315), ("east", 0.3525)):
-                rows.append(Gain(scenario, "Graph, equivalent IMU factor", than, f"{axis}_rmse", gain, lower=lower,
-                                 higher=_MORE))  # fmt: skip
+                rows.append(Gain(scenario, "Graph, equivalent IMU factor", than, f"{axis}_rmse", gain,
+                                 lower=_WHITE_LESS, higher=_MORE))  # fmt: skip
             for axis, gain in _SMOOTHED.items():
                 rows.append(Gain(scenario, "Forward and backward", than, f"smoothed_{axis}_rmse", gain,
                                  than_score=f"{axis}_rmse", lower=_TERRAIN, higher=_TERRAIN))  # fmt: skip
@@ -273,7 +278,8 @@ def _claim(name: str, sentence: str, row: str, score: str, gain: float, than_sco
                     "second set, does not reset": _than("federated-no-reset", _SPARSE),
                 },
                 ours="first set, resets",
-                why="the gains of the text do not say which of the two sets of intervals they are of",
+                why="the gains of the text do not say which of the two sets of intervals they are of. The IMU has a "
+                "slow bias here; with the printed white noise neither federated filter loses more than 2 %",
             ),
         ),
     )  # fmt: skip

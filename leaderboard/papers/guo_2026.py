@@ -41,8 +41,8 @@ _WINDOW = (
     "the window are those of an older node (see the claims)"
 )
 _AXES = (
-    "the paper prints no errors of its fixes by axis. Ours are as large north as east, and twice as large down; with "
-    "errors that are larger east and small down the statement holds for every method alike"
+    "the paper prints no errors of its fixes by axis. Ours have multipath of 4, 4 and 6 m (north, east, down). With 3, "
+    "6 and 1 m, and white noise that is as large down as across, it holds for EKF and GA-FGO on four of four seeds"
 )
 _LINEAR = (
     "both filters have the same states, and for errors of this size the model is almost linear, so both give the same "

@@ -3,45 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
-from simnav.log.channel import list_recordings
 from simnav.log.source import LogSource
 from simnav.scenario import Scenario
-from simnav.sensors import AidSpec, DerivedInstrument
+from simnav.scenario.residuals import ErrorSeries, instrument_of
+from simnav.sensors import AidSpec
 from simnav.simulation.simulator import ideal
 from simnav.source import record
-from simnav.spec import SpecError, closest
-from simnav.types import KINDS, Array
+from simnav.spec import SpecError
+from simnav.types import KINDS
 
-__all__ = ["ErrorSeries", "comparable", "real_errors", "simulated_errors"]
-
-
-@dataclass(frozen=True, eq=False)
-class ErrorSeries:
-    """The error of one instrument in one run.
-
-    Attributes
-    ----------
-    run : str
-        The recording or the seed.
-    time : (n,) array
-        [s].
-    error : (n, d) array
-        Reading less what the reference says, components as in ``Kind.errors``, SI units.
-    rate : float
-        Readings a second that the instrument should give [Hz].
-    duration : float
-        Length of the run [s].
-    """
-
-    run: str
-    time: Array
-    error: Array
-    rate: float
-    duration: float
+__all__ = ["ErrorSeries", "comparable", "simulated_errors"]
 
 
 def comparable(simulated: Scenario, recorded: Scenario) -> list[str]:
@@ -64,53 +39,12 @@ def comparable(simulated: Scenario, recorded: Scenario) -> list[str]:
     ]
 
 
-def _spec(scenario: Scenario, name: str) -> AidSpec:
-    spec = scenario.aids.get(name)
-    if spec is None:
-        raise SpecError(f"{scenario.id} has no instrument {name!r}{closest(name, list(scenario.aids))}")
-    return spec
-
-
-def real_errors(scenario: Scenario, name: str) -> list[ErrorSeries]:
-    """The errors of a measured instrument, one series for each recording of the log.
-
-    The reading without error is that of the reference, with the lever arm of the scenario.
-
-    Raises
-    ------
-    SpecError
-        If the scenario has no such instrument, or it is not measured.
-    LogError
-        If the log is absent.
-    """
-    spec = _spec(scenario, name)
-    assert scenario.log is not None
-    if scenario.log.instruments[name].source == "reference":
-        raise SpecError(f"{scenario.id}: {name!r} is itself simulated from the reference")
-    plain = scenario.model_copy(update={"faults": ()})
-    found = []
-    for seed, recording in enumerate(list_recordings(scenario.log)):
-        source = LogSource(plain, seed)
-        stream = source.advance(source.duration).aids[name]
-        exact = spec.ideal().install(name, 0, source.surroundings)
-        if isinstance(exact, DerivedInstrument):
-            raise SpecError(f"{scenario.id}: {name!r} reads another instrument; the reference does not say its reading")
-        value, _, _ = exact.reading(source.taps(stream.time))
-        error = KINDS[spec.kind].difference(stream.value, value)
-        known = np.isfinite(error).all(axis=1)
-        # The rate of the datasheet is a limit; the log says how often the instrument really speaks.
-        rate = float(1.0 / np.median(np.diff(stream.time))) if len(stream.time) > 1 else spec.rate
-        time = stream.time[known]
-        found.append(ErrorSeries(recording or "recording", time, error[known], rate, source.duration))
-    return found
-
-
 def simulated_errors(scenario: Scenario, name: str, seeds: Iterable[int]) -> list[ErrorSeries]:
     """The errors of an instrument in simulated runs, without faults.
 
     A recorded scenario is taken, too, if the instrument is simulated from its reference.
     """
-    spec = _spec(scenario, name)
+    spec = instrument_of(scenario, name)
     plain = scenario.model_copy(update={"faults": ()})
     if plain.log is not None:
         if plain.log.instruments[name].source != "reference":

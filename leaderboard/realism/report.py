@@ -15,12 +15,13 @@ from simnav.leaderboard.results.frame import frame
 from simnav.log.channel import list_recordings
 from simnav.log.source import LogSource
 from simnav.scenario import Scenario
+from simnav.scenario.residuals import residuals
 from simnav.source import record
 from simnav.spec import UNITS, SpecError, closest
 from simnav.types import Array, ImuSamples
 
 from .classifier import Verdict, judge
-from .errors import ErrorSeries, comparable, real_errors, simulated_errors
+from .errors import ErrorSeries, comparable, simulated_errors
 from .features import LAGS, Windows, feature_names, imu_windows, windows_of
 from .fit import Fit, autocovariance, fitted
 
@@ -208,7 +209,7 @@ def realism_of(scenario: Scenario, log: Scenario, instruments: Sequence[str], ru
 
 
 def _aid(scenario: Scenario, log: Scenario, name: str, seeds: range) -> InstrumentRealism:
-    real, simulated = real_errors(log, name), simulated_errors(scenario, name, seeds)
+    real, simulated = residuals(log, name), simulated_errors(scenario, name, seeds)
     return compared(name, log.aids[name].definition, real, simulated)
 
 

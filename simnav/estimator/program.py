@@ -242,7 +242,9 @@ def _csv_estimate(line: str) -> Estimate:
         raise EstimatorError(f"the program answered {line[:100]!r}, in which a cell is not a number") from None
     state = numbers[1:10]
     given = np.array([bool(c.strip()) for c in cells[1:10]])
-    vectors = {n: state[3 * i : 3 * i + 3] for i, n in enumerate(_VECTORS) if given[3 * i : 3 * i + 3].any()}
+    vectors: dict[str, Any] = {
+        n: state[3 * i : 3 * i + 3] for i, n in enumerate(_VECTORS) if given[3 * i : 3 * i + 3].any()
+    }
     covariance = None
     if len(cells) == 19:
         covariance = np.diag(np.where(given, np.nan_to_num(numbers[10:]), 0.0) ** 2)
@@ -279,7 +281,9 @@ def _json_estimate(line: str) -> Estimate:
         content = json.loads(line)
         if not isinstance(content, dict) or "time" not in content:
             raise ValueError
-        vectors = {n: np.array(content[n], dtype=np.float64) for n in _VECTORS if content.get(n) is not None}
+        vectors: dict[str, Any] = {
+            n: np.array(content[n], dtype=np.float64) for n in _VECTORS if content.get(n) is not None
+        }
         covariance = content.get("covariance")
         sigma = content.get("sigma")
         if sigma is not None:

@@ -144,6 +144,10 @@ class LogSource:
     def _states(self, time: Array) -> NavigationStates:
         return replace(self._reference.states(self._begin + time), time=time)
 
+    def reference_states(self, time: Array) -> NavigationStates:
+        """The reference at n times on the clock of the log [s]; NaN where it has nothing to say."""
+        return self._reference.states(time)
+
     def _measure(
         self, scenario: Scenario, log: RecordedSpec, seed: int, surroundings: Surroundings
     ) -> dict[str, AidStream]:

@@ -9,11 +9,12 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from simnav.plugins import PluginError, load_plugin
+from simnav.plugins import PluginError, Registry, load_plugin
 from simnav.scenario.catalogue import Header, headers
+from simnav.scenario.replay import read_logs_by
 from simnav.scenario.scenario import Scenario
 from simnav.spec import SpecError, closest
-from simnav.world import VESSELS
+from simnav.world import SURROUNDINGS, VESSELS
 
 __all__ = ["load", "names", "parse"]
 
@@ -49,7 +50,12 @@ def parse(text: str, *, source: str = "<toml>", folder: Path | None = None) -> S
     if "plugins" in table:
         table["plugins"] = _load_plugins(table["plugins"], source, folder or Path.cwd())
     if isinstance(table.get("vessel"), dict):
-        table["vessel"] = _with_whole_paths(table["vessel"], folder or Path.cwd())
+        table["vessel"] = _with_whole_paths(table["vessel"], VESSELS, folder or Path.cwd())
+    if isinstance(table.get("surroundings"), dict):
+        table["surroundings"] = {
+            name: _with_whole_paths(part, SURROUNDINGS, folder or Path.cwd()) if isinstance(part, dict) else part
+            for name, part in table["surroundings"].items()
+        }
     try:
         return Scenario.from_toml(table, source=source)
     except RecursionError:
@@ -78,11 +84,11 @@ def _load_plugins(names: Any, source: str, folder: Path) -> list[str]:
     return paths
 
 
-def _with_whole_paths(table: dict[str, Any], folder: Path) -> dict[str, Any]:
-    """The table of a vessel whose files are named by their whole paths."""
+def _with_whole_paths(table: dict[str, Any], kinds: Registry[Any], folder: Path) -> dict[str, Any]:
+    """The table of a vessel or of a part of the surroundings, with the whole paths of the files that it names."""
     kind = table.get("kind")
-    cls = VESSELS.get(kind) if isinstance(kind, str) else None
-    given = {k: table[k] for k in (() if cls is None else cls.files) if isinstance(table.get(k), str)}
+    cls = kinds.get(kind) if isinstance(kind, str) else None
+    given = {k: table[k] for k in (() if cls is None else cls.files) if isinstance(table.get(k), str) and table[k]}
     return {**table, **{key: str((folder / Path(name).expanduser()).resolve()) for key, name in given.items()}}
 
 
@@ -143,3 +149,6 @@ def _read(path: Path) -> Scenario:
     except OSError as error:
         raise SpecError(f"{path}: cannot be read: {error.strerror}") from None
     return parse(text, source=str(path), folder=path.parent)
+
+
+read_logs_by(load)

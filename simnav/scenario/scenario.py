@@ -138,7 +138,7 @@ class Scenario(Description):
         """Hexadecimal digest of everything that decides the numbers of a run, defaults included.
 
         Title, description, source, tags, track, group and dials are not included, nor are the files of a log. The
-        files of a vessel are included by their content, not by their paths.
+        files of a vessel and of the surroundings are included by their content, not by their paths.
         Distributions are included as they are written.
         """
         words = {"title", "description", "source", "tags", "track", "group", "plugins", "dials"}
@@ -147,6 +147,9 @@ class Scenario(Description):
         content = self.model_dump(mode="python", exclude=words)
         for name in self.craft.files:
             content["vessel"][name] = _digest(getattr(self.craft, name))
+        for part, spec in self.surroundings.items():
+            for name in spec.files:
+                content["surroundings"][part][name] = getattr(spec, name) and _digest(getattr(spec, name))
         if self._template is not None:
             content["distributions"] = _canonical(self._template.table, words)
         # Not sorted: the order of the instruments is the order in which simultaneous measurements are handed over.

@@ -1,14 +1,24 @@
-"""Depth sensor: depth below the mean sea surface, which is the WGS-84 ellipsoid in simnav."""
+"""Depth sensor: depth below the mean sea surface.
+
+The mean surface is the WGS-84 ellipsoid, unless the scenario has the part ``water_level`` of the surroundings (geoid,
+tide, air pressure). Estimators take it for the ellipsoid.
+"""
 
 from __future__ import annotations
 
 from typing import Literal
 
+import numpy as np
+from numpy.typing import NDArray
+
 from simnav import kinds
+from simnav.geometry.earth import displace
 from simnav.kinds import LARGEST_HEIGHT, Component, Kind
 from simnav.sensors.instrument import ZERO, AidSpec, Instrument, SigmaTriple, register_instrument
 from simnav.sensors.observation import DEPTH, CompiledInstrument
 from simnav.spec import NonNegative, Vector, quantity
+from simnav.types import Array, TapStates
+from simnav.world.surroundings import Surroundings
 
 __all__ = ["Depth"]
 
@@ -23,7 +33,12 @@ __all__ = ["Depth"]
     example={"rate_hz": 0.5, "sigma_m": 0.2},
 )
 class Depth(AidSpec):
-    """Depth of the sensor itself, positive down."""
+    """Depth of the sensor itself, positive down.
+
+    With ``waves`` a sensor near the surface reads the pressure of the waves above it: the elevation of each component
+    times exp(-k z), with its wave number k and the depth z of the sensor (linear waves in deep water, DNV-RP-C205
+    section 3.2; near the bottom the factor is larger).
+    """
 
     kind: Literal["depth"] = "depth"
     sigma: NonNegative = quantity("m")
@@ -32,6 +47,7 @@ class Depth(AidSpec):
     scale: NonNegative = quantity("percent", 0.0)
     lever_arm: Vector = quantity("m", ZERO)
     lever_arm_sigma: SigmaTriple = quantity("m", ZERO)
+    waves: bool = False
     fixed_bias: float = quantity("m", 0.0)
     fixed_scale: float = quantity("percent", 0.0)
 
@@ -42,3 +58,26 @@ class Depth(AidSpec):
 
 class _Depth(CompiledInstrument):
     code = DEPTH
+
+    def __init__(self, spec: Depth, name: str, seed: int):
+        super().__init__(spec, name, seed)
+        self._waves = spec.waves
+
+    def enter(self, surroundings: Surroundings) -> None:
+        """See `Instrument.enter`. The kernel knows the ellipsoid only."""
+        super().enter(surroundings)
+        self.in_kernel = not self._waves and "water_level" not in surroundings
+
+    def reading(self, tap: TapStates) -> tuple[Array, Array, NDArray[np.bool_] | None]:
+        """See `Instrument.reading`."""
+        value, sigma, there = super().reading(tap)
+        if self.in_kernel:
+            return value, sigma, there
+        place = displace(tap.position, self.lever_displacement(tap))
+        level, above = self.surroundings.get("water_level"), np.zeros(len(tap.time))
+        if level is not None:
+            above += level.height(place, tap.time) + level.apparent_depth(tap.time)
+        waves = self.surroundings.get("sea") if self._waves else None
+        if waves is not None:
+            above += waves.elevation(place, tap.time, np.maximum(above - place[:, 2], 0.0))
+        return value + (1.0 + self.scale) * above[:, None], sigma, there

@@ -12,11 +12,11 @@ import numpy as np
 from simnav.compiled import kernel
 from simnav.geometry.earth import displace_scalar
 from simnav.geometry.ecef import ecef_from_geodetic_scalar
-from simnav.kinds import Component, Datasheet, NavigationPoint
+from simnav.kinds import Component, Datasheet, NavigationPoint, NavigationPoints
 from simnav.satellites.signal_errors import amplification, noise_factor, range_error
 from simnav.types import Array
 
-__all__ = ["DENSITY_RATIO", "SIDE", "observe", "reading_sigma"]
+__all__ = ["DENSITY_RATIO", "SIDE", "observe", "observe_all", "reading_sigma"]
 
 #: The side information of a reading: apparent position and velocity of the satellite in the Earth-fixed frame of the
 #: time of reception, its direction from the antenna, C/N0 [dB-Hz], the delays that the models predict, and the wet
@@ -39,7 +39,7 @@ ELEVATION, DENSITY_RATIO, IONOSPHERE, TROPOSPHERE, MAPPING = 6, 8, 9, 10, 11
 _CLOCK = np.eye(2)
 
 
-@kernel("void(f8[::1], f8[::1], f8[:, ::1], f8[::1], f8[::1], f8[::1], f8[::1], f8[:, ::1])")
+@kernel()
 def _predict(
     position: Array, velocity: Array, dcm: Array, rate: Array, arm: Array, side: Array, reading: Array, jacobian: Array
 ) -> None:
@@ -81,39 +81,59 @@ def _predict(
     jacobian[1, 8] += -(swing[0] * u[1] - swing[1] * u[0])
 
 
+@kernel("void(f8[:, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[::1], f8[:, ::1], f8[:, ::1], f8[:, :, ::1])")
+def _predict_all(
+    position: Array, velocity: Array, dcm: Array, rate: Array, arm: Array, side: Array, reading: Array, jacobian: Array
+) -> None:
+    """Apply `_predict` to n readings."""
+    for i in range(len(position)):
+        _predict(position[i], velocity[i], dcm[i], rate[i], arm, side[i], reading[i], jacobian[i])
+
+
 def observe(point: NavigationPoint, sheet: Datasheet) -> tuple[Array, dict[str, Array]]:
     """Pseudorange and its rate at a state, and their Jacobian by block (`simnav.kinds.Observation`)."""
-    side, blocks = point.side, point.blocks
-    reading, jacobian = np.empty(2), np.empty((2, 9))
-    _predict(
-        point.position, point.velocity, np.ascontiguousarray(point.dcm), point.angular_rate, sheet.lever_arm,
-        np.ascontiguousarray(side), reading, jacobian,
+    blocks = {name: values[None] for name, values in point.blocks.items()}
+    points = NavigationPoints(
+        np.array([point.time]), point.position[None], point.velocity[None], point.dcm[None], point.angular_rate[None],
+        blocks, np.array([sheet.channels.index(point.channel)]), point.side[None],
     )  # fmt: skip
-    at, (sigma, frequencies) = sheet.channels.index(point.channel), _figures(sheet, side)
-    ionosphere, mapping = side[IONOSPHERE], side[MAPPING]
+    reading, given = observe_all(points, sheet)
+    return reading[0], {name: block[0] for name, block in given.items()}
+
+
+def observe_all(points: NavigationPoints, sheet: Datasheet) -> tuple[Array, dict[str, Array]]:
+    """The same for n readings (`simnav.kinds.Observations`)."""
+    side, blocks, at, n = np.ascontiguousarray(points.side), points.blocks, points.channel, len(points.position)
+    reading, jacobian = np.empty((n, 2)), np.empty((n, 2, 9))
+    position, velocity, dcm, rate = (np.ascontiguousarray(array) for array in points[1:5])
+    _predict_all(position, velocity, dcm, rate, sheet.lever_arm, side, reading, jacobian)
+    sigma, frequencies = _figures(sheet, side[:, ELEVATION])
+    ionosphere, mapping, row = side[:, IONOSPHERE], side[:, MAPPING], np.arange(n)
     reading += blocks["clock"]
-    reading[0] += side[TROPOSPHERE] + mapping * blocks["troposphere"][0] + sigma * blocks["signals"][at]
-    signals = np.zeros((2, len(sheet.channels)))
-    signals[0, at] = sigma
+    reading[:, 0] += side[:, TROPOSPHERE] + mapping * blocks["troposphere"][:, 0] + sigma * blocks["signals"][row, at]
+    signals, troposphere = np.zeros((n, 2, len(sheet.channels))), np.zeros((n, 2, 1))
+    signals[row, 0, at], troposphere[:, 0, 0] = sigma, mapping
     given = {
-        "navigation": jacobian, "clock": _CLOCK, "troposphere": np.array([[mapping], [0.0]]), "signals": signals,
+        "navigation": jacobian, "clock": np.broadcast_to(_CLOCK, (n, 2, 2)), "troposphere": troposphere,
+        "signals": signals,
     }  # fmt: skip
     if frequencies == 1:
-        reading[0] += ionosphere * (1.0 + blocks["ionosphere"][0])
-        given["ionosphere"] = np.array([[ionosphere], [0.0]])
+        reading[:, 0] += ionosphere * (1.0 + blocks["ionosphere"][:, 0])
+        given["ionosphere"] = np.zeros((n, 2, 1))
+        given["ionosphere"][:, 0, 0] = ionosphere
     return reading, given
 
 
-def _figures(sheet: Datasheet, side: Array) -> tuple[float, int]:
-    """One sigma of the lasting error of a range [m], and the number of frequencies."""
+def _figures(sheet: Datasheet, elevation: Array) -> tuple[Array, int]:
+    """One sigma of the lasting error of each range [m], and the number of frequencies."""
     details = sheet.details
     frequencies = int(details["frequencies"])
     multipath = details["multipath"] * amplification(frequencies)
-    return float(range_error(side[ELEVATION], details["signal_error"], multipath)), frequencies
+    return np.asarray(range_error(elevation, details["signal_error"], multipath)), frequencies
 
 
 def reading_sigma(side: Array, sheet: Datasheet) -> Array:
-    """The white noise of a reading, from its C/N0 (`simnav.kinds.ReadingSigma`)."""
-    sigma: Array = sheet.sigma * noise_factor(side[DENSITY_RATIO])
-    sigma[0] *= amplification(int(sheet.details["frequencies"]))
+    """The white noise of readings, from their C/N0 (`simnav.kinds.ReadingSigma`)."""
+    sigma: Array = sheet.sigma * noise_factor(side[..., DENSITY_RATIO])[..., None]
+    sigma[..., 0] *= amplification(int(sheet.details["frequencies"]))
     return sigma

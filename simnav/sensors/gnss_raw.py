@@ -49,7 +49,7 @@ from simnav.satellites.signal_errors import amplification, density_ratio, noise_
 from simnav.satellites.sky import Sight, Sky
 from simnav.satellites.time_scales import gps_time
 from simnav.sensors.channels import ChannelInstrument
-from simnav.sensors.gnss_observation import DENSITY_RATIO, SIDE, observe, reading_sigma
+from simnav.sensors.gnss_observation import DENSITY_RATIO, SIDE, observe, observe_all, reading_sigma
 from simnav.sensors.instrument import ZERO, AidSpec, Instrument, register_instrument, turn_to_body, turn_to_ned
 from simnav.spec import NonNegative, Positive, SpecError, Vector, closest, quantity
 from simnav.types import NO_SIDE, Array, TapStates
@@ -108,6 +108,7 @@ _Texts = tuple[Annotated[str, StringConstraints(min_length=1)], ...]
         datasheet=("signal_error", "multipath", "frequencies"),
         side=SIDE,
         reading_sigma=reading_sigma,
+        observations=observe_all,
     ),
     example={
         "satellites": ["G12", "G29", "E27", "E30", "E34"],

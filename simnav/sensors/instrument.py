@@ -136,10 +136,12 @@ class AidSpec(Spec):
 
     @model_serializer(mode="wrap")
     def _without_empty(self, serialize: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """The digest of a scenario whose instruments name no processes is what it was before there were any."""
+        """The digest of a scenario that names no processes and no sigma of a lever arm is what it was before these."""
         table: dict[str, Any] = serialize(self)
         if not self.processes:
             table.pop("processes", None)
+        if not any(np.atleast_1d(self.figure("lever_arm_sigma"))):
+            table.pop("lever_arm_sigma", None)
         return table
 
     @model_validator(mode="after")

@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -54,7 +55,9 @@ class _Read:
             return Estimate(time, start.position, start.velocity, start.attitude, start.covariance)
         state = self.states[k]
         given = np.isfinite(state)
-        vectors = {n: state[3 * i : 3 * i + 3] for i, n in enumerate(_COLUMNS) if given[3 * i : 3 * i + 3].any()}
+        vectors: dict[str, Any] = {
+            n: state[3 * i : 3 * i + 3] for i, n in enumerate(_COLUMNS) if given[3 * i : 3 * i + 3].any()
+        }
         covariance = None
         if self.sigmas is not None:
             covariance = np.diag(np.nan_to_num(self.sigmas[k]) ** 2)

@@ -32,6 +32,7 @@ from simnav.world.surroundings import (
 )
 from simnav.world.trajectory import SampledTrajectory, Steered, Trajectory, Voyage, WorldBlock
 from simnav.world.vessel import VESSELS, KinematicVessel, Vessel, register_vessel
+from simnav.world.water_level import WaterLevel
 from simnav.world.world import World
 
 #: Any registered vessel; its ``kind`` decides the class.
@@ -72,6 +73,7 @@ __all__ = [
     "Uuv",
     "Vessel",
     "Voyage",
+    "WaterLevel",
     "Waypoints",
     "World",
     "WorldBlock",

@@ -27,6 +27,7 @@ def _world(vessel: KinematicVessel, voyage: Voyage) -> World:
         flow.current if isinstance(flow, WaterFlow) else None,
         rate=voyage.rate,
         seed=voyage.seed,
+        depth=waves.depth if isinstance(waves, Waves) else None,
     )
 
 

@@ -13,10 +13,11 @@ from math import atan2, cos, exp, inf, sin
 import numpy as np
 
 from simnav.compiled import Array, Flags, Integers, kernel
+from simnav.declared_process import oscillation
 from simnav.geometry.rotation import wrap_scalar
 from simnav.strapdown import sample_from_motion
 from simnav.world.manoeuvres import ACCELERATE, COLUMNS, DEPTH, HOLD, TURN, WAYPOINTS, ZIGZAG
-from simnav.world.sea import ROWS
+from simnav.world.sea import ROWS, YAW
 
 __all__ = ["DIVE", "PARAMETERS", "STATE", "TAP_COLUMNS", "advance", "command", "initialise"]
 
@@ -36,13 +37,19 @@ WATER_NORTH, WATER_EAST = 54, 55
 # In closed loop: error of the heading by which the vessel is steered, and the heading correction back to the track.
 # In a turn for a given time, where the rate is commanded and not the heading: the parts of both already turned.
 ERROR_HEADING, TO_TRACK, TURNED = 56, 57, 58
-STATE = 59
+#: Heave velocity, roll, pitch and yaw that follow from the waves as oscillators, each with value, rate and what drives
+#: it (`simnav.world.sea.steady`); without them all are zero.
+ANSWERS = 59
+YAW_ANSWER = ANSWERS + 9
+STATE = 71
 #: Where the state holds the depth that is steered for, and the largest path angle.
 DIVE = np.array([DEPTH_REFERENCE, GAMMA_LIMIT])
 # ... in the integer state: sample, segment, waypoint, whether the segment has begun
 # ... and in the parameters.
 DT, TAU_U, TAU_R, TAU_G, TURN_RATE, HEEL, DIVES, CURRENT_N, CURRENT_E, SHEAR, ATTENUATION = range(11)
-PARAMETERS = 11
+#: Natural angular frequency and damping ratio of these oscillators; zero: there are none.
+OSCILLATORS = 11
+PARAMETERS = 19
 #: Columns of a tap: position 0:3, velocity 3:6, roll, pitch, yaw 6:9, angular rate 9:12, current north, east 12:14.
 TAP_COLUMNS = 14
 #: Rows of the phases of waves, and columns of an eddy.
@@ -232,9 +239,14 @@ def _compose(x: Array, p: Array, waves: Responses) -> Composed:
     w0, w1, w2, w3, w4, w5, w6 = waves
     cp, sp, cg, sg = x[COS_PSI], x[SIN_PSI], x[COS_GAMMA], x[SIN_GAMMA]
     shade, flow = 1.0, 1.0
+    # The bow yaws about the course that the vessel keeps.
+    ch, sh = cp, sp
     if x[DEPTH_CALM] > 0.0:
         shade = exp(-p[ATTENUATION] * x[DEPTH_CALM])
         flow = max(0.0, 1.0 - p[SHEAR] * x[DEPTH_CALM])
+    if p[OSCILLATORS] > 0.0:
+        yaw = x[PSI] + shade * x[YAW_ANSWER]
+        ch, sh = cos(yaw), sin(yaw)
     v0 = x[U] * cg * cp + flow * x[WATER_NORTH] + shade * w0
     v1 = x[U] * cg * sp + flow * x[WATER_EAST] + shade * w1
     v2 = -x[U] * sg + shade * w2
@@ -245,13 +257,47 @@ def _compose(x: Array, p: Array, waves: Responses) -> Composed:
     return (
         (v0, v1, v2),
         (
-            ct * cp, sr * st * cp - cr * sp, cr * st * cp + sr * sp,
-            ct * sp, sr * st * sp + cr * cp, cr * st * sp - sr * cp,
+            ct * ch, sr * st * ch - cr * sh, cr * st * ch + sr * sh,
+            ct * sh, sr * st * sh + cr * ch, cr * st * sh - sr * ch,
             -st, sr * ct, cr * ct,
         ),
         roll,
         pitch,
     )  # fmt: skip
+
+
+@kernel()
+def _oscillate(x: Array, p: Array, k: int, force: float, dt: float) -> float:
+    """Exact step of oscillator k under a force that is linear within the step. Return its new value.
+
+    With the force a + b t the equation y'' + 2 z w y' + w^2 y = w^2 (a + b t) has the solution a + b t - 2 z b / w, to
+    which the free oscillation is added.
+    """
+    at = ANSWERS + 3 * k
+    w, z = p[OSCILLATORS + 2 * k], p[OSCILLATORS + 2 * k + 1]
+    slope = (force - x[at + 2]) / dt if dt > 0.0 else 0.0
+    lag = 2.0 * z * slope / w
+    y, rate = x[at] - (x[at + 2] - lag), x[at + 1] - slope
+    a, b, c, d = oscillation(dt, w, z)
+    x[at], x[at + 1], x[at + 2] = a * y + b * rate + force - lag, c * y + d * rate + slope, force
+    value: float = x[at]
+    return value
+
+
+@kernel()
+def _answer(x: Array, p: Array, waves: Responses, phase: Array, table: Array, dt: float) -> Responses:
+    """The responses of the oscillators to the waves at the vessel, in the form of `_waves`; yaw stays in the state."""
+    w0, w1, w2, w3, w4, w5, w6 = waves
+    cp, sp = x[COS_PSI], x[SIN_PSI]
+    first = second = 0.0
+    for i in range(phase.shape[1]):
+        first += table[YAW, i] * phase[0, i]
+        second += table[YAW + 1, i] * phase[0, i]
+    heave = _oscillate(x, p, 0, w2, dt)
+    roll = _oscillate(x, p, 1, w3 * sp - w4 * cp, dt)
+    pitch = _oscillate(x, p, 2, w5 * cp + w6 * sp, dt)
+    _oscillate(x, p, 3, first * (cp * cp - sp * sp) - second * 2.0 * cp * sp, dt)
+    return w0, w1, heave, roll * sp, -roll * cp, pitch * cp, pitch * sp
 
 
 @kernel()
@@ -272,6 +318,8 @@ def initialise(x: Array, p: Array, phase: Array, table: Array, eddies: Array) ->
     x[COS_PSI], x[SIN_PSI], x[COS_GAMMA], x[SIN_GAMMA] = cos(x[PSI]), sin(x[PSI]), cos(x[GAMMA]), sin(x[GAMMA])
     ahead = x[U] * x[COS_GAMMA]
     w = _waves(phase, table, ahead * x[COS_PSI], ahead * x[SIN_PSI], 0.0)
+    if p[OSCILLATORS] > 0.0:
+        w = _answer(x, p, w, phase, table, 0.0)
     v, c, roll, pitch = _compose(x, p, w)
     x[V], x[V + 1], x[V + 2] = v
     for i in range(9):
@@ -315,6 +363,8 @@ def _advance_one(
         x[COS_PSI], x[SIN_PSI] = cos(x[PSI]), sin(x[PSI])
         ahead = x[U] * x[COS_GAMMA]
         waves = _waves(phase, table, ahead * x[COS_PSI], ahead * x[SIN_PSI], dt)
+        if p[OSCILLATORS] > 0.0:
+            waves = _answer(x, p, waves, phase, table, dt)
         _water(x, p, eddies, t1)
         composed = _compose(x, p, waves)
         v, c, roll, pitch = composed
@@ -360,10 +410,10 @@ def advance(
     ----------
     active : (w,) bool array
         True for each world that is advanced.
-    state : (w, 59) and (w, 4) int arrays
+    state : (w, 71) and (w, 4) int arrays
         The state vector, and the integer state: sample, segment, waypoint, and 1 if the segment has begun. Both are
         updated.
-    p : (w, 11) array
+    p : (w, 19) array
         Constants of the vessel, the water and the step, at the indices that this module names.
     sizes : (w, 4) int array
         Number of manoeuvres, points, waves and eddies of each world.
@@ -434,7 +484,7 @@ def command(active: Flags, x: Array, wrong: Array, heading: Array, speed: Array)
     ----------
     active : (w,) bool array
         True for each world that gets a command.
-    x : (w, 59) array
+    x : (w, 71) array
         State vectors; updated.
     wrong : (w,) array
         Error of the estimated heading by which the vessel is steered [rad]; NaN: as before.

@@ -17,15 +17,17 @@ House 2013, sections 9.3.4 and 10.4.1; the excess is that of a plane wave on a p
 from __future__ import annotations
 
 from math import cos, inf, sin
-from typing import Annotated, Literal, NamedTuple, Self
+from pathlib import Path
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, model_validator
+from pydantic import Field, SerializerFunctionWrapHandler, ValidationError, model_serializer, model_validator
 
 from simnav.compiled import Array, Flags, Integers, kernel
 from simnav.geometry.earth import relative_position
 from simnav.spec import Spec, SpecError, quantity
+from simnav.world.geojson import read_buildings
 from simnav.world.surroundings import SurroundingSpec, register_surrounding
 
 __all__ = ["Obstacle", "ObstacleMap", "Obstacles", "Paths"]
@@ -70,16 +72,62 @@ class Obstacles(SurroundingSpec):
 
     Attributes
     ----------
-    latitude, longitude : float
-        Origin of the map [rad].
+    latitude, longitude : float or None
+        Origin of the map [rad]; with a file it may be left out, and is then the first corner in the file.
     obstacle : tuple of Obstacle
         The obstacles.
+    file : str
+        A GeoJSON file with further obstacles (`simnav.world.geojson`); empty for none.
     """
 
+    files: ClassVar[tuple[str, ...]] = ("file",)
+
     kind: Literal["obstacles"] = "obstacles"
-    latitude: float = quantity("deg")
-    longitude: float = quantity("deg")
+    latitude: float | None = quantity("deg", None)
+    longitude: float | None = quantity("deg", None)
     obstacle: Annotated[tuple[Obstacle, ...], Field(max_length=1000)] = ()
+    file: str = ""
+
+    @model_validator(mode="after")
+    def _placed(self) -> Self:
+        if (self.latitude is None) != (self.longitude is None):
+            raise ValueError("latitude_deg and longitude_deg belong together")
+        if self.latitude is None and (self.obstacle or not self.file):
+            raise ValueError("latitude_deg and longitude_deg of the origin are missing")
+        if self.file:
+            self.every()  # an error of the file is one of the scenario
+        return self
+
+    @model_serializer(mode="wrap")
+    def _without_file(self, serialize: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """The digest of a scenario without a file is what it was before there were any."""
+        table: dict[str, Any] = serialize(self)
+        if not self.file:
+            table.pop("file", None)
+        return table
+
+    def every(self) -> tuple[tuple[float, float], tuple[Obstacle, ...]]:
+        """The origin of the map [rad], and all obstacles, those of the file included.
+
+        Raises
+        ------
+        SpecError
+            If the file is not valid.
+        """
+        buildings = read_buildings(Path(self.file)) if self.file else []
+        if self.latitude is None or self.longitude is None:
+            latitude, longitude = buildings[0].corners[0].tolist()
+        else:
+            latitude, longitude = self.latitude, self.longitude
+        origin, found = np.array([latitude, longitude, 0.0]), list(self.obstacle)
+        for building in buildings:
+            place = np.column_stack([building.corners, np.zeros(len(building.corners))])
+            corners = tuple(map(tuple, relative_position(place, origin)[:, :2].tolist()))
+            try:
+                found.append(Obstacle(name=building.name, corners=corners, bottom=building.bottom, top=building.top))
+            except ValidationError as error:
+                raise SpecError(f"{self.file}: {error.errors()[0]['msg'].removeprefix('Value error, ')}") from None
+        return (latitude, longitude), tuple(found)
 
     def build(self, name: str, seed: int) -> ObstacleMap:
         """See `SurroundingSpec.build`."""
@@ -114,14 +162,15 @@ class ObstacleMap:
     """
 
     def __init__(self, spec: Obstacles):
-        self._origin = np.array([spec.latitude, spec.longitude, 0.0])
-        self._names = [o.name or f"number {k}" for k, o in enumerate(spec.obstacle, 1)]
-        polygons = [np.array(o.corners) for o in spec.obstacle]
+        origin, obstacles = spec.every()
+        self._origin = np.array([*origin, 0.0])
+        self._names = [o.name or f"number {k}" for k, o in enumerate(obstacles, 1)]
+        polygons = [np.array(o.corners) for o in obstacles]
         polygons = [p if _area(p) > 0.0 else p[::-1] for p in polygons]
         walls = [np.hstack([p, np.roll(p, -1, axis=0)]) for p in polygons]
         self._walls = np.ascontiguousarray(np.concatenate(walls) if walls else np.empty((0, 4)))
         self._first = np.cumsum([0, *(len(w) for w in walls)]).astype(np.int64)
-        self._heights = np.array([(o.bottom, o.top) for o in spec.obstacle]).reshape(-1, 2)
+        self._heights = np.array([(o.bottom, o.top) for o in obstacles]).reshape(-1, 2)
 
     def paths(self, position: Array, velocity: Array, elevation: Array, azimuth: Array) -> Paths:
         """The ways of signals from c directions to an antenna at n times.

@@ -2,29 +2,39 @@
 
 The surface is a sum of long-crested components, each with its own frequency and direction. The vessel responds to
 the elevation (heave), the slope (roll, pitch) and the orbital motion (surge, sway) of each component by a second-order
-response, at the encounter frequency, which depends on the speed and course of the vessel. Sources:
-DNV-RP-C205 section 3.5 (spectra); T. I. Fossen, *Handbook of Marine Craft Hydrodynamics and Motion Control*, Wiley
-2011, chapters 8 and 10.
+response. The phase of a component always advances with the encounter frequency, which depends on the speed and course
+of the vessel. The size of the response depends on ``Sea.response``:
+
+- ``absolute``: it is that at the absolute frequency of the component, as in the first scenarios of simnav. There is no
+  yaw, and waves are those of deep water.
+- ``encounter``: heave, roll, pitch and yaw are oscillators that the waves at the vessel drive, so their size is that at
+  the encounter frequency, also while the vessel turns. In water of a known depth h the wave number k follows from
+  omega^2 = g k tanh(k h).
+
+Sources: DNV-RP-C205 section 3.5 (spectra) and 3.2 (dispersion); T. I. Fossen, *Handbook of Marine Craft Hydrodynamics
+and Motion Control*, Wiley 2011, chapters 8 and 10.
 """
 
 from __future__ import annotations
 
 from functools import cached_property
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
 from simnav.geometry.earth import relative_position
 from simnav.spec import NonNegative, Positive, Spec, quantity
 from simnav.streams import stream
 from simnav.types import Array
 
-__all__ = ["Sea", "Waves", "components", "spectrum"]
+__all__ = ["Sea", "Waves", "components", "spectrum", "steady", "wave_number"]
 
 _G = 9.81
-#: Rows of the component table: phase rate, wave number north and east, and cosine and sine gains of seven responses.
-ROWS = 17
+#: Rows of the component table: phase rate, wave number north and east, cosine and sine gains of seven responses, and
+#: two cosine gains that yaw follows from.
+ROWS = 19
+YAW = 17
 
 
 class Sea(Spec):
@@ -51,6 +61,11 @@ class Sea(Spec):
     roll_gain, pitch_gain, drift_gain : float
         Ratio of roll and pitch to the wave slope, and of surge and sway to the orbital motion, well below resonance
         [-]. A hull that is longer than a wavelength averages over it, so its gains are below 1.
+    response : str
+        ``absolute`` or ``encounter`` (see the module).
+    yaw_period, yaw_damping, yaw_gain : float
+        The same of yaw, for ``encounter``: period [s], damping ratio [-], and ratio of yaw to the wave slope times the
+        sine and cosine of the angle between waves and bow [-]. Waves from ahead, abeam and astern cause no yaw.
     """
 
     spectrum: Literal["jonswap", "pierson_moskowitz"] = "jonswap"
@@ -69,6 +84,34 @@ class Sea(Spec):
     roll_gain: NonNegative = 0.6
     pitch_gain: NonNegative = 0.4
     drift_gain: NonNegative = 0.5
+    response: Literal["absolute", "encounter"] = "absolute"
+    yaw_period: Positive = quantity("s", 12.0)
+    yaw_damping: Annotated[float, Field(gt=0.02, le=2.0)] = 0.8
+    yaw_gain: NonNegative = 0.3
+
+    @model_serializer(mode="wrap")
+    def _as_it_was(self, serialize: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """The digest of a scenario with the response ``absolute`` is what it was before there was another one."""
+        table: dict[str, Any] = serialize(self)
+        if self.response == "absolute":
+            for name in ("response", "yaw_period", "yaw_damping", "yaw_gain"):
+                table.pop(name, None)
+        return table
+
+    @model_validator(mode="after")
+    def _yaw_with_encounter(self) -> Self:
+        for name in ("yaw_period", "yaw_damping", "yaw_gain"):
+            if self.response == "absolute" and name in self.model_fields_set:
+                key = "yaw_period_s" if name == "yaw_period" else name
+                raise ValueError(f'{key} is of no use without response = "encounter"')
+        return self
+
+    @property
+    def oscillators(self) -> tuple[tuple[float, float], ...]:
+        """Natural angular frequency [rad/s] and damping ratio of heave, roll, pitch and yaw."""
+        periods = self.heave_period, self.roll_period, self.pitch_period, self.yaw_period
+        dampings = self.heave_damping, self.roll_damping, self.pitch_damping, self.yaw_damping
+        return tuple((2.0 * np.pi / period, damping) for period, damping in zip(periods, dampings, strict=True))
 
 
 def spectrum(sea: Sea, omega: Array) -> Array:
@@ -102,7 +145,33 @@ def spectrum(sea: Sea, omega: Array) -> Array:
     return density
 
 
-def components(sea: Sea | None, seed: int) -> tuple[Array, Array]:
+def wave_number(omega: Array, depth: float | None = None) -> Array:
+    """Wave number of linear waves, from omega^2 = g k tanh(k h).
+
+    Parameters
+    ----------
+    omega : (n,) array
+        Angular frequency [rad/s], positive.
+    depth : float, optional
+        Depth of the water h [m]; None: deep water.
+
+    Returns
+    -------
+    (n,) array
+        [rad/m].
+    """
+    deep = np.asarray(omega, dtype=np.float64) ** 2 / _G
+    if depth is None:
+        return deep
+    # Newton's method from the formula of Fenton and McKee (1990), which is within 1.5 %; six steps leave rounding only.
+    number = deep / np.tanh((deep * depth) ** 0.75) ** (2.0 / 3.0)
+    for _ in range(6):
+        t = np.tanh(number * depth)
+        number = number - (number * t - deep) / (t + number * depth * (1.0 - t * t))
+    return np.asarray(number)
+
+
+def components(sea: Sea | None, seed: int, depth: float | None = None) -> tuple[Array, Array]:
     """Draw the wave components of one run.
 
     Parameters
@@ -111,16 +180,20 @@ def components(sea: Sea | None, seed: int) -> tuple[Array, Array]:
         The sea state; None: a flat sea.
     seed : int
         Seed of the run: it fixes frequencies, directions and phases.
+    depth : float, optional
+        Depth of the water [m], which the response ``encounter`` knows.
 
     Returns
     -------
     phase : (3, n) array
         Cosine and sine of the phase at time 0 at the start position, and a row for the encounter frequency.
-    table : (17, n) array
+    table : (19, n) array
         Frequency [rad/s], wave number north and east [rad/m]; then pairs of cosine and sine gains of the
         displacements north, east, down [m], and of the slope responses roll-north, roll-east, pitch-north,
         pitch-east [rad]. The roll of the vessel is the projection of (roll-north, roll-east) on its axes, and its pitch
-        that of (pitch-north, pitch-east).
+        that of (pitch-north, pitch-east). With the response ``encounter`` the gains of heave, roll and pitch are those
+        of the waves that drive them, and the last two rows are not zero: with the heading psi, yaw is driven by cos(2
+        psi) times the sum of the first less sin(2 psi) times that of the second.
     """
     if sea is None or sea.significant_height == 0.0:
         return np.zeros((3, 0)), np.zeros((ROWS, 0))
@@ -138,10 +211,13 @@ def components(sea: Sea | None, seed: int) -> tuple[Array, Array]:
     amplitude = np.sqrt(2.0 * sea.significant_height**2 / 16.0 / n)
     heading = sea.direction + np.pi + sea.spreading * rng.standard_normal(n)
     phase = 2.0 * np.pi * rng.random(n)
-    number = omega**2 / _G
+    encounter = sea.response == "encounter"
+    number = wave_number(omega, depth) if encounter else omega**2 / _G
     north, east = np.cos(heading), np.sin(heading)
 
     def response(period: float, damping: float) -> Array:
+        if encounter:
+            return np.ones(n)
         natural = 2.0 * np.pi / period
         value: Array = natural**2 / (natural**2 - omega**2 - 2j * damping * natural * omega)
         return value
@@ -150,13 +226,56 @@ def components(sea: Sea | None, seed: int) -> tuple[Array, Array]:
     # Re(G) cos(theta) + Im(G) sin(theta): elevation has G = a, horizontal displacement i a, slope i a k.
     heave = amplitude * response(sea.heave_period, sea.heave_damping)
     orbit = 1j * amplitude * sea.drift_gain
+    if encounter and depth is not None:
+        orbit = orbit / np.tanh(number * depth)  # particles move further along than up and down
     roll = 1j * amplitude * number * sea.roll_gain * response(sea.roll_period, sea.roll_damping)
     pitch = 1j * amplitude * number * sea.pitch_gain * response(sea.pitch_period, sea.pitch_damping)
     gains = [orbit * north, orbit * east, -heave, roll * north, roll * east, pitch * north, pitch * east]
     rows = [omega, number * north, number * east]
     for g in gains:
         rows += [np.real(g), np.imag(g)]
+    turning = 0.5 * amplitude * number * sea.yaw_gain if encounter else np.zeros(n)
+    rows += [turning * np.sin(2.0 * heading), turning * np.cos(2.0 * heading)]
     return np.stack([np.cos(phase), np.sin(phase), omega]), np.ascontiguousarray(np.stack(rows))
+
+
+def steady(sea: Sea, phase: Array, table: Array, north: float, east: float, heading: float) -> Array:
+    """The oscillators of the response ``encounter`` on a straight course.
+
+    Parameters
+    ----------
+    sea : Sea
+        The sea state.
+    phase, table : (3, n) and (19, n) arrays
+        The waves at this time, as of `components`.
+    north, east : float
+        Velocity through the water [m/s].
+    heading : float
+        Heading [rad].
+
+    Returns
+    -------
+    (4, 3) array
+        For the down velocity [m/s], roll, pitch and yaw [rad]: value, rate, and what drives it.
+    """
+    rate = table[0] - table[1] * north - table[2] * east
+    turned = np.conj(phase[0] + 1j * phase[1])
+    c, s = np.cos(heading), np.sin(heading)
+
+    def gain(row: int) -> Array:
+        return np.asarray(table[row] + 1j * table[row + 1])
+
+    driven = [
+        -1j * rate * gain(7),
+        gain(9) * s - gain(11) * c,
+        gain(13) * c + gain(15) * s,
+        table[YAW] * np.cos(2.0 * heading) - table[YAW + 1] * np.sin(2.0 * heading),
+    ]
+    out = np.empty((4, 3))
+    for k, ((natural, damping), force) in enumerate(zip(sea.oscillators, driven, strict=True)):
+        answer = force * natural**2 / (natural**2 - rate**2 - 2j * damping * natural * rate)
+        out[k] = [np.sum(np.real(z * turned)) for z in (answer, -1j * rate * answer, force)]
+    return out
 
 
 class Waves:
@@ -170,17 +289,19 @@ class Waves:
         Seed of the world: it fixes the components.
     origin : (3,) array
         Geodetic position from which the phases count: that of the start, at the surface.
+    depth : float, optional
+        Depth of the water [m]; None: it is not known.
     """
 
-    def __init__(self, sea: Sea, seed: int, origin: Array):
-        self.sea, self._seed, self._origin = sea, seed, origin
+    def __init__(self, sea: Sea, seed: int, origin: Array, depth: float | None = None):
+        self.sea, self.depth, self._seed, self._origin = sea, depth, seed, origin
 
     @cached_property
     def _components(self) -> tuple[Array, Array]:
-        return components(self.sea, self._seed)
+        return components(self.sea, self._seed, self.depth)
 
-    def elevation(self, position: Array, time: Array) -> Array:
-        """Elevation of the surface.
+    def elevation(self, position: Array, time: Array, depth: Array | None = None) -> Array:
+        """Elevation of the surface, or the water column that a pressure sensor below it takes for it.
 
         The waves travel through water at rest. A current does not carry them along here.
 
@@ -190,6 +311,8 @@ class Waves:
             Latitude, longitude [rad] and height [m]; the height does not matter.
         time : (n,) array
             Time since the start of the run [s].
+        depth : (n,) array, optional
+            Depth of the sensors [m], by which each component is less: times exp(-k z).
 
         Returns
         -------
@@ -202,6 +325,9 @@ class Waves:
         elevation = np.zeros(len(time))
         for k in range(table.shape[1]):
             phase = np.arctan2(start[1, k], start[0, k])
-            elevation += np.cos(table[0, k] * time - table[1, k] * north - table[2, k] * east + phase)
+            wave = np.cos(table[0, k] * time - table[1, k] * north - table[2, k] * east + phase)
+            if depth is not None:
+                wave *= np.exp(-np.hypot(table[1, k], table[2, k]) * depth)
+            elevation += wave
         elevation *= amplitude
         return elevation

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, TypeVar
+from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 
@@ -45,7 +45,15 @@ class SurroundingsError(SpecError):
 
 
 class SurroundingSpec(Spec):
-    """Base class of the specifications of parts of the surroundings: a table ``[surroundings.NAME]`` of a scenario."""
+    """Base class of the specifications of parts of the surroundings: a table ``[surroundings.NAME]`` of a scenario.
+
+    Attributes
+    ----------
+    files : tuple of str
+        Names of the fields that are paths of files, as of `simnav.world.vessel.VesselSpec`.
+    """
+
+    files: ClassVar[tuple[str, ...]] = ()
 
     kind: str
 
@@ -181,7 +189,7 @@ def surround(
     made: dict[str, Any] = {}
     origin = np.zeros(3) if start is None else np.array([start.latitude, start.longitude, 0.0])
     if sea is not None:
-        made["sea"] = Waves(sea, seed, origin)
+        made["sea"] = Waves(sea, seed, origin, water_depth)
     if current is not None:
         made["current"] = WaterFlow(current, seed, origin)
     if water_depth is not None:

@@ -13,7 +13,7 @@ from simnav.types import Array, ImuSamples, NavigationStates, TapStates
 from simnav.world import motion
 from simnav.world.current import Current, eddies
 from simnav.world.manoeuvres import Manoeuvre, table
-from simnav.world.sea import Sea, components
+from simnav.world.sea import Sea, components, steady, wave_number
 from simnav.world.start import Start
 from simnav.world.track import PlannedTrack
 from simnav.world.trajectory import WorldBlock
@@ -47,6 +47,8 @@ class World:
         Sample rate of the ideal IMU [Hz].
     seed : int
         Seed of the wave components and of the variable part of the current.
+    depth : float, optional
+        Depth of the water [m], which a sea with the response ``encounter`` knows.
 
     Attributes
     ----------
@@ -64,6 +66,7 @@ class World:
         *,
         rate: float,
         seed: int,
+        depth: float | None = None,
     ):
         if not rate > 0.0:
             raise ValueError(f"rate = {rate!r} Hz should be positive")
@@ -81,7 +84,8 @@ class World:
             p[motion.SHEAR] = current.shear / current.speed  # the variable part decreases with depth like the mean
         if sea is not None and vessel.dives:
             # Waves decrease as exp(-k z); the wave number at the peak is used for all, to keep the motion smooth.
-            p[motion.ATTENUATION] = (2.0 * np.pi / sea.peak_period) ** 2 / 9.81
+            known = depth if sea.response == "encounter" else None
+            p[motion.ATTENUATION] = wave_number(np.array([2.0 * np.pi / sea.peak_period]), known)[0]
         x = np.zeros(motion.STATE)
         x[motion.U] = x[motion.SPEED_COMMAND] = x[motion.SPEED_TARGET] = start.speed
         x[motion.SPEED_SLEW] = np.inf
@@ -93,9 +97,14 @@ class World:
         self._x, self._p = x, p
         self._index = np.zeros(4, dtype=np.int64)
         self._rows, self._points = table(manoeuvres)
-        self._phase, self._waves = components(sea, seed)
+        self._phase, self._waves = components(sea, seed, depth)
         self._eddies = eddies(current, seed)
         self.sizes = np.array([len(self._rows), len(self._points), self._phase.shape[1], len(self._eddies)])
+        if sea is not None and sea.response == "encounter" and len(self._phase[0]):
+            p[motion.OSCILLATORS : motion.OSCILLATORS + 8] = np.ravel(sea.oscillators)
+            north, east = start.speed * np.cos(start.heading), start.speed * np.sin(start.heading)
+            at = steady(sea, self._phase, self._waves, north, east, start.heading)
+            x[motion.ANSWERS : motion.ANSWERS + 12] = at.ravel()
         motion.initialise(self._x, self._p, self._phase, self._waves, self._eddies)
 
     @property

@@ -1,4 +1,4 @@
-"""Ten short scenarios with faults of every kind, on which the golden test runs every row.
+"""Eleven short scenarios with faults of every kind, on which the golden test runs every row.
 
 Each is a scenario of the catalogue, cut after less than a minute, with faults of its own.
 """
@@ -6,7 +6,8 @@ Each is a scenario of the catalogue, cut after less than a minute, with faults o
 from __future__ import annotations
 
 import tomllib
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -32,18 +33,23 @@ class Case:
         In place of the faults of that scenario, as in a TOML file.
     slow : bool
         Whether slow rows run on it, too.
+    instruments : mapping of str to dict
+        In place of instruments of that scenario, as in a TOML file.
     """
 
     base: str
     duration: float
     faults: tuple[dict[str, Any], ...]
     slow: bool = False
+    instruments: Mapping[str, dict[str, Any]] = field(default_factory=dict)
 
     def scenario(self) -> Scenario:
         """The scenario."""
         table = table_of(self.base)
         for name in ("draw", "dial", "fault"):
             table.pop(name, None)
+        if self.instruments:
+            table["instruments"] = {**table["instruments"], **self.instruments}
         return Scenario.from_toml(table | {"duration_s": self.duration, "fault": list(self.faults)}, source=self.base)
 
 
@@ -85,6 +91,13 @@ CASES = {
         _fault("imu_dropout", "imu", 14.0, 14.2, output="zero"),
         _fault("imu_dropout", "imu", 17.0, 17.25),
     )),
+    "satellites jammed and spoofed": Case("open-sea", 24.0, (
+        _fault("jamming", "gnss", 5.0, 15.0, loss=18.0, rise_s=8.0),
+        _fault("spoofing", "gnss", 12.0, 22.0, drift_m_s=[2.0, -1.0, 0.0], clock_drift_m_s=0.5),
+    ), instruments={"gnss": {
+        "kind": "gnss_raw", "satellites": ["G12", "G29", "E27", "E30", "E34"], "sigma_pseudorange_m": 0.3,
+        "sigma_range_rate_m_s": 0.05, "lever_arm_m": [1.0, 0.0, -3.0],
+    }}),
     "gnss velocity with gross errors": Case("open-sea", 24.0, (
         _fault("gross_error", "gnss_velocity", 6.0, 20.0, probability=0.4, size_m_s=[1.0, 3.0]),
     )),

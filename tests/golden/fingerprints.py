@@ -176,7 +176,12 @@ def of_case(case: Case) -> dict[str, Any]:
         if name in _SCORED and trial.status == "ok":
             values = score(trial, recording, [n for n in SCORES if not n.startswith("update_")])
             scores[name] = {key: value for key, value in values.items() if np.isfinite(value)}
-    content = [case.duration, list(case.faults), said(table_of(case.base) | {"fault": [], "draw": {}})]
+    content = [
+        case.duration,
+        list(case.faults),
+        *([dict(case.instruments)] if case.instruments else []),
+        said(table_of(case.base) | {"fault": [], "draw": {}}),
+    ]
     says = hashlib.blake2b(json.dumps(content).encode(), digest_size=6).hexdigest()
     return {"says": says, "recording": _rounded(of_recording(recording)), "rows": _rounded(rows),
             "scores": _rounded(scores)}  # fmt: skip

@@ -16,6 +16,7 @@ from simnav.sensors.faults.imu_disturbance import ImuDisturbance
 from simnav.sensors.faults.imu_faults import ImuBiasStep, ImuClipping, ImuDropout
 from simnav.sensors.faults.layer import Activity, FaultLayer
 from simnav.sensors.faults.replacing import FalseZero, Frozen, Outage, ReplacingLayer
+from simnav.sensors.faults.satellite_signals import Jamming, Spoofing
 from simnav.sensors.faults.sizes import Size, size_by_component, size_range
 from simnav.spec import OneOf
 
@@ -36,6 +37,7 @@ __all__ = [
     "ImuClipping",
     "ImuDisturbance",
     "ImuDropout",
+    "Jamming",
     "Multipath",
     "Names",
     "NoiseStep",
@@ -43,6 +45,7 @@ __all__ = [
     "Ramp",
     "ReplacingLayer",
     "Size",
+    "Spoofing",
     "build_layers",
     "effect_of",
     "fault_specs",

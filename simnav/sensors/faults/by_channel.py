@@ -51,13 +51,15 @@ def each_channel(stream: AidStream, channels: tuple[str, ...], apply: Callable[[
             continue
         rest &= ~own
         lost &= ~own_lost
-        # A fault may leave out readings, and need not know of their side information.
+        # A fault may leave out readings, and need not know of their side information, which it also may change.
         rows = slice(None) if len(result) == len(part) else np.searchsorted(part.time, result.time)
+        own_side = result.side.shape == (len(result), part.side.shape[1])
+        side = result.side if own_side else part.side[rows]
         changed.append(
             replace(
                 result,
                 channel=np.full(len(result), c, np.int16),
-                side=part.side[rows],
+                side=side,
                 dropped_channel=np.full(len(result.dropped), c, np.int16),
             )
         )

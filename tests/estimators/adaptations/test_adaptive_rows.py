@@ -18,7 +18,8 @@ from simnav.source import record
 from simnav.trial import run_trial
 from simnav.types import Instruments
 
-ROWS = [name for name in names() if find(name).__module__ == "simnav.estimators.rows.adaptive"]
+#: But for the one with states of a DVL.
+ROWS = [name for name in names() if find(name).__module__ == "simnav.estimators.rows.adaptive" and name != "adkf-23"]
 PAPER = [name for name in ROWS if name.endswith("-paper")]
 DEFAULTS = [name for name in ROWS if name not in PAPER]
 #: Rows that are to withstand gross errors; Sage-Husa and its kin estimate a noise that lasts.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from simnav.estimator import make
@@ -18,8 +19,10 @@ def test_its_error_is_the_distance_of_the_outage(seed):
     recording = record(load("ship-straight").with_values({"duration_s": 240.0, "fault": [OUTAGE]}), seed)
     found = {name: score(run_trial(make(name), recording), recording) for name in ("ship-ekf", "ship-ekf-standing")}
     standing = found["ship-ekf-standing"]["outage_end_error_max"]
-    speed = 6.5  # m/s, about
-    assert 0.75 * 60.0 * speed < standing < 1.3 * 60.0 * speed
+    truth = recording.data.truth
+    away = (truth.time >= OUTAGE["start_s"]) & (truth.time <= OUTAGE["end_s"])
+    distance = 60.0 * float(np.hypot(*truth.velocity[away, :2].T).mean())
+    assert 0.9 * distance < standing < 1.1 * distance
     assert found["ship-ekf"]["outage_end_error_max"] < 0.1 * standing
 
 

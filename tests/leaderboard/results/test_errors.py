@@ -29,6 +29,7 @@ def test_the_reason_of_a_result():
     assert result.reason == READABLE
 
 
+@pytest.mark.usefixtures("clean_registry")
 def test_the_reason_of_a_run(tmp_path: Path, capfd: pytest.CaptureFixture[str]):
     (tmp_path / "shouting.py").write_text(SHOUTING)
     (run,) = simnav.run("ship-straight", tmp_path / "shouting.py", seed=0).estimators

@@ -52,4 +52,4 @@ def test_seeds_give_different_seas_and_the_same_one_the_same():
 
 
 def test_flat_sea_has_no_components():
-    assert components(None, 1)[1].shape == (17, 0)
+    assert components(None, 1)[1].shape == (19, 0)

@@ -121,7 +121,11 @@ def test_tables_round_trip_and_count_in_the_digest(shoal, plugins, text):
     [
         ("mean_m_s", "mean", "unknown key 'surroundings.sound_speed.mean'.*'mean_m_s'"),
         ("1480.0", "-1.0", "surroundings.sound_speed.mean_m_s = -1.0: should be greater than 0"),
-        ('kind = "slope"', "", "surroundings.bottom has no key 'kind'; one of: obstacles, slope, sound_speed"),
+        (
+            'kind = "slope"',
+            "",
+            "surroundings.bottom has no key 'kind'; one of: obstacles, water_level, slope, sound_speed",
+        ),
         ('kind = "slope"', 'kind = "slop"', "surroundings.bottom.kind = 'slop' is unknown; did you mean 'slope'"),
         ("[start]", "water_depth_m = 40.0\n[start]", "surroundings.bottom: water_depth_m says the same"),
         ("surroundings.sound_speed", "surroundings.Sound", "Sound"),

@@ -1,0 +1,133 @@
+"""The readings of the channels of one instrument, predicted all at one time.
+
+A window predicts each reading of each of its nodes again in every iteration: 20 satellites in 20 nodes are 400 calls of
+a Python function. A kind that has `simnav.kinds.Kind.observations` is called once instead. The result is that of
+`simnav.estimators.models.own_observation`, reading by reading.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simnav.blocks import NAVIGATION
+from simnav.geometry.earth import earth_rate
+from simnav.kinds import NavigationPoints, Observations
+from simnav.types import Array
+
+from .channels import ChannelDatasheet, whole
+from .own_observation import OwnObservation
+
+__all__ = ["ManyReadings", "of_instruments"]
+
+
+def of_instruments(own: Mapping[str, OwnObservation], bias_at: Mapping[str, int]) -> list[ManyReadings]:
+    """One `ManyReadings` for each instrument with channels whose kind can predict many readings at one time.
+
+    Parameters
+    ----------
+    own : mapping of str to OwnObservation
+        The equation of each source of readings, by its name.
+    bias_at : mapping of str to int
+        Index in the error state of the first bias of a source; sources without one are not in it.
+    """
+    groups: dict[str, list[str]] = {}
+    for name, observation in own.items():
+        sheet = observation.sheet
+        if isinstance(sheet, ChannelDatasheet) and observation.kind.observations is not None:
+            groups.setdefault(sheet.instrument, []).append(name)
+    return [
+        ManyReadings({name: own[name] for name in names}, observations)
+        for names in groups.values()
+        if (observations := own[names[0]].kind.observations) is not None and bias_at.keys().isdisjoint(names)
+    ]
+
+
+class ManyReadings:
+    """The measurement equation of all channels of an instrument, without biases of the channels.
+
+    Parameters
+    ----------
+    own : mapping of str to OwnObservation
+        The equation of each channel, by its source.
+    observations : callable
+        The function of the kind.
+    """
+
+    def __init__(self, own: Mapping[str, OwnObservation], observations: Observations):
+        first = next(iter(own.values()))
+        assert isinstance(first.sheet, ChannelDatasheet)
+        self.sources, self.kind, self._observations = tuple(own), first.kind, observations
+        self._sheet = whole(first.sheet)
+        self._channel = {name: first.sheet.siblings.index(o.channel) for name, o in own.items()}
+        self._places = first.places
+        self._zeros = {b.name: np.zeros((1, b.size)) for b in first.sheet.blocks if b.name not in self._places}
+
+    def channels(self, names: Sequence[str]) -> NDArray[np.intp]:
+        """(k,) places of the channels of sources in the datasheet; -1 for the sources of other instruments."""
+        return np.array([self._channel.get(name, -1) for name in names], dtype=np.intp)
+
+    def linearise(
+        self, time: Array, value: Array, channel: NDArray[np.intp], state: Sequence[Array], side: Array, offset: int,
+    ) -> tuple[Array, Array]:  # fmt: skip
+        """Innovations and Jacobians of n readings.
+
+        Parameters
+        ----------
+        time : (n,) array
+            Times of validity [s].
+        value : (n, d) array
+            Measured values.
+        channel : (n,) int array
+            Their channels, as of `channels`.
+        state : sequence of array
+            For each reading: position, velocity, DCM, output of the gyroscopes, their bias first, calibration (n, m).
+        side : (n, s) array
+            Their side information.
+        offset : int
+            Index in the error state of the first calibration state.
+
+        Returns
+        -------
+        innovation : (n, d) array
+            Measured minus predicted.
+        jacobian : (n, d, offset + m) array
+            Derivative of the prediction by the error state.
+        """
+        position, velocity, dcm, rate, bias, calibration = state
+        turning = rate - bias[:, :3] - np.einsum("nji,nj->ni", dcm, earth_rate(position[:, 0]))
+        at = {name: slice(k, k + self._size(name)) for name, k in self._places.items()}
+        n = len(time)
+        blocks = {name: np.broadcast_to(zero, (n, zero.shape[1])) for name, zero in self._zeros.items()}
+        blocks |= {name: calibration[:, where] for name, where in at.items()}
+        points = NavigationPoints(time, position, velocity, dcm, turning, blocks, channel, side)
+        reading, given = self._observations(points, self._sheet)
+        jacobian = np.zeros((n, value.shape[1], offset + calibration.shape[1]))
+        jacobian[:, :, :9] = given[NAVIGATION]
+        for name, where in at.items():
+            jacobian[:, :, where.start + offset : where.stop + offset] = given[name]
+        return self.kind.difference(value, reading), jacobian
+
+    def noise(self, side: Array) -> Array:
+        """The (n, d) variances of the white noise of n readings, from their (n, s) side information.
+
+        Raises
+        ------
+        ValueError
+            If the kind's function returns something else.
+        """
+        function, shape = self.kind.reading_sigma, (len(side), len(self.kind.components))
+        if function is None:
+            return np.broadcast_to(self._sheet.sigma**2, shape)
+        sigma = np.asarray(function(side, self._sheet), dtype=np.float64)
+        if sigma.shape != shape or not (np.isfinite(sigma).all() and np.all(sigma >= 0.0)):
+            raise ValueError(
+                f"reading_sigma of kind {self._sheet.kind!r}, for the instrument {self._sheet.name!r}, should return "
+                f"an array of shape {shape} for so many readings, finite and not negative, not {sigma.tolist()!r:.200}"
+            )
+        return np.asarray(sigma**2)
+
+    def _size(self, name: str) -> int:
+        return next(block.size for block in self._sheet.blocks if block.name == name)

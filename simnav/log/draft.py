@@ -1,0 +1,268 @@
+"""A scenario to begin with, from the streams of a log: what columns are, by their names and sizes."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from simnav.log.inspection import Stream
+from simnav.types import Array
+
+__all__ = ["Guess", "draft", "guesses"]
+
+_AXES = r"(?:_|\.|\[|\s|-)?"
+_LABEL = {
+    "angular_rate": r"gyr?o?|g|w|ang(ular)?[_.]?(vel(ocity)?|rate)|omega|imu[_.]g",
+    "specific_force": r"acc?(el)?(eration)?|a|f|linear[_.]acc(eleration)?|imu[_.]a",
+}
+_DVL = (("x", "forward"), ("y", "starboard"), ("z", "down"))
+#: Quantity -> regular expressions of the names of its columns, in order.
+_NAMES: dict[str, tuple[str, ...]] = {
+    "position": (
+        r"^(gps|gnss|nav)?[_.]?lat(itude)?\b|^lat",
+        r"^(gps|gnss|nav)?[_.]?(lon|lng)",
+        r"^(height|hgt|h$|ellh)|^(alt|ele)",
+    ),
+    **{quantity: tuple(rf"^({label}){_AXES}{axis}\b" for axis in "xyz") for quantity, label in _LABEL.items()},
+    "heading": (r"^(true[_.]?)?(heading|hdg|yaw)\b|^(heading|yaw)_",),
+    "level": (r"^roll\b|^roll_", r"^pitch\b|^pitch_"),
+    "velocity": (r"^(vel(ocity)?[_.]?n(orth)?|vn)\b", r"^(vel(ocity)?[_.]?e(ast)?|ve)\b"),
+    "dvl": tuple(rf"^(dvl[_.]?(v|vel)?[_.]?{axis}|ground_{name}|v_?{name}|v{axis})\b" for axis, name in _DVL),
+    "speed": (r"^(speed|stw|water_?speed)\b",),
+    "depth": (r"^depth\b|^depth_(m|meter)",),
+}
+#: Kinds of instruments that a quantity becomes, with a sigma to begin with.
+_INSTRUMENTS = {
+    "position": ("gnss", 'kind = "gnss_position"', "sigma_m = [2.0, 2.0, 4.0]"),
+    "heading": ("gyrocompass", 'kind = "gyrocompass"', "sigma_deg = 1.0"),
+    "dvl": ("dvl", 'kind = "dvl"', "sigma_m_s = 0.05"),
+    "speed": ("speed_log", 'kind = "speed_log"', "sigma_m_s = 0.3"),
+    "depth": ("depth", 'kind = "depth"', "sigma_m = 0.3"),
+}
+#: Sentences that say nothing of the vessel's own motion, though their columns have such names.
+_NOT = {"depth": ("DPT", "DBT", "PSIMSSB"), "speed": ("RMC", "VTG", "GGA")}
+_EVERY = 10
+
+
+@dataclass(frozen=True)
+class Guess:
+    """What some columns of a stream probably are.
+
+    Attributes
+    ----------
+    stream : Stream
+        The stream.
+    quantity : str
+        A key of `_NAMES`.
+    columns, units : tuple of str
+        Columns with signs, and their units.
+    """
+
+    stream: Stream
+    quantity: str
+    columns: tuple[str, ...]
+    units: tuple[str, ...]
+
+    def sentence(self) -> str:
+        """As text."""
+        pairs = ", ".join(f"{c} [{u}]" for c, u in zip(self.columns, self.units, strict=True))
+        return f"{self.quantity.replace('_', ' ')}: {pairs}"
+
+
+def guesses(stream: Stream) -> Iterator[Guess]:
+    """What the columns of a stream probably are; everything is to be checked by its user."""
+    names = [n for n in stream.table.names if stream.table.columns[n].dtype != object]
+    for quantity, patterns in _NAMES.items():
+        if stream.sentence in _NOT.get(quantity, ()):
+            continue
+        found = []
+        for pattern in patterns:
+            found += _first(names, pattern)
+        if len(found) < len(patterns) and not (quantity == "position" and len(found) == 2):
+            continue
+        values = np.stack([stream.table.column(n)[1] for n in found], axis=-1)
+        values = values[np.isfinite(values).all(axis=1)]
+        if not len(values):
+            continue
+        columns, units = _signed(quantity, found, values), _units(stream, quantity, values)
+        yield Guess(stream, quantity, columns, units)
+
+
+def _first(names: Sequence[str], pattern: str) -> list[str]:
+    """The first name that fits the first alternative that any name fits; empty for none."""
+    for alternative in pattern.split("|^"):
+        text = alternative if alternative.startswith("^") else f"^{alternative}"
+        found = [n for n in names if re.search(text, n.strip().lstrip("#").strip(), re.I)]
+        if found:
+            return found[:1]
+    return []
+
+
+def _signed(quantity: str, columns: Sequence[str], values: Array) -> tuple[str, ...]:
+    """Signs of columns: gravity must point up, and axes forward, left, up become forward, starboard, down."""
+    if quantity == "specific_force" and float(np.mean(values[:, 2])) > 0.0:
+        return columns[0], f"-{columns[1]}", f"-{columns[2]}"
+    if quantity == "position" and len(columns) == 2:
+        return (*columns, "=0")
+    return tuple(columns)
+
+
+def _units(stream: Stream, quantity: str, values: Array) -> tuple[str, ...]:
+    size, width = float(np.percentile(np.abs(values), 99.0)), int(values.shape[1])
+    if stream.form == "nmea":
+        return ("1",) * (3 if quantity == "position" else width)
+    if quantity == "position":
+        angle = "rad" if np.abs(values[:, 0]).max() < 1.58 and np.abs(values[:, 1]).max() < 3.15 else "deg"
+        if np.abs(values[:, :2]).max() > 361.0:
+            angle = "1e-7 deg"
+        return angle, angle, "m"
+    if quantity == "angular_rate":
+        return ("deg_s" if size > 4.0 else "rad_s",) * 3
+    if quantity == "specific_force":
+        norm = float(np.median(np.linalg.norm(values, axis=1)))
+        return ("g" if norm < 2.0 else "m_s2" if norm < 50.0 else "mg",) * 3
+    if quantity in ("heading", "level"):
+        return ("deg" if size > 6.3 else "rad",) * width
+    return ("m" if quantity == "depth" else "m_s",) * width
+
+
+def draft(streams: Sequence[Stream], name: str = "my-log") -> str:
+    """The text of a scenario file over the streams, with all that has to be checked as comments.
+
+    Parameters
+    ----------
+    streams : sequence of Stream
+        From `simnav.log.inspection.inspect_log`, of one folder.
+    name : str
+        Name of the scenario.
+
+    Returns
+    -------
+    str
+        TOML. It can be run where one of the streams has positions; otherwise it says what is missing.
+    """
+    found = [g for s in streams for g in guesses(s)]
+    best: dict[str, Guess] = {}
+    for guess in found:  # of several the longest
+        if guess.quantity not in best or len(guess.stream.time) > len(best[guess.quantity].stream.time):
+            best[guess.quantity] = guess
+    position = best.get("position")
+    if position is None:
+        return (
+            f"# No columns with latitude and longitude were found in {len(streams)} streams. A scenario needs\n"
+            "# positions as a reference: see docs/how-to/use-your-own-log.md.\n"
+        )
+    rate, force = best.get("angular_rate"), best.get("specific_force")
+    inertial = rate is not None and force is not None and rate.stream is force.stream
+    used = [position, *(g for q, g in best.items() if q in _INSTRUMENTS and q != "position")]
+    if inertial and rate is not None:
+        used.append(rate)
+    keys = _file_keys(used)
+    span = float(position.stream.time[-1] - position.stream.time[0])
+    lines = [
+        "# A scenario to begin with. Check everything that is marked: simnav cannot know it.",
+        f"# Then: simnav check {name}.toml; simnav run {name}.toml",
+        f'name = "{name}"',
+        "version = 1",
+        f'title = "{name}"',
+        f"duration_s = {max(1.0, np.floor(span)):.1f}",
+        "",
+        "[initial_error]",
+        "position_m = [2.0, 2.0, 3.0]",
+        "velocity_m_s = [0.2, 0.2, 0.2]",
+        "attitude_deg = [1.0, 1.0, 5.0]",
+        "",
+        "[log]",
+        f"folder = {json.dumps(str(position.stream.path.resolve().parent))}",
+        'begin = "moving"                 # check: the course of the moving vessel is its heading at the start',
+    ]
+    if "heading" in best or span < 20.0:
+        lines[-1] = f"# {lines[-1]}"
+    for stream, key in keys.items():
+        lines += ["", *_file(stream, key)]
+    if inertial and rate is not None and force is not None:
+        lines += ["", *_imu(rate, force, keys)]
+    for quantity, guess in best.items():
+        if quantity in _INSTRUMENTS:
+            lines += ["", *_channel(f"log.instruments.{_INSTRUMENTS[quantity][0]}", guess, keys)]
+            if quantity == "position":
+                lines.append(f"every = {_EVERY}                     # every tenth fix to the estimators ...")
+    lines += ["", *_channel("log.reference.position", position, keys)]
+    lines.append(f"hold_out = {_EVERY}                  # ... and the others to compare with")
+    if inertial and rate is not None:
+        hertz = 1.0 / float(np.median(np.diff(rate.stream.time)))
+        lines += ["", "[instruments.imu]", f"rate_hz = {_round(hertz)}",
+                  'grade = "mems"                   # check: or the figures of its datasheet']  # fmt: skip
+    for quantity, guess in best.items():
+        if quantity in _INSTRUMENTS:
+            label, kind, sigma = _INSTRUMENTS[quantity]
+            hertz = 1.0 / max(1e-3, float(np.median(np.diff(guess.stream.time)))) if len(guess.stream.time) > 1 else 1.0
+            hertz = hertz / _EVERY if quantity == "position" else hertz
+            lines += ["", f"[instruments.{label}]", kind, f"rate_hz = {_round(hertz)}", f"{sigma}   # check"]
+    return "\n".join(lines) + "\n"
+
+
+def _round(value: float) -> str:
+    return f"{float(f'{value:.4g}')!r}"
+
+
+def _file_keys(used: Sequence[Guess]) -> dict[Any, str]:
+    """A name for each file, by path and keys."""
+    keys: dict[Any, str] = {}
+    for guess in used:
+        stem = re.sub(r"\W+", "_", guess.stream.path.stem.lower()).strip("_") or "file"
+        place = guess.stream.path
+        if place not in keys:
+            keys[place] = stem if stem not in keys.values() else f"{stem}_{len(keys)}"
+    by_stream: dict[Any, Any] = {}
+    for guess in used:
+        by_stream.setdefault(guess.stream.path, (guess.stream, keys[guess.stream.path]))
+    return dict(by_stream.values())
+
+
+def _key_of(keys: dict[Any, str], stream: Stream) -> str:
+    return next(key for known, key in keys.items() if known.path == stream.path)
+
+
+def _file(stream: Stream, key: str) -> list[str]:
+    lines = [f"[log.files.{key}]", f"path = {json.dumps(stream.path.name)}"]
+    if stream.form != "csv":
+        lines.append(f'format = "{stream.form}"')
+    for name, value in stream.keys.items():
+        lines.append(f"{name} = {json.dumps(list(value) if isinstance(value, tuple) else value)}")
+    if stream.form == "csv" and len(stream.time) > 1 and (np.diff(stream.time) == 0.0).any():
+        lines.append('same_time = "spread"             # check: some rows have the same time')
+    return lines
+
+
+def _channel(table: str, guess: Guess, keys: dict[Any, str]) -> list[str]:
+    stream = guess.stream
+    lines = [f"[{table}]", f'file = "{_key_of(keys, stream)}"']
+    if stream.sentence is not None:
+        lines.append(f"sentence = {json.dumps(stream.sentence)}")
+    if stream.talker is not None:
+        lines.append(f'talker = "{stream.talker}"')
+    columns = list(guess.columns)
+    lines.append(f"columns = {json.dumps(columns)}")
+    if set(guess.units) != {"1"}:
+        lines.append(f"units = {json.dumps(list(guess.units))}   # check")
+    return lines
+
+
+def _imu(rate: Guess, force: Guess, keys: dict[Any, str]) -> list[str]:
+    flipped = force.columns[2].startswith("-")
+    rates = [rate.columns[0], *(f"-{c}" if flipped else c for c in rate.columns[1:])]
+    return [
+        "[log.imu]",
+        f'file = "{_key_of(keys, rate.stream)}"',
+        'samples = "instantaneous"        # check: or "means", "increments"',
+        f"angular_rate = {json.dumps(rates)}   # check: forward, starboard, down; or say mounting_deg",
+        f'angular_rate_unit = "{rate.units[0]}"   # check',
+        f"specific_force = {json.dumps(list(force.columns))}",
+        f'specific_force_unit = "{force.units[0]}"',
+    ]

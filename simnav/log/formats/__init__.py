@@ -1,0 +1,22 @@
+"""The formats of log files that simnav reads, one file each. The import of this module registers their readers."""
+
+from __future__ import annotations
+
+from simnav.log.delimited import read_csv
+from simnav.log.formats import bags, euroc, hdf5, kf_gins, mat, parquet, pd0, rtklib, sbet, tum
+from simnav.log.nmea import read_nmea
+
+__all__ = [
+    "bags",
+    "euroc",
+    "hdf5",
+    "kf_gins",
+    "mat",
+    "parquet",
+    "pd0",
+    "read_csv",
+    "read_nmea",
+    "rtklib",
+    "sbet",
+    "tum",
+]

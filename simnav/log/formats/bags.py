@@ -1,0 +1,178 @@
+"""Bags of ROS 1 and ROS 2, and MCAP files: the messages of one topic as a table (an extra: rosbags, mcap).
+
+``sentence`` of a channel, or ``options = { topic = "/imu" }`` of the file, names the topic. Columns are the numbers in
+a message, by their path: ``linear_acceleration.x``, ``position_covariance_1``. Times are those at which messages were
+recorded (``clock = "logger"``) or those in their header (``clock = "sentence"``).
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from simnav.log.files import FileSpec
+from simnav.log.reader import Rows, register_reader
+from simnav.log.table import LogError, Table
+from simnav.spec import closest
+
+__all__ = ["topics_of"]
+
+#: Longer arrays in a message (images, point clouds) are left out.
+_LONGEST = 64
+_DEEPEST = 8
+
+
+@register_reader("rosbag", title="a bag")
+def read_bag(path: Path, file: FileSpec, sentence: str | None, talker: str | None) -> Rows:
+    """See the module."""
+    return _rows(path, file, sentence, "rosbag")
+
+
+@register_reader("mcap", title="an MCAP file")
+def read_mcap(path: Path, file: FileSpec, sentence: str | None, talker: str | None) -> Rows:
+    """See the module."""
+    return _rows(path, file, sentence, "mcap")
+
+
+def _rows(path: Path, file: FileSpec, sentence: str | None, form: str) -> Rows:
+    topic = sentence or file.options.get("topic")
+    if not path.exists():
+        raise FileNotFoundError
+    status = path.stat()
+    table = _table(path, form, None if topic is None else str(topic), status.st_mtime_ns, status.st_size)
+    clock = "header" if file.clock == "sentence" else "recorded"
+    if clock not in table.columns:
+        raise LogError(f"{table.source}: its messages have no stamp in a header; say clock = 'logger'")
+    return Rows(table, table.column(clock)[1], clock)
+
+
+@lru_cache(maxsize=16)
+def _table(path: Path, form: str, topic: str | None, _mtime: int, _size: int) -> Table:
+    messages = _mcap(path, topic) if form == "mcap" else _bag(path, topic)
+    rows: list[dict[str, float]] = []
+    try:
+        for stamp, message in messages:
+            row = {"recorded": 1e-9 * stamp, **dict(_numbers("", message, 0))}
+            if "header.stamp.sec" in row:
+                row["header"] = row["header.stamp.sec"] + 1e-9 * row.get("header.stamp.nanosec", 0.0)
+            elif "timestamp.sec" in row:
+                row["header"] = row["timestamp.sec"] + 1e-9 * row.get("timestamp.nsec", 0.0)
+            rows.append(row)
+    except (LogError, FileNotFoundError):
+        raise
+    except (MemoryError, Exception) as error:
+        text = " ".join(str(error).split())[:100]
+        raise LogError(
+            f"{path}: message {len(rows) + 1} cannot be read ({type(error).__name__}: {text or 'no more is known'}); "
+            "the file is damaged or cut off"
+        ) from None
+    if not rows:
+        raise LogError(f"{path}: the topic {topic!r} has no messages")
+    names = list(dict.fromkeys(name for row in rows for name in row))
+    columns = {name: np.array([row.get(name, np.nan) for row in rows]) for name in names}
+    return Table(f"{path} ({topic})", dict(columns), np.arange(1, len(rows) + 1), numbered=False)
+
+
+def topics_of(path: Path, form: str) -> list[str]:
+    """The topics of a file of the format ``rosbag`` or ``mcap``.
+
+    Raises
+    ------
+    LogError
+        If it cannot be read.
+    """
+    try:
+        if form == "mcap":
+            from mcap.reader import make_reader
+
+            with open(path, "rb") as stream:
+                summary = make_reader(stream).get_summary()
+            return sorted({c.topic for c in summary.channels.values()}) if summary else []
+        from rosbags.highlevel import AnyReader
+        from rosbags.typesys import Stores, get_typestore
+
+        with AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader:
+            return sorted({c.topic for c in reader.connections})
+    except ImportError as error:
+        raise LogError(f"{path}: needs the library {error.name}: pip install 'simnav[logs]'") from None
+    except Exception as error:
+        raise LogError(f"{path}: its topics cannot be read ({' '.join(str(error).split())[:100]})") from None
+
+
+def _choose(path: Path, topic: str | None, topics: list[str]) -> str:
+    if topic is None:
+        raise LogError(f"{path}: say which topic (sentence); there are: {', '.join(sorted(topics)) or 'none'}")
+    if topic not in topics:
+        raise LogError(f"{path}: there is no topic {topic!r}{closest(topic, topics)}")
+    return topic
+
+
+def _bag(path: Path, topic: str | None) -> Iterator[tuple[int, Any]]:
+    try:
+        from rosbags.highlevel import AnyReader
+        from rosbags.typesys import Stores, get_typestore
+    except ImportError:
+        raise LogError(f"{path}: format = 'rosbag' needs the library rosbags: pip install 'simnav[logs]'") from None
+    with AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader:
+        chosen = _choose(path, topic, sorted({c.topic for c in reader.connections}))
+        connections = [c for c in reader.connections if c.topic == chosen]
+        for connection, stamp, raw in reader.messages(connections=connections):
+            yield stamp, reader.deserialize(raw, connection.msgtype)
+
+
+def _mcap(path: Path, topic: str | None) -> Iterator[tuple[int, Any]]:
+    try:
+        from mcap.reader import make_reader
+    except ImportError:
+        raise LogError(f"{path}: format = 'mcap' needs the library mcap: pip install 'simnav[logs]'") from None
+    decode: dict[int, Any] = {}
+    with open(path, "rb") as stream:
+        reader = make_reader(stream)
+        summary = reader.get_summary()
+        topics = sorted({c.topic for c in summary.channels.values()}) if summary else []
+        chosen = _choose(path, topic, topics) if topics else topic
+        for schema, channel, message in reader.iter_messages(topics=None if chosen is None else [chosen]):
+            if channel.id not in decode:
+                decode[channel.id] = _decoder(path, channel, schema)
+            yield message.log_time, decode[channel.id](message.data)
+
+
+def _decoder(path: Path, channel: Any, schema: Any) -> Any:
+    """A function from the bytes of a message to an object, for the encodings that are known."""
+    if channel.message_encoding == "json":
+        return json.loads
+    if channel.message_encoding == "cdr" and schema is not None and schema.encoding == "ros2msg":
+        try:
+            from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+        except ImportError:
+            raise LogError(f"{path}: messages of ROS 2 need the library rosbags: pip install 'simnav[logs]'") from None
+        store = get_typestore(Stores.ROS2_HUMBLE)
+        name = schema.name if schema.name.count("/") == 2 else schema.name.replace("/", "/msg/")
+        if name not in store.types:
+            text = schema.data.decode().split("=" * 80)[0]
+            store.register(get_types_from_msg(text, name))
+        return lambda raw: store.deserialize_cdr(raw, name)
+    raise LogError(
+        f"{path}: messages of the topic {channel.topic!r} are encoded as {channel.message_encoding!r}; read are 'json' "
+        "and 'cdr' (ROS 2)"
+    )
+
+
+def _numbers(name: str, value: Any, depth: int) -> Iterator[tuple[str, float]]:
+    """The numbers in a message, with their paths."""
+    if isinstance(value, (bool, int, float, np.number)):
+        yield name, float(value)
+    elif isinstance(value, (np.ndarray, list, tuple)):
+        if len(value) <= _LONGEST and depth < _DEEPEST:
+            for i, inner in enumerate(value):
+                yield from _numbers(f"{name}_{i + 1}", inner, depth + 1)
+    elif depth < _DEEPEST:
+        fields = value if isinstance(value, dict) else getattr(value, "__dict__", {})
+        for key, inner in fields.items():
+            if not str(key).startswith("__"):
+                yield from _numbers(f"{name}.{key}" if name else str(key), inner, depth + 1)

@@ -1,0 +1,261 @@
+"""What the files of a log hold: streams with their rates and gaps, and what their columns probably are."""
+
+from __future__ import annotations
+
+import re
+import warnings
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from simnav.log.binary import signature
+from simnav.log.check import described
+from simnav.log.delimited import read_csv
+from simnav.log.files import FileSpec
+from simnav.log.formats.bags import topics_of
+from simnav.log.nmea import read_nmea
+from simnav.log.reader import READERS
+from simnav.log.table import LogError, Table, utc_seconds
+from simnav.types import Array
+
+__all__ = ["Stream", "inspect_log", "streams_of"]
+
+#: Ending of a file -> its format, where its content says nothing.
+_ENDINGS = {
+    ".pos": "rtklib", ".tum": "tum", ".nmea": "nmea", ".sbet": "sbet", ".out": "sbet", ".pd0": "pd0", ".mat": "mat",
+    ".h5": "hdf5", ".hdf5": "hdf5", ".parquet": "parquet", ".mcap": "mcap", ".bag": "rosbag", ".db3": "rosbag",
+}  # fmt: skip
+_TIME = re.compile(r"^#?\s*(time|times|timestamp|stamp|t|utc|sec|secs|seconds|epoch|gpstime|datetime)(?![a-z])", re.I)
+_DATE = re.compile(r"^\s*(date|day|%?\s*ymd)\b", re.I)
+#: Times of this size are in this unit.
+_LARGE = ((1e17, "ns"), (1e14, "us"), (1e11, "ms"))
+#: Columns of an IMU.
+_INERTIAL = re.compile(r"^(a|g|w|acc|gyr|gyro|accel|omega)[_ .]?[xyz]\b", re.I)
+_LINES = 40
+
+
+@dataclass(frozen=True, eq=False)
+class Stream:
+    """One table of a file.
+
+    Attributes
+    ----------
+    path : Path
+        The file.
+    form : str
+        Its format.
+    sentence, talker : str or None
+        Of NMEA; for bags the topic.
+    table : Table
+        Its columns.
+    time : (n,) array
+        Times of the rows [s].
+    keys : dict
+        Keys of `FileSpec` with which it is read.
+    notes : tuple of str
+        What was left out, or looks wrong.
+    """
+
+    path: Path
+    form: str
+    sentence: str | None
+    talker: str | None
+    table: Table
+    time: Array
+    keys: dict[str, Any] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+
+    @property
+    def name(self) -> str:
+        """File, and sentence or topic."""
+        inside = "" if self.sentence is None else f" {self.talker or ''}{self.sentence}"
+        return f"{self.path.name}{inside}"
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain: what ``simnav inspect --json`` prints."""
+        columns: dict[str, dict[str, Any]] = {}
+        for name in self.table.names:
+            values = self.table.columns[name]
+            if values.dtype == object:
+                columns[name] = {"text": str(next((v for v in values if v is not None), ""))[:40]}
+                continue
+            finite = values[np.isfinite(values.astype(np.float64))].astype(np.float64)
+            columns[name] = {"missing": int(len(values) - len(finite))}
+            if len(finite):
+                columns[name] |= {
+                    k: float(f(finite)) for k, f in (("least", np.min), ("median", np.median), ("most", np.max))
+                }
+        return {
+            "file": str(self.path), "format": self.form, "sentence": self.sentence, "talker": self.talker,
+            "rows": len(self.table), "times": described(self.time), "columns": columns, "notes": list(self.notes),
+        }  # fmt: skip
+
+
+def inspect_log(paths: Sequence[Path]) -> tuple[list[Stream], list[str]]:
+    """The streams of files, and of the files in folders.
+
+    Parameters
+    ----------
+    paths : sequence of Path
+        Files, or folders whose files are taken.
+
+    Returns
+    -------
+    list of Stream, list of str
+        The streams, and a sentence for each file that cannot be read.
+
+    Raises
+    ------
+    LogError
+        If a path does not exist.
+    """
+    files: list[Path] = []
+    for path in paths:
+        if path.is_dir():
+            files += sorted(p for p in path.iterdir() if p.is_file() and not p.name.startswith("."))
+        elif path.exists():
+            files.append(path)
+        else:
+            raise LogError(f"{path}: there is no such file or folder")
+    found: list[Stream] = []
+    failed: list[str] = []
+    for path in files:
+        try:
+            found += streams_of(path)
+        except LogError as error:
+            failed.append(str(error))
+    return found, failed
+
+
+def streams_of(path: Path) -> list[Stream]:
+    """The streams of one file.
+
+    Raises
+    ------
+    LogError
+        If it cannot be read.
+    """
+    form = _format(path)
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        found = list(_streams(path, form))
+    notes = tuple(dict.fromkeys(" ".join(str(w.message).split()).removeprefix(f"{path}: ") for w in said))
+    return [Stream(s.path, s.form, s.sentence, s.talker, s.table, s.time, s.keys, notes) for s in found]
+
+
+def _format(path: Path) -> str:
+    found = signature(path)
+    if found is not None and found[1]:
+        return found[1]
+    by_ending = _ENDINGS.get(path.suffix.lower())
+    if found is not None:
+        if by_ending in ("sbet", "pd0", "mat"):
+            return by_ending
+        raise LogError(f"{path}: it is {found[0]}; say its format in a scenario: {', '.join(sorted(READERS.items()))}")
+    with open(path, encoding="latin-1") as text:
+        head = [line for _, line in zip(range(_LINES), text, strict=False)]
+    if sum(bool(re.search(r"[$!][A-Z]{4,6},", line)) for line in head) > 0.3 * len(head):
+        return "nmea"
+    if any(re.match(r"%\s+(GPST|UTC|JST)\s", line) for line in head):
+        return "rtklib"
+    return by_ending if by_ending in ("tum", "rtklib", "nmea") else "csv"
+
+
+def _streams(path: Path, form: str) -> Iterator[Stream]:
+    if form == "nmea":
+        tables = read_nmea(path).tables
+        stamped = any(np.isfinite(t.column("logger")[1]).any() for t in tables.values())
+        clock = "logger" if stamped else "sentence"
+        for (talker, sentence), table in tables.items():
+            own = None if talker == "P" else talker
+            yield Stream(path, form, sentence, own, table, _known(table.column(clock)[1]), {"clock": clock})
+        return
+    if form in ("mcap", "rosbag"):
+        for topic in topics_of(path, form):
+            reader = READERS.get(form)
+            assert reader is not None
+            rows = reader.read(path, FileSpec(path=path.name, format=form), topic)
+            yield Stream(path, form, topic, None, rows.table, _known(rows.time))
+        return
+    keys = _time_keys(path) if form == "csv" else _array_keys(path, form)
+    reader = READERS.get(form)
+    assert reader is not None
+    rows = reader.read(path, FileSpec(path=path.name, format=form, **keys))
+    yield Stream(path, form, None, None, rows.table, _known(rows.time), keys)
+
+
+def _known(time: Array) -> Array:
+    return time[np.isfinite(time)]
+
+
+def _time_keys(path: Path) -> dict[str, Any]:
+    """Where the times of a table probably are, as keys of `FileSpec`."""
+    comment = "#" if path.read_bytes()[:1] == b"#" and not _header_in_comment(path) else ""
+    table = read_csv(path, comment)
+    keys: dict[str, Any] = {"comment": comment} if comment else {}
+    names = list(table.names)
+    date = next((n for n in names if _DATE.match(n) and table.columns[n].dtype == object), None)
+    named = next((n for n in names if _TIME.match(n)), None)
+    if date is not None and named is not None and date != named:
+        return keys | {"time": (date, named)}
+    if named is None:
+        named = next((n for n in names if _ascends(table, n)), names[0])
+    values = table.columns[named]
+    if values.dtype == object:
+        first = next((str(v) for v in values if v is not None), "")
+        try:
+            utc_seconds(first)
+        except ValueError:
+            second = names[names.index(named) + 1] if names.index(named) + 1 < len(names) else None
+            if second is None or not re.match(r"\d{4}[-/]", first):
+                raise LogError(f"{path}: no column holds the times; there are: {', '.join(names)}") from None
+            return keys | {"time": (named, second)}
+        return keys | {"time": named, "time_unit": "iso"}
+    return keys | {"time": named, "time_unit": _time_unit(table, named, np.asarray(values, dtype=np.float64))}
+
+
+def _header_in_comment(path: Path) -> bool:
+    with open(path, encoding="latin-1") as text:
+        first, second = text.readline(), text.readline()
+    return not second.startswith("#") and first.count(",") == second.count(",") > 0
+
+
+def _time_unit(table: Table, name: str, values: Array) -> str:
+    ending = re.search(r"(?:_|\[|\()(ns|us|ms|s)(?:\]|\))?$", name.strip())
+    if ending:
+        return ending[1]
+    size = float(np.nanmedian(np.abs(values)))
+    inertial = sum(bool(_INERTIAL.match(n)) for n in table.names) >= 3
+    spacing = float(np.nanmedian(np.abs(np.diff(values)))) if len(values) > 1 else 0.0
+    if inertial and size < _LARGE[-1][0] and spacing >= 1.0:  # no IMU has samples as rare as that
+        return "ms" if spacing < 1e3 else "us" if spacing < 1e6 else "ns"
+    return next((unit for least, unit in _LARGE if size > least), "s")
+
+
+def _ascends(table: Table, name: str) -> bool:
+    values = table.columns[name]
+    if values.dtype == object or len(values) < 2:
+        return False
+    with np.errstate(invalid="ignore"):
+        return bool(np.all(np.diff(values.astype(np.float64)) > 0.0))
+
+
+def _array_keys(path: Path, form: str) -> dict[str, Any]:
+    """The array or column of the times, by its name."""
+    if form not in ("mat", "hdf5", "parquet"):
+        return {}
+    reader = READERS.get(form)
+    assert reader is not None
+    try:
+        names = list(reader.read(path, FileSpec(path=path.name, format=form, time=1)).table.names)
+    except LogError as error:
+        names = re.findall(r"([^\s,]+) \d+(?:x\d+)*", str(error).rpartition("there are:")[2])
+        if not names:
+            raise
+    chosen = next((n for n in names if _TIME.match(re.split(r"[./]", n)[-1])), None)
+    if chosen is None:
+        raise LogError(f"{path}: no name tells the times; say time = NAME in a scenario; there are: {', '.join(names)}")
+    return {"time": chosen}

@@ -1,0 +1,121 @@
+"""The level of the water and the pressure of the air above it: what a depth sensor takes for the surface.
+
+Without this part of the surroundings the mean surface is the WGS-84 ellipsoid. With it the surface is at the height ::
+
+    level = N + sum of A cos(2 pi t / T + phase)
+
+above the ellipsoid: the undulation N of the geoid, which may slope, and the constituents of the tide. The air pressure
+changes by a part that a pressure sensor takes for water, 1 hPa for about 1 cm (``pressure_change`` over the density and
+gravity). The sea does not follow it here.
+
+Sources: D. T. Pugh and P. L. Woodworth, *Sea-Level Science*, Cambridge 2014, chapters 3 and 7; the undulation is that
+of a geoid model at the place, such as EGM2008.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal, Self
+
+import numpy as np
+from pydantic import BeforeValidator, model_validator
+
+from simnav.geometry.earth import relative_position
+from simnav.spec import Positive, quantity, register_unit
+from simnav.streams import stream
+from simnav.types import Array
+from simnav.world.surroundings import SurroundingSpec, register_surrounding
+
+__all__ = ["Level", "WaterLevel"]
+
+register_unit("hpa", 100.0)
+register_unit("mm_km", 1e-6)
+
+#: Density of sea water [kg/m^3] times gravity [m/s^2].
+_WEIGHT = 1025.0 * 9.81
+
+
+def _listed(value: Any) -> Any:
+    return tuple(value) if isinstance(value, (list, tuple)) else (value,)
+
+
+Figures = Annotated[tuple[float, ...], BeforeValidator(_listed)]
+
+
+@register_surrounding
+class WaterLevel(SurroundingSpec):
+    """The height of the mean surface above the ellipsoid, with the tide, and the pressure of the air.
+
+    Attributes
+    ----------
+    geoid : float
+        Undulation of the geoid at the first place that is asked for [m].
+    geoid_slope : (float, float)
+        Its change to the north and to the east [m/m].
+    tide_amplitude, tide_period : tuple of float
+        Amplitude [m] and period [s] of each constituent; 12.42 h is the principal lunar one.
+    tide_phase : tuple of float, optional
+        Phase of each constituent at the start of the run [rad]; None: drawn for each run.
+    pressure_change : float
+        Change of the air pressure from the start of the run to ``pressure_time`` [Pa], then constant.
+    pressure_time : float
+        [s].
+    """
+
+    kind: Literal["water_level"] = "water_level"
+    geoid: float = quantity("m", 0.0)
+    geoid_slope: tuple[float, float] = quantity("mm_km", (0.0, 0.0))
+    tide_amplitude: Figures = quantity("m", ())
+    tide_period: Figures = quantity("h", ())
+    tide_phase: Figures | None = quantity("deg", None)
+    pressure_change: float = quantity("hpa", 0.0)
+    pressure_time: Positive = quantity("h", 3600.0)
+
+    @model_validator(mode="after")
+    def _as_many(self) -> Self:
+        phases = self.tide_phase if self.tide_phase is not None else self.tide_period
+        if not len(self.tide_amplitude) == len(self.tide_period) == len(phases):
+            raise ValueError(
+                f"tide_amplitude_m, tide_period_h and tide_phase_deg have {len(self.tide_amplitude)}, "
+                f"{len(self.tide_period)} and {len(phases)} numbers; each constituent has one of each"
+            )
+        if any(not period > 0.0 for period in self.tide_period):
+            raise ValueError(f"tide_period_h = {[p / 3600.0 for p in self.tide_period]}: periods are greater than 0")
+        return self
+
+    def build(self, name: str, seed: int) -> Level:
+        """See `SurroundingSpec.build`."""
+        drawn = 2.0 * np.pi * stream(seed, "surroundings", name, "tide").random(len(self.tide_period))
+        return Level(self, drawn if self.tide_phase is None else np.asarray(self.tide_phase))
+
+
+class Level:
+    """The level of the water in one run.
+
+    Parameters
+    ----------
+    spec : WaterLevel
+        Its description.
+    phase : (k,) array
+        Phases of the constituents of the tide at the start [rad].
+    """
+
+    def __init__(self, spec: WaterLevel, phase: Array):
+        self.spec, self._phase = spec, phase
+        self._origin: Array | None = None
+
+    def height(self, position: Array, time: Array) -> Array:
+        """The (n,) heights of the mean surface above the ellipsoid [m] at n positions and times."""
+        if self._origin is None and len(position):
+            self._origin = np.array(position[0])
+        level = np.full(len(time), self.spec.geoid)
+        if any(self.spec.geoid_slope) and len(time):
+            assert self._origin is not None
+            level += relative_position(position, self._origin)[:, :2] @ np.asarray(self.spec.geoid_slope)
+        for a, period, phase in zip(self.spec.tide_amplitude, self.spec.tide_period, self._phase, strict=True):
+            level += a * np.cos(2.0 * np.pi * np.asarray(time) / period + phase)
+        return level
+
+    def apparent_depth(self, time: Array) -> Array:
+        """The (n,) depths that a pressure sensor adds for the change of the air pressure [m]."""
+        share = np.clip(np.asarray(time) / self.spec.pressure_time, 0.0, 1.0)
+        return np.asarray(self.spec.pressure_change * share / _WEIGHT)

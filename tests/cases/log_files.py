@@ -1,0 +1,209 @@
+"""A small good file of every format of logs that simnav reads, made by other code than that which reads it."""
+
+from __future__ import annotations
+
+import json
+import struct
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from simnav.log.files import FileSpec
+from simnav.log.reader import READERS, Rows
+
+__all__ = ["CASES", "Case", "mutated", "read"]
+
+N = 12
+T = np.arange(N, dtype=np.float64)
+LATITUDE, LONGITUDE, HEIGHT = 54.0 + 1e-5 * T, 7.9 + 2e-5 * T, 0.1 * T
+
+
+class Case(NamedTuple):
+    """How a file is made, and with which keys it is read.
+
+    Attributes
+    ----------
+    ending : str
+        Ending of its name.
+    make : callable
+        Gives the content.
+    keys : mapping
+        Keys of `FileSpec`.
+    sentence : str or None
+        What a channel names.
+    """
+
+    ending: str
+    make: Callable[[Path], None]
+    keys: Mapping[str, Any] = {}
+    sentence: str | None = None
+
+
+def _text(text: str) -> Callable[[Path], None]:
+    return lambda path: path.write_text(text) and None
+
+
+def _rows(*columns: Any, separator: str = " ") -> str:
+    return "".join(separator.join(repr(float(x)) for x in row) + "\n" for row in zip(*columns, strict=True))
+
+
+def _nmea() -> str:
+    lines = [
+        "2014-08-01T00:00:00.5Z $GPGGA,000000.25,2230.0000,S,01745.6000,W,1,06,1.3,033.6,M,-002.6,M,,",
+        "2014-08-01T00:00:00.6Z $GPVTG,210.0,T,,M,010.0,N,,K",
+        "2014-08-01T00:00:00.7Z $HCHDG,98.3,0.5,E,12.6,W",
+        "2014-08-01T00:00:00.8Z $PSXN,23,0.35,-1.74,218.26,0.58",
+        "2014-08-01T00:00:00.9Z $PSIMSSB,000000.25,M23,A,,C,H,M,-100.10,50.50,200.20,1.436,N,,",
+        "2014-08-01T00:00:01.0Z $PNORBT7,1406851200.75,1.234,-1.234,0.5,-0.1,0.02,0.004,23.45,23.4,23.5,23.6",
+        "2014-08-01T00:00:01.5Z $GPGGA,000001.25,2230.0000,S,01745.6000,W,1,06,1.3,033.6,M,-002.6,M,,",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _pos() -> str:
+    head = "% program   : rnx2rtkp\n%  GPST                  latitude(deg) longitude(deg)  height(m)   Q  ns   sdn(m)\n"
+    rows = []
+    for k in range(N):
+        place = f"{LATITUDE[k]:.9f} {LONGITUDE[k]:.9f} {HEIGHT[k]:.4f}"
+        rows.append(f"2024/05/01 10:00:{k:02d}.000 {place} {1 + k % 2} 9 0.0{k + 10}")
+    return head + "\n".join(rows) + "\n"
+
+
+def _sbet(path: Path) -> None:
+    zero = np.zeros(N)
+    columns = [T, np.radians(LATITUDE), np.radians(LONGITUDE), HEIGHT, zero + 2.0, zero + 1.0, zero, zero, zero,
+               zero + 1.0, zero + 0.3, zero, zero, zero - 9.8, zero, zero, zero]  # fmt: skip
+    path.write_bytes(np.stack(columns, axis=1).astype("<f8").tobytes())
+
+
+def _pd0(path: Path) -> None:
+    content = b""
+    for k in range(N):
+        fixed = bytearray(59)
+        fixed[25] = 2 << 3  # ship coordinates
+        leader = bytearray(65)
+        leader[0:2] = b"\x80\x00"
+        leader[4:11] = bytes([24, 5, 1, 10, 0, k, 50])
+        struct.pack_into("<3H2hHh", leader, 14, 1500, 123, 4500, -150, 250, 35, 1234)
+        bottom = bytearray(85)
+        bottom[0:2] = b"\x00\x06"
+        struct.pack_into("<4H4h", bottom, 16, 2000, 2010, 2020, 2030, 100, -1500 if k else -32768, 20, 3)
+        parts = [bytes(fixed), bytes(leader), bytes(bottom)]
+        offsets, at = [], 6 + 2 * len(parts)
+        for part in parts:
+            offsets.append(at)
+            at += len(part)
+        body = struct.pack("<2sHBB3H", b"\x7f\x7f", at, 0, 3, *offsets) + b"".join(parts)
+        content += body + struct.pack("<H", sum(body) & 0xFFFF)
+    path.write_bytes(content)
+
+
+def _mat(path: Path) -> None:
+    from scipy.io import savemat
+
+    savemat(path, {"imu": {"t": T, "acc": np.tile([0.0, 0.1, -9.8], (N, 1))}, "name": "x", "scalar": 3.0})
+
+
+def _hdf5(path: Path) -> None:
+    import h5py
+
+    with h5py.File(path, "w") as file:
+        file["imu/t"], file["imu/acc"], file["note"] = T, np.tile([0.0, 0.1, -9.8], (N, 1)), "x"
+
+
+def _parquet(path: Path) -> None:
+    import pyarrow as pa
+    from pyarrow import parquet
+
+    stamps = pa.array([1_700_000_000_000_000 + int(1e6 * t) for t in T], pa.timestamp("us"))
+    place = pa.array([{"lat": a, "lon": b} for a, b in zip(LATITUDE, LONGITUDE, strict=True)])
+    parquet.write_table(pa.table({"stamp": stamps, "place": place, "mode": ["A"] * N}), path)
+
+
+def _mcap(path: Path) -> None:
+    from mcap.writer import Writer
+
+    with open(path, "wb") as stream:
+        writer = Writer(stream)
+        writer.start()
+        schema = writer.register_schema("fix", "jsonschema", b"{}")
+        channel = writer.register_channel("/fix", "json", schema)
+        for k in range(N):
+            message = {"timestamp": {"sec": k, "nsec": 500_000_000}, "latitude": LATITUDE[k], "covariance": [1.0, 2.0]}
+            writer.add_message(channel, 10**9 * k + 7 * 10**8, json.dumps(message).encode(), 10**9 * k)
+        writer.finish()
+
+
+def _bag(path: Path) -> None:
+    from rosbags.rosbag1 import Writer
+    from rosbags.typesys import Stores, get_typestore
+
+    store = get_typestore(Stores.ROS1_NOETIC)
+    names = ("std_msgs/msg/Header", "builtin_interfaces/msg/Time", "sensor_msgs/msg/NavSatFix")
+    header, stamp, fix = (store.types[n] for n in names)
+    status = store.types["sensor_msgs/msg/NavSatStatus"]
+    with Writer(path) as writer:
+        connection = writer.add_connection("/fix", fix.__msgtype__, typestore=store)
+        for k in range(N):
+            head = header(seq=k, stamp=stamp(sec=k, nanosec=500_000_000), frame_id="gps")
+            message = fix(header=head, status=status(status=0, service=1),
+                          latitude=LATITUDE[k], longitude=LONGITUDE[k],
+                          altitude=HEIGHT[k],
+                          position_covariance=np.arange(9.0), position_covariance_type=2)  # fmt: skip
+            writer.write(connection, 10**9 * (k + 1), store.serialize_ros1(message, fix.__msgtype__))
+
+
+_ZERO = np.zeros(N)
+_TABLE = "time,latitude,longitude,height\n" + _rows(T, LATITUDE, LONGITUDE, HEIGHT, separator=",")
+_EUROC = "#timestamp [ns],wx,wy,wz,ax,ay,az\n" + _rows(1e9 * T, *[_ZERO] * 5, _ZERO - 9.8, separator=",")
+#: A case for each format that comes with simnav.
+CASES: Mapping[str, Case] = {
+    "csv": Case(".csv", _text(_TABLE)),
+    "nmea": Case(".nmea", _text(_nmea()), sentence="GGA"),
+    "rtklib": Case(".pos", _text(_pos())),
+    "tum": Case(".tum", _text(_rows(T, T, _ZERO, _ZERO, _ZERO, _ZERO, _ZERO + 0.6, _ZERO + 0.8))),
+    "euroc": Case(".csv", _text(_EUROC)),
+    "kf_gins": Case(".txt", _text(_rows(T, *[_ZERO] * 5, _ZERO - 9.8))),
+    "sbet": Case(".out", _sbet),
+    "pd0": Case(".pd0", _pd0),
+    "mat": Case(".mat", _mat, {"time": "imu.t"}),
+    "hdf5": Case(".h5", _hdf5, {"time": "imu/t"}),
+    "parquet": Case(".parquet", _parquet, {"time": "stamp"}),
+    "mcap": Case(".mcap", _mcap, {"clock": "sentence"}, "/fix"),
+    "rosbag": Case(".bag", _bag, {"clock": "sentence"}, "/fix"),
+}  # fmt: skip
+
+
+def read(form: str, path: Path, **keys: Any) -> Rows:
+    """Read a file of a format, with the keys of its case."""
+    case = CASES[form]
+    reader = READERS.get(form)
+    assert reader is not None
+    return reader.read(path, FileSpec(path=path.name, format=form, **{**case.keys, **keys}), case.sentence)
+
+
+def mutated(content: bytes, chance: Any) -> bytes:
+    """A content with one to three changes: bytes changed, doubled, cut out, or the end cut off."""
+    data = bytearray(content)
+    for _ in range(chance.randint(1, 3)):
+        if not data:
+            break
+        at, kind = chance.randrange(len(data)), chance.randrange(6)
+        length = chance.choice((1, 2, 8, 40))
+        if kind == 0:
+            data[at] = chance.randrange(256)
+        elif kind == 1:
+            data[at : at + length] = bytes(chance.choice((0, 255, 127)) for _ in range(length))
+        elif kind == 2:
+            del data[at : at + length]
+        elif kind == 3:
+            data[at:at] = data[max(0, at - 5 * length) : at]
+        elif kind == 4:
+            del data[at:]
+        else:
+            data[at : at + 1] = chance.choice(
+                (b"nan", b"inf", b"-1e308", b"9" * 300, b",", b"\n", b"\x00", b"\xff\xfe", b'"')
+            )
+    return bytes(data)

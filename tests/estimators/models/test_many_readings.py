@@ -1,0 +1,91 @@
+"""All readings of satellites at one time are what they are one by one."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from simnav.estimator import make
+from simnav.estimators.algebra.joseph import joseph_sequence
+from simnav.estimators.models import inertial
+from simnav.estimators.models.channels import by_channel
+from simnav.estimators.models.inertial import InertialModel
+from simnav.geometry.earth import relative_position
+from simnav.kinds import Component, Kind
+from simnav.plugins import PluginError
+from simnav.recording import Recording
+from simnav.source import record
+from simnav.trial import run_trial
+from tests.cases.raw_gnss import raw_gnss
+
+
+@pytest.fixture(scope="module")
+def recording() -> Recording:
+    return record(raw_gnss(30.0), 1)
+
+
+def test_innovations_and_jacobians(recording: Recording):
+    model = InertialModel()
+    model.begin(recording.start, by_channel(recording.instruments))
+    (many,) = model.many
+    stream, rng = recording.data.aids["gnss"], np.random.default_rng(1)
+    rows = np.arange(0, len(stream), 7)
+    names = [f"gnss:{stream.channels[c]}" for c in stream.channel[rows]]
+    states = []
+    for _ in rows:
+        model.correct(rng.standard_normal(model.size) * 0.01)
+        states.append([a.copy() for a in model._state()])
+    columns = [np.stack(column) for column in zip(*states, strict=True)]
+    offset = model.size - len(model.calibration)
+    innovation, jacobian = many.linearise(
+        stream.time[rows], stream.value[rows], many.channels(names), columns, stream.side[rows], offset
+    )
+    for k, (row, name) in enumerate(zip(rows, names, strict=True)):
+        one = model.observe_own(name, float(stream.time[row]), stream.value[row], tuple(states[k]), stream.side[row])
+        assert one is not None
+        np.testing.assert_allclose(innovation[k], one[0], rtol=0.0, atol=1e-6)
+        np.testing.assert_allclose(jacobian[k], one[1], rtol=1e-9, atol=1e-9)
+    assert many.channels(["gnss:none", "compass"]).tolist() == [-1, -1]
+
+
+@pytest.mark.parametrize("name", ["sw-fgo", "gnc-fgo"])
+def test_a_window_gives_the_same(recording: Recording, monkeypatch: pytest.MonkeyPatch, name: str):
+    together = run_trial(make(name), recording)
+    monkeypatch.setattr(inertial, "of_instruments", lambda own, bias_at: [])
+    one_by_one = run_trial(make(name), recording)
+    assert (together.status, one_by_one.status) == ("ok", "ok")
+    np.testing.assert_allclose(together.position, one_by_one.position, rtol=0.0, atol=1e-12)
+    np.testing.assert_allclose(together.covariance, one_by_one.covariance, rtol=1e-6, atol=1e-12)
+
+
+def test_a_compiled_equation_has_no_such_form():
+    with pytest.raises(PluginError, match="a kind with observations has an equation of its own: a function"):
+        Kind("depth", "depth", (Component("depth", "m"),), "depth", observations=lambda points, sheet: None)
+
+
+def test_a_filter_takes_them_together_as_one_by_one(recording: Recording, monkeypatch: pytest.MonkeyPatch):
+    """To what the second derivatives of the ranges are worth: the state moves by metres, the satellites are far."""
+    together = run_trial(make("ekf"), recording)
+    monkeypatch.setattr(inertial, "of_instruments", lambda own, bias_at: [])
+    one_by_one = run_trial(make("ekf"), recording)
+    np.testing.assert_allclose(relative_position(together.position, one_by_one.position), 0.0, atol=1e-3)
+    variances = (np.diagonal(trial.covariance, axis1=1, axis2=2) for trial in (together, one_by_one))
+    np.testing.assert_allclose(*variances, rtol=1e-3)
+    nis = "nis.gnss:G11"
+    np.testing.assert_allclose(together.diagnostics[nis], one_by_one.diagnostics[nis], rtol=2e-2, atol=1e-3)
+
+
+def test_a_sequence_of_updates_is_one_large_one():
+    rng = np.random.default_rng(3)
+    root = rng.standard_normal((7, 7))
+    first = root @ root.T
+    H, R, y = rng.standard_normal((4, 2, 7)), np.stack([np.diag([0.5, 2.0])] * 4), rng.standard_normal((4, 2))
+    P, dx, nis, size = first.copy(), np.empty(7), np.empty(4), np.empty(4)
+    joseph_sequence(P, y, H, R, dx, nis, size)
+    tall = H.reshape(8, 7)
+    S = tall @ first @ tall.T + np.diag([0.5, 2.0] * 4)
+    gain = first @ tall.T @ np.linalg.inv(S)
+    np.testing.assert_allclose(dx, gain @ y.ravel(), rtol=1e-9)
+    np.testing.assert_allclose(P, first - gain @ S @ gain.T, atol=1e-9)
+    assert nis.sum() == pytest.approx(y.ravel() @ np.linalg.solve(S, y.ravel()))
+    assert size[0] == pytest.approx(np.hypot(*y[0]))

@@ -1,0 +1,176 @@
+"""Each registered format: what is read is what was written, and a mutated file is no traceback."""
+
+from __future__ import annotations
+
+import struct
+import sys
+
+import numpy as np
+import pytest
+
+from simnav.log import LogError, LogWarning
+from simnav.log.files import FileSpec
+from simnav.log.formats.gps_time import leap_seconds
+from simnav.log.reader import READERS
+from tests.audit.readers import mutations
+from tests.cases.log_files import CASES, HEIGHT, LATITUDE, LONGITUDE, N, T, read
+
+_NEEDS = {"hdf5": "h5py", "mcap": "mcap", "rosbag": "rosbags"}
+
+
+def test_there_is_a_case_of_every_format_of_simnav():
+    ours = {name for name, reader in READERS.items().items() if reader.__module__.startswith("simnav.")}
+    assert set(CASES) == ours
+
+
+@pytest.fixture(params=CASES)
+def form(request):
+    if request.param in _NEEDS:
+        pytest.importorskip(_NEEDS[request.param])
+    return request.param
+
+
+def test_mutated_files_are_read_or_refused(form):
+    """`python -m tests.audit readers` tries 3000 of each."""
+    found = mutations(form, 12, seed=1)
+    assert set(found) <= {"read", "refused"}, found
+
+
+@pytest.fixture
+def good(tmp_path):
+    def make(form, **keys):
+        path = tmp_path / f"good{CASES[form].ending}"
+        if not path.exists():
+            CASES[form].make(path)
+        return read(form, path, **keys)
+
+    make.folder = tmp_path
+    return make
+
+
+def test_rtklib(good):
+    rows = good("rtklib")
+    np.testing.assert_allclose(rows.table.column("latitude")[1], LATITUDE, atol=1e-9)
+    np.testing.assert_allclose(rows.table.column("height")[1], HEIGHT, atol=1e-4)
+    assert rows.table.column("Q")[1].tolist() == [1.0, 2.0] * 6
+    assert rows.time[0] == 1714557600.0 - 18.0  # 2024-05-01 10:00:00 of GPS time
+    path = good.folder / "week.pos"
+    path.write_text("% UTC a b c\n%  UTC latitude(deg) longitude(deg) height(m)\n2312 295200.5 54.0 7.9 1.0\n")
+    assert read("rtklib", path).time[0] == 1714557600.5
+    path.write_text("2312 295200.5 54.0\n")
+    with pytest.raises(LogError, match="line 1: 1 values after the time where the header names"):
+        read("rtklib", path)
+
+
+def test_leap_seconds():
+    assert leap_seconds(np.array([362793599.0, 362793600.0, 1483228799.0, 1483228800.0])).tolist() == [0, 1, 17, 18]
+
+
+def test_tum(good):
+    rows = good("tum")
+    assert np.degrees(rows.table.column("yaw")[1][0]) == pytest.approx(2.0 * np.degrees(np.arctan2(0.6, 0.8)))
+    # East-north-up and forward-left-up, as ROS has it: counterclockwise from the east.
+    turned = good("tum", options={"frame": "enu"}).table.column("yaw")[1][0]
+    assert np.degrees(turned) == pytest.approx(90.0 - 2.0 * np.degrees(np.arctan2(0.6, 0.8)))
+    with pytest.raises(LogError, match=r"options.frame = 'x' should be 'ned' or 'enu'"):
+        good("tum", options={"frame": "x"})
+    path = good.folder / "bad.tum"
+    path.write_text("1 0 0 0 0 0 0 1\n2 0 0 0 0.9 0.9 0.9 0.9\n")
+    with pytest.raises(LogError, match=r"bad\.tum, line 2: the quaternion has the length 1\.8"):
+        read("tum", path)
+
+
+def test_euroc_and_kf_gins(good):
+    assert good("euroc").time == pytest.approx(T)
+    assert good("kf_gins").table.column("dvel_z")[1] == pytest.approx(-9.8)
+    gnss = good("kf_gins", options={"content": "gnss"}).table
+    assert gnss.names[1:4] == ("latitude", "longitude", "height")
+    path = good.folder / "five.txt"
+    path.write_text("1 2 3 4 5\n")
+    with pytest.raises(LogError, match=r"5 columns; a KF-GINS file has 7"):
+        read("kf_gins", path)
+    with pytest.raises(LogError, match=r"5 columns; a EuRoC file has 7"):
+        read("euroc", path)
+
+
+def test_sbet(good):
+    table = good("sbet").table
+    assert np.degrees(table.column("longitude")[1]) == pytest.approx(LONGITUDE)
+    speed = np.hypot(table.column("velocity_north")[1], table.column("velocity_east")[1])
+    assert speed == pytest.approx(np.hypot(2.0, 1.0))
+    assert table.column("velocity_north")[1][0] == pytest.approx(2.0 * np.cos(0.3) - 1.0 * np.sin(0.3))
+    assert table.column("heading")[1][0] == pytest.approx(0.7)
+    path = good.folder / "cut.out"
+    path.write_bytes((good.folder / "good.out").read_bytes()[:-5])
+    with pytest.raises(LogError, match=r"1627 bytes are no whole number of records of 136 bytes.*offset 1496"):
+        read("sbet", path)
+
+
+def test_pd0(good):
+    with np.errstate(all="raise"):
+        table = good("pd0").table
+    assert table.column("ground_forward")[1][1:] == pytest.approx(1.5)
+    assert np.isnan(table.column("ground_forward")[1][0])  # a velocity that is missing
+    assert table.column("ground_starboard")[1][1] == pytest.approx(-0.1)
+    assert table.column("range_4")[1][0] == pytest.approx(20.3)
+    assert np.degrees(table.column("heading")[1][0]) == pytest.approx(45.0)
+    assert good("pd0").time[:2].tolist() == [1714557600.5, 1714557601.5]
+    content = bytearray((good.folder / "good.pd0").read_bytes())
+    content[100] ^= 1
+    path = good.folder / "bad.pd0"
+    path.write_bytes(bytes(content) + struct.pack("<2sH", b"\x7f\x7f", 400))
+    with pytest.warns(LogWarning, match="1 ensembles of PD0 are damaged or cut off and are left out, the first is at"):
+        assert len(read("pd0", path).table) == N - 1
+
+
+def test_named_arrays(good):
+    assert good("mat").table.column("imu.acc_3")[1] == pytest.approx(-9.8)
+    with pytest.raises(LogError, match=r"name the array of the times, .*; there are: imu.t 12, imu.acc 12x3"):
+        good("mat", time=1)
+    with pytest.raises(LogError, match=r"there is no array 'imu.T'; did you mean 'imu.t'\?"):
+        good("mat", time="imu.T")
+    with pytest.raises(LogError, match=r"the array 'imu.acc' of the times is 12x3, no vector"):
+        good("mat", time="imu.acc")
+    pytest.importorskip("h5py")
+    assert good("hdf5").table.column("imu/acc_2")[1] == pytest.approx(0.1)
+
+
+def test_parquet(good):
+    rows = good("parquet")
+    assert rows.time == pytest.approx(1.7e9 + T)
+    assert rows.table.column("place.lat")[1] == pytest.approx(LATITUDE)
+
+
+@pytest.mark.parametrize("form", ["mcap", "rosbag"])
+def test_bags(good, form):
+    pytest.importorskip(_NEEDS[form])
+    rows = good(form)
+    assert rows.time == pytest.approx(T + 0.5)
+    assert rows.table.column("latitude")[1] == pytest.approx(LATITUDE)
+    assert len(good(form, clock="logger").time) == N
+    path = good.folder / f"good{CASES[form].ending}"
+    with pytest.raises(LogError, match="there is no topic '/fox'; did you mean '/fix'"):
+        READERS.get(form).read(path, FileSpec(path="x"), "/fox")
+    with pytest.raises(LogError, match=r"say which topic \(sentence\); there are: /fix"):
+        READERS.get(form).read(path, FileSpec(path="x"))
+
+
+@pytest.mark.parametrize("form", ["mat", "hdf5", "mcap", "rosbag"])
+def test_a_binary_file_given_as_a_table_is_named(good, form):
+    if form in _NEEDS:
+        pytest.importorskip(_NEEDS[form])
+    good(form)
+    with pytest.raises(LogError, match=f"and no text as format = 'csv' wants; say format = '{form}'"):
+        read("csv", good.folder / f"good{CASES[form].ending}")
+
+
+@pytest.mark.parametrize(("form", "library"), [("hdf5", "h5py"), ("mcap", "mcap"), ("rosbag", "rosbags")])
+def test_a_library_that_is_missing_is_named(good, monkeypatch, form, library):
+    path = good.folder / f"any{CASES[form].ending}"
+    path.write_bytes(b"0")
+    for module in [m for m in sys.modules if m.partition(".")[0] == library]:
+        monkeypatch.setitem(sys.modules, module, None)
+    monkeypatch.setitem(sys.modules, library, None)
+    monkeypatch.setattr("simnav.log.formats.hdf5.find_spec", lambda name: None)
+    with pytest.raises(LogError, match=rf"needs the library {library}: pip install 'simnav\[logs\]'"):
+        read(form, path)

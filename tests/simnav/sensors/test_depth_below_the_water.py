@@ -1,0 +1,80 @@
+"""The depth sensor below a surface that is not the ellipsoid: geoid, tide, air pressure, waves above it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from simnav.scenario import Scenario, parse
+from simnav.simulation.simulator import simulate
+from simnav.spec import SpecError
+
+HEAD = """
+name = "level"
+version = 1
+title = "Depth"
+duration_s = 3600.0
+step_s = 10.0
+[start]
+latitude_deg = 54.0
+longitude_deg = 8.0
+depth_m = 12.0
+heading_deg = 0.0
+speed_m_s = 2.0
+[vessel]
+kind = "uuv"
+[instruments.depth]
+rate_hz = 0.1
+sigma_m = 0.0
+"""
+
+
+def read(text: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Times, readings and true depths below the ellipsoid."""
+    recording = simulate(parse(HEAD + text), 1)
+    stream = recording.data.aids["depth"]
+    truth = recording.data.truth
+    return stream.time, stream.value[:, 0], -np.interp(stream.time, truth.time, truth.position[:, 2])
+
+
+def test_geoid_tide_and_air_pressure_add_up():
+    time, value, depth = read(
+        "[surroundings.water_level]\ngeoid_m = 40.0\ngeoid_slope_mm_km = [20.0, 0.0]\ntide_amplitude_m = [1.5, 0.4]\n"
+        "tide_period_h = [12.42, 12.0]\ntide_phase_deg = [0.0, 90.0]\n"
+        "pressure_change_hpa = -20.0\npressure_time_h = 0.5\n"
+    )
+    tide = 1.5 * np.cos(2.0 * np.pi * time / 12.42 / 3600.0) - 0.4 * np.sin(2.0 * np.pi * time / 12.0 / 3600.0)
+    air = -2000.0 / (1025.0 * 9.81) * np.minimum(time / 1800.0, 1.0)
+    north = 2.0 * (time - time[0])
+    np.testing.assert_allclose(value - depth, 40.0 + 2e-5 * north + tide + air, atol=2e-3)
+
+
+def test_the_tide_begins_anywhere_where_no_phase_is_given():
+    text = "[surroundings.water_level]\ntide_amplitude_m = 2.0\ntide_period_h = 12.42\n"
+    scenario = parse(HEAD + text)
+    first = [simulate(scenario, seed).data.aids["depth"].value[0, 0] for seed in range(4)]
+    assert np.std(first) > 0.3
+    assert Scenario.from_toml(scenario.to_toml()) == scenario
+
+
+def test_waves_above_the_sensor_are_less_at_depth():
+    sea = "[sea]\nsignificant_height_m = 2.0\npeak_period_s = 8.0\ndrift_gain = 0.0\n"
+    text = HEAD.replace("rate_hz = 0.1", "rate_hz = 1.0").replace("3600.0", "600.0")
+
+    def spread(depth: float) -> float:
+        given = text.replace("depth_m = 12.0", f"depth_m = {depth}")
+        with_waves, without = (
+            simulate(parse(f"{given}waves = {waves}\n{sea}"), 1).data.aids["depth"].value[:, 0]
+            for waves in ("true", "false")
+        )
+        return float(np.std(with_waves - without))
+
+    near, far = spread(1.0), spread(20.0)
+    assert 0.3 < near < 0.5  # a quarter of the significant height, and less
+    k = (2.0 * np.pi / 8.0) ** 2 / 9.81
+    assert far / near == pytest.approx(np.exp(-19.0 * k), rel=0.5)
+
+
+def test_bad_tides_are_refused():
+    with pytest.raises(SpecError, match="have 2, 1 and 1 numbers; each constituent has one of each"):
+        parse(HEAD + "[surroundings.water_level]\ntide_amplitude_m = [1.0, 2.0]\ntide_period_h = [12.0]\n")
