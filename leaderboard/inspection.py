@@ -16,14 +16,13 @@ from simnav.leaderboard.results.errors import RequestError, StoreError, mistakes
 from simnav.leaderboard.results.scratch import scratch
 
 from .calls import call, finite_number, whole_number
+from .error_requests import AllanRequest, RealismRequest
 from .given import absolute, results_of, scenario_of, scenarios_of
 from .requests import (
-    AllanRequest,
     BoundRequest,
     CiteRequest,
     MergeRequest,
     RankRequest,
-    RealismRequest,
     ReproduceRequest,
     RescoreRequest,
     SealRequest,

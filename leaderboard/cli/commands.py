@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from simnav.leaderboard.calls import option, request
 from simnav.leaderboard.claim_requests import ClaimRequest
+from simnav.leaderboard.error_requests import AllanRequest, RealismRequest
 from simnav.leaderboard.log_requests import (
     AlignRequest,
     ExportRequest,
@@ -27,7 +28,6 @@ from simnav.leaderboard.publishing_requests import (
     SubmitRequest,
 )
 from simnav.leaderboard.requests import (
-    AllanRequest,
     BenchRequest,
     BoundRequest,
     CampaignRequest,
@@ -35,7 +35,6 @@ from simnav.leaderboard.requests import (
     EvaluateRequest,
     MergeRequest,
     Parameters,
-    RealismRequest,
     RecordRequest,
     ReproduceRequest,
     RescoreRequest,
