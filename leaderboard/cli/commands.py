@@ -11,6 +11,13 @@ from typing import TYPE_CHECKING, Any
 from simnav.leaderboard.calls import option, request
 from simnav.leaderboard.claim_requests import ClaimRequest
 from simnav.leaderboard.error_requests import AllanRequest, RealismRequest
+from simnav.leaderboard.log_requests import (
+    AlignRequest,
+    ExportRequest,
+    InspectRequest,
+    ScoreRequest,
+    TuneNoiseRequest,
+)
 from simnav.leaderboard.publishing_requests import (
     AuditRequest,
     BundleOptions,
@@ -21,14 +28,11 @@ from simnav.leaderboard.publishing_requests import (
     SubmitRequest,
 )
 from simnav.leaderboard.requests import (
-    AlignRequest,
     BenchRequest,
     BoundRequest,
     CampaignRequest,
     CiteRequest,
     EvaluateRequest,
-    ExportRequest,
-    InspectRequest,
     MergeRequest,
     Parameters,
     RecordRequest,
@@ -37,10 +41,8 @@ from simnav.leaderboard.requests import (
     RobustnessRequest,
     RunRequest,
     Scenarios,
-    ScoreRequest,
     SealRequest,
     SweepRequest,
-    TuneNoiseRequest,
     TuneRequest,
     VerifyRequest,
 )
