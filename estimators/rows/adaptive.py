@@ -46,7 +46,6 @@ class SageHusaKf(_Adaptive, adaptation=SageHusa):
     3
         A lasting error is blamed on an instrument only by a witness, whatever its size. Before, one that an IMU of 20
         times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
-        Fixes that see no error of a log at first may see it later.
     """
 
     version = 3
@@ -69,7 +68,6 @@ class SageHusaPaper(
     3
         A lasting error is blamed on an instrument only by a witness, whatever its size. Before, one that an IMU of 20
         times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
-        Fixes that see no error of a log at first may see it later.
     """
 
     version = 3
@@ -78,6 +76,10 @@ class SageHusaPaper(
 @register("iae")
 class Iae(_Adaptive, adaptation=piece(InnovationBased, source="innovation")):
     """Innovation-based adaptive estimation of the measurement noise over a window that adapts its length.
+
+    Beside an IMU that is poorer than its datasheet, 1 of 39 voyages (``training-poor-imu``) had more than 1.5 times the
+    error of ``ekf``, 6.8 times at most: where a slow log is left alone, what it says in the first seconds of a
+    disturbance gets no weight.
 
     Source: G. Mao, K. Wang, T. Fu, *Robust GNSS/INS integrated navigation algorithm based on adaptive factor graph
     optimization*, 2025, eqs. 16-20.
@@ -90,7 +92,6 @@ class Iae(_Adaptive, adaptation=piece(InnovationBased, source="innovation")):
     3
         A lasting error is blamed on an instrument only by a witness, whatever its size. Before, one that an IMU of 20
         times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
-        Fixes that see no error of a log at first may see it later.
     """
 
     version = 3
@@ -110,7 +111,6 @@ class IaeFixed(_Adaptive, adaptation=piece(FixedWindow, source="innovation")):
     3
         A lasting error is blamed on an instrument only by a witness, whatever its size. Before, one that an IMU of 20
         times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
-        Fixes that see no error of a log at first may see it later.
     """
 
     version = 3
@@ -131,7 +131,6 @@ class Rae(_Adaptive, adaptation=piece(FixedWindow, source="residual", newest=Fal
     3
         A lasting error is blamed on an instrument only by a witness, whatever its size. Before, one that an IMU of 20
         times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
-        Fixes that see no error of a log at first may see it later.
     """
 
     version = 3
@@ -141,6 +140,10 @@ class Rae(_Adaptive, adaptation=piece(FixedWindow, source="residual", newest=Fal
 @register("adkf")
 class Adkf(_Adaptive, adaptation=AdaptiveFactor):
     """Adaptive robust filter: R or P over a factor that falls with a statistic of the innovation.
+
+    Beside an IMU that is poorer than its datasheet, 3 of 39 voyages (``training-poor-imu``) had more than 1.5 times the
+    error of ``ekf``, 6.5 times at most: where a slow log is left alone, what it says in the first seconds of a
+    disturbance gets no weight.
 
     Source: Z. Zhan, C. Liu, K. Jin et al., *GNSS/SINS/DVL integrated navigation algorithm based on adaptive
     differential Kalman filtering*, PLoS One 21(2), 2026.
@@ -153,7 +156,6 @@ class Adkf(_Adaptive, adaptation=AdaptiveFactor):
     3
         A lasting error is blamed on an instrument only by a witness, whatever its size. Before, one that an IMU of 20
         times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
-        Fixes that see no error of a log at first may see it later.
     """
 
     version = 3
@@ -182,6 +184,10 @@ class Adkf23(Row, solver=KalmanEstimator, model=DvlCalibrationModel, adaptation=
 class Igg3(_Adaptive, adaptation=Igg3Weights):
     """IGG-III equivalent weights: full weight up to k0 sigma, almost none from k1 sigma on.
 
+    Beside an IMU that is poorer than its datasheet, 2 of 39 voyages (``training-poor-imu``) had more than 1.5 times the
+    error of ``ekf``, 6.3 times at most: where a slow log is left alone, what it says in the first seconds of a
+    disturbance gets no weight.
+
     Source: Y. Yang, L. Song and T. Xu, *Robust estimator for correlated observations based on bifactor equivalent
     weights*, J. Geodesy 76, 2002.
 
@@ -193,7 +199,6 @@ class Igg3(_Adaptive, adaptation=Igg3Weights):
     3
         A lasting error is blamed on an instrument only by a witness, whatever its size. Before, one that an IMU of 20
         times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
-        Fixes that see no error of a log at first may see it later.
     """
 
     version = 3
@@ -213,7 +218,6 @@ class HuberKf(_Adaptive, adaptation=HuberWeights):
     3
         A lasting error is blamed on an instrument only by a witness, whatever its size. Before, one that an IMU of 20
         times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
-        Fixes that see no error of a log at first may see it later.
     """
 
     version = 3
@@ -222,6 +226,10 @@ class HuberKf(_Adaptive, adaptation=HuberWeights):
 @register("gated-ekf")
 class GatedEkf(_Adaptive, adaptation=ChiSquareGate):
     """Chi-square gating: measurements that fail the test are left out; a filter that fails for long is doubted.
+
+    Beside an IMU that is poorer than its datasheet, 3 of 39 voyages (``training-poor-imu``) had more than 1.5 times the
+    error of ``ekf``, 4.0 times at most: where a slow log is left alone, what it says in the first seconds of a
+    disturbance gets no weight.
 
     Source: Y. Bar-Shalom, X. R. Li and T. Kirubarajan, *Estimation with Applications to Tracking and Navigation*, 2001,
     section 5.4.
@@ -234,7 +242,6 @@ class GatedEkf(_Adaptive, adaptation=ChiSquareGate):
     3
         A lasting error is blamed on an instrument only by a witness, whatever its size. Before, one that an IMU of 20
         times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
-        Fixes that see no error of a log at first may see it later.
     """
 
     version = 3
@@ -252,6 +259,10 @@ class FadingEkf(_Adaptive, adaptation=FadingMemory):
 class VbAkf(_Adaptive, adaptation=VariationalBayes):
     """Variational-Bayes adaptive filter: state and noise variances estimated together.
 
+    Beside an IMU that is poorer than its datasheet, 4 of 39 voyages (``training-poor-imu``) had more than 1.5 times the
+    error of ``ekf``, 8.5 times at most: where a slow log is left alone, what it says in the first seconds of a
+    disturbance gets no weight.
+
     Source: S. Särkkä and A. Nummenmaa, *Recursive noise adaptive Kalman filtering by variational Bayesian
     approximations*, IEEE TAC 54(3), 2009.
 
@@ -263,7 +274,6 @@ class VbAkf(_Adaptive, adaptation=VariationalBayes):
     3
         A lasting error is blamed on an instrument only by a witness, whatever its size. Before, one that an IMU of 20
         times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
-        Fixes that see no error of a log at first may see it later.
     """
 
     version = 3
@@ -283,7 +293,6 @@ class Mckf(_Adaptive, adaptation=piece(MaximumCorrentropy, smallest=1e-3)):
     3
         A lasting error is blamed on an instrument only by a witness, whatever its size. Before, one that an IMU of 20
         times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
-        Fixes that see no error of a log at first may see it later.
     """
 
     version = 3
@@ -292,6 +301,10 @@ class Mckf(_Adaptive, adaptation=piece(MaximumCorrentropy, smallest=1e-3)):
 @register("imm")
 class Imm(Row, solver=ImmEstimator, model=Suitable):
     """Interacting multiple models: the noise of each instrument jumps between levels.
+
+    Beside an IMU that is poorer than its datasheet, 5 of 39 voyages (``training-poor-imu``) had more than 1.5 times the
+    error of ``ekf``, 8.1 times at most: where a slow log is left alone, what it says in the first seconds of a
+    disturbance gets no weight.
 
     Source: H. A. P. Blom and Y. Bar-Shalom, *The interacting multiple model algorithm for systems with Markovian
     switching coefficients*, IEEE TAC 33(8), 1988.
@@ -304,7 +317,6 @@ class Imm(Row, solver=ImmEstimator, model=Suitable):
     3
         A lasting error is blamed on an instrument only by a witness, whatever its size. Before, one that an IMU of 20
         times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
-        Fixes that see no error of a log at first may see it later.
     """
 
     version = 3

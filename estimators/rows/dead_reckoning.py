@@ -11,5 +11,7 @@ __all__ = ["DeadReckoning"]
 class DeadReckoning(Row, solver=DeadReckoningEstimator):
     """Dead reckoning: heading from gyroscopes or compass, speed from DVL or log, from the initial position on.
 
+    It does not notice that the initial state is further off than its covariance says (``wrong-start``): no fix is used.
+
     Source: N. Bowditch, *The American Practical Navigator*, chapter on dead reckoning.
     """

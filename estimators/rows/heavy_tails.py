@@ -17,6 +17,10 @@ _FORMERLY = {"dof": "adaptation__dof", "smoothed_dof": "smoother__dof"}
 class StudentTKf(Row, solver=KalmanEstimator, model=Suitable, adaptation=StudentT, iteration=poor_heading):
     """Student-t filter: each measurement's noise has heavy tails, so that a large residual counts for little.
 
+    Beside an IMU that is poorer than its datasheet, 3 of 39 voyages (``training-poor-imu``) had more than 1.5 times the
+    error of ``ekf``, 4.6 times at most: where a slow log is left alone, what it says in the first seconds of a
+    disturbance gets no weight.
+
     Source: Y. Huang, Y. Zhang, N. Li, Z. Wu and J. A. Chambers, *A novel robust Student's t-based Kalman filter*, IEEE
     Trans. Aerospace and Electronic Systems 53(3), 2017.
 
@@ -28,7 +32,6 @@ class StudentTKf(Row, solver=KalmanEstimator, model=Suitable, adaptation=Student
     3
         A lasting error is blamed on an instrument only by a witness, whatever its size. Before, one that an IMU of 20
         times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
-        Fixes that see no error of a log at first may see it later.
     """
 
     version = 3
@@ -49,7 +52,6 @@ class StudentTRts(StudentTKf, smoother=StudentTSmoother):
     3
         A lasting error is blamed on an instrument only by a witness, whatever its size. Before, one that an IMU of 20
         times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
-        Fixes that see no error of a log at first may see it later.
     """
 
     version = 3

@@ -42,6 +42,9 @@ class Ekf23(Row, solver=KalmanEstimator, model=DvlCalibrationModel, iteration=po
 class Ekf9(Row, solver=KalmanEstimator, model=NineStateModel, iteration=poor_heading):
     """9-state EKF: position, velocity and attitude, fixed sigmas, no biases.
 
+    It does not notice that its fixed sigmas are too large for good instruments and too small for poor ones: on
+    ``clean-voyages`` it has up to 85 times the error of ``ekf``.
+
     Source: M. Guo, B. Wang, L. Wei et al., *Robust INS/GNSS/DVL integrated navigation for MASS based on
     gradient-adaptive factor graph optimization*, 2026.
     """
@@ -69,7 +72,9 @@ class InvariantEkf(Row, solver=InvariantKalmanEstimator, model=InertialModel):
 class Kf(Row, solver=LinearKalmanEstimator, model=InertialModel):
     """Linear 15-state error-state KF, open loop: free inertial navigation, corrected by its estimated error.
 
-    The states of ``ekf``. It leaves its linear range where free inertial navigation does.
+    The states of ``ekf``. It leaves its linear range where free inertial navigation does, and does not notice it: of
+    258 runs of the board with more than ten times the error of ``ekf``, 30 % have neither a covariance nor a status
+    that admits it (``python -m tests.audit silence``).
 
     Source: P. S. Maybeck, *Stochastic Models, Estimation, and Control*, vol. 1, 1979.
     """
@@ -89,6 +94,10 @@ class Kf9(Row, solver=piece(LinearKalmanEstimator, defaults={"feedback": 1.0}), 
 @register("kf-23", aliases=("kf-paper-003",))
 class Kf23(Row, solver=LinearKalmanEstimator, model=DvlCalibrationModel):
     """Linear 23-state error-state KF, open loop, with the DVL's errors as states.
+
+    It leaves its linear range where free inertial navigation does, and does not notice it: of 344 runs of the board
+    with more than ten times the error of ``ekf``, 17 % have neither a covariance nor a status that admits it
+    (``python -m tests.audit silence``).
 
     Source: Z. Zhan, C. Liu, K. Jin et al., *GNSS/SINS/DVL integrated navigation algorithm based on adaptive
     differential Kalman filtering*, PLoS One 21(2), 2026.
@@ -116,14 +125,18 @@ class ShipEkfStanding(Row, solver=KalmanEstimator, model=StandingShip):
 class GnssOnly(Row, solver=KalmanEstimator, model=KinematicModel):
     """GNSS alone: fixes (and velocities, if any) smoothed by a constant-velocity Kalman filter.
 
-    Between fixes and in an outage the ship goes on as she went. Source: Y. Bar-Shalom, X. R. Li and T. Kirubarajan,
-    *Estimation with Applications to Tracking and Navigation*, 2001, section 6.2.
+    Between fixes and in an outage the ship goes on as she went. It does not notice a turn there: of 240 runs of the
+    board with more than ten times the error of ``ekf``, 4 % do not admit it. Source: Y. Bar-Shalom, X. R. Li and T.
+    Kirubarajan, *Estimation with Applications to Tracking and Navigation*, 2001, section 6.2.
     """
 
 
 @register("inertial", aliases=("pure-inertial",))
 class PureInertial(Row, solver=KalmanEstimator, model=UnaidedModel):
     """Pure inertial navigation: the strapdown solution from the initial state, with its growing covariance.
+
+    It does not notice that the initial state is further off than its covariance says (``wrong-start``), because it uses
+    no measurement.
 
     Source: P. D. Groves, *Principles of GNSS, Inertial, and Multisensor Integrated Navigation Systems*, 2013.
     """

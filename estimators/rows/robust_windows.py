@@ -104,6 +104,10 @@ class GncFgo(
 ):
     """Sliding window with graduated non-convexity: after an outlier the robust cost begins convex and hardens.
 
+    Do not use it where an error of the IMU or of a log takes a step and stays: it takes the good measurements that
+    contradict the window for outliers. It had 3.3 times the error of ``ekf`` after a step of 1 mg in an accelerometer,
+    and 1.8 times after one of 3 % in the scale factor of a DVL; and 3.7 times on ``wrong-start``.
+
     Version 2: a log that is the last witness beside the motion is not rejected for good.
 
     Source: H. Yang, P. Antonante, V. Tzoumas and L. Carlone, *Graduated non-convexity for robust spatial perception*,

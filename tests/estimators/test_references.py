@@ -10,7 +10,7 @@ import pytest
 
 from simnav.estimator import find, make
 from simnav.estimators.adaptations.base import Innovation
-from simnav.estimators.adaptations.truth import FisherNoise, MixtureNoise, TrueNoise, fisher_information
+from simnav.estimators.adaptations.truth import FaultTimes, FisherNoise, MixtureNoise, TrueNoise, fisher_information
 from simnav.recording import AidStream, FaultLabel
 from simnav.scenario import Scenario, load
 from simnav.scoring import errors
@@ -21,7 +21,7 @@ from simnav.simulation.simulator import simulate
 from simnav.trial import run_trial
 from simnav.types import Datasheet, Instruments, Measurement
 
-ROWS = ("oracle", "oracle-clairvoyant", "oracle-mixture", "oracle-rts")
+ROWS = ("oracle", "oracle-clairvoyant", "oracle-mixture", "oracle-rts", "oracle-times")
 
 
 def shortened(name: str, duration: float, *faults) -> Scenario:
@@ -133,6 +133,15 @@ def test_a_flagged_gross_error_counts_with_its_variance_or_not_at_all():
         noise = adaptation.adapt(innovation)
         assert (None if noise is None else noise[0, 0]) == expected
     adaptation, innovation = revealed(TrueNoise(), gross(100.0), False, 50.0)
+    assert adaptation.adapt(innovation)[0, 0] == 1.0
+
+
+def test_who_knows_only_the_times_uses_no_measurement_with_a_fault_whatever_its_size():
+    for size in (0.1, 100.0):
+        adaptation, innovation = revealed(FaultTimes(), gross(size), True, 0.0)
+        assert adaptation.adapt(innovation) is None
+        assert adaptation.states() == []
+    adaptation, innovation = revealed(FaultTimes(), gross(100.0), False, 50.0)
     assert adaptation.adapt(innovation)[0, 0] == 1.0
 
 

@@ -1,4 +1,4 @@
-"""The chart of accuracy against honesty: its points are those of the ranking; references are open, never the front."""
+"""The chart of accuracy against honesty: its points are those of the ranking, and references are open points."""
 
 from __future__ import annotations
 
