@@ -18,6 +18,7 @@ from typing import Any
 
 from pydantic.fields import FieldInfo
 
+import simnav.scenario.reading  # noqa: F401 (it registers the error process of recordings)
 from simnav.sensors.imu import ImuSpec
 from simnav.spec import Spec, spec_types, toml_number, unit_of
 

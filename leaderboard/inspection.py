@@ -16,18 +16,15 @@ from simnav.leaderboard.results.errors import RequestError, StoreError, mistakes
 from simnav.leaderboard.results.scratch import scratch
 
 from .calls import call, finite_number, whole_number
+from .error_requests import AllanRequest, RealismRequest
 from .given import absolute, results_of, scenario_of, scenarios_of
 from .requests import (
-    AllanRequest,
     BoundRequest,
     CiteRequest,
-    ExportRequest,
     MergeRequest,
     RankRequest,
-    RealismRequest,
     ReproduceRequest,
     RescoreRequest,
-    ScoreRequest,
     SealRequest,
     VerifyRequest,
 )
@@ -45,12 +42,8 @@ if TYPE_CHECKING:
 
     from .allan import AllanReport
     from .realism.report import RealismReport
-    from .single_run import RunReport
 
-__all__ = [
-    "allan", "bound", "cite", "export", "merge", "rank", "realism", "reproduce", "rescore", "score_files", "seal",
-    "verify",
-]  # fmt: skip
+__all__ = ["allan", "bound", "cite", "merge", "rank", "realism", "reproduce", "rescore", "seal", "verify"]
 
 
 @call(RankRequest)
@@ -216,76 +209,6 @@ def allan(request: AllanRequest) -> AllanReport:
             return allan_of_file(absolute(given), start, end)
         scenario = scenario_of(given)
         return allan_of_scenario(scenario, seed, finite_number("duration", request.duration), start, end)
-
-
-@call(ScoreRequest)
-def score_files(request: ScoreRequest) -> RunReport:
-    """Score estimates that were made elsewhere.
-
-    Returns
-    -------
-    RunReport
-        As of a run; the estimators are the files, by their names.
-
-    Raises
-    ------
-    RequestError
-        If a file cannot be read: one sentence with file, line and column.
-    """
-    from simnav.leaderboard.campaign.seal import read_seal
-
-    from .single_run import score_of_files
-
-    given = [request.files] if isinstance(request.files, (str, os.PathLike)) else list(request.files)
-    if not given:
-        raise RequestError("no file of estimates was named")
-    chosen, number = scenario_of(request.scenario), whole_number("seed", request.seed, 0)
-    seed = read_seal(request.sealed).seed(chosen.id, number)
-    return score_of_files(chosen, [absolute(path) for path in given], seed)
-
-
-@call(ExportRequest)
-def export(request: ExportRequest) -> list[Path]:
-    """Write what an estimator receives.
-
-    Returns
-    -------
-    list of Path
-        The files that were written.
-
-    Raises
-    ------
-    RequestError
-        If the format is unknown or needs the truth, or options contradict each other.
-    """
-    from simnav.leaderboard.campaign.seal import read_seal
-    from simnav.source import record
-
-    from .results.formats import formats, write
-    from .results.hidden import without_truth
-
-    seal, chosen = read_seal(request.sealed), scenarios_of(request.scenarios)
-    if request.blind and request.truth:
-        raise RequestError("'blind' and 'truth' exclude each other")
-    if request.blind and not seal.secret:
-        raise RequestError(
-            "'blind' needs 'sealed': without a key anybody can make the runs again; make one with 'simnav seal KEYFILE'"
-        )
-    if request.form not in formats("recording"):
-        raise RequestError(f"format = {request.form!r} is unknown; there are: {', '.join(formats('recording'))}")
-    output, runs = absolute(request.output), whole_number("runs", request.runs, 1)
-    first, written = whole_number("seed", request.seed, 0), list[Path]()
-    for scenario in chosen:
-        for number in range(first, first + runs):
-            with mistakes(ValueError, OSError):
-                recording = record(scenario, seal.seed(scenario.id, number))
-                told = recording if request.truth else without_truth(recording)
-                several = runs > 1 or len(chosen) > 1 or request.blind
-                ending = "" if request.form == "csv" else f".{request.form}"
-                target = output / f"{scenario.id}-{number}{ending}" if several else output
-                target.parent.mkdir(parents=True, exist_ok=True)
-                written += write("recording", request.form, told, target)
-    return written
 
 
 @call(RealismRequest)

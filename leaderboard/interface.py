@@ -18,20 +18,8 @@ from simnav.leaderboard.results.errors import RequestError
 from .claiming import claim
 from .costing import bench, costs
 from .given import results_of, scenario_of, scenarios_of
-from .inspection import (
-    allan,
-    bound,
-    cite,
-    export,
-    merge,
-    rank,
-    realism,
-    reproduce,
-    rescore,
-    score_files,
-    seal,
-    verify,
-)  # fmt: skip
+from .inspection import allan, bound, cite, merge, rank, realism, reproduce, rescore, seal, verify
+from .logs import align, export, inspect_log, score_files, tune_noise
 from .requests import ScenarioLike, Scenarios
 from .running import campaign, check, evaluate, make, record, robustness, run, sweep, tune
 
@@ -41,6 +29,7 @@ __all__ = [
     "RequestError",
     "ScenarioLike",
     "Scenarios",
+    "align",
     "allan",
     "bench",
     "bound",
@@ -51,6 +40,7 @@ __all__ = [
     "costs",
     "evaluate",
     "export",
+    "inspect_log",
     "make",
     "merge",
     "rank",
@@ -67,5 +57,6 @@ __all__ = [
     "seal",
     "sweep",
     "tune",
+    "tune_noise",
     "verify",
 ]

@@ -23,28 +23,21 @@ if TYPE_CHECKING:
     from simnav.scenario import Scenario
 
 __all__ = [
-    "AlignRequest",
-    "AllanRequest",
     "BenchRequest",
     "BoundRequest",
     "CampaignRequest",
     "CiteRequest",
     "CostsRequest",
     "EvaluateRequest",
-    "ExportRequest",
-    "InspectRequest",
     "MergeRequest",
     "RankRequest",
-    "RealismRequest",
     "RecordRequest",
     "ReproduceRequest",
     "RescoreRequest",
     "RobustnessRequest",
     "RunRequest",
-    "ScoreRequest",
     "SealRequest",
     "SweepRequest",
-    "TuneNoiseRequest",
     "TuneRequest",
     "VerifyRequest",
 ]
@@ -55,8 +48,8 @@ Bar: TypeAlias = "Callable[..., None] | None"
 CampaignProgress: TypeAlias = "Callable[[Progress], None] | None"
 Parameters: TypeAlias = "Mapping[str, Any] | None"
 
-_SCENARIO = "Name, versioned id, or path of a TOML file."
-_SCENARIO_MORE = "Or the `simnav.scenario.Scenario` itself."
+SCENARIO = "Name, versioned id, or path of a TOML file."
+SCENARIO_MORE = "Or the `simnav.scenario.Scenario` itself."
 _SCENARIOS = "Names, tracks or TOML files, separated by commas. Default: all."
 _ESTIMATORS = "Names or files, separated by commas; 'sw-fgo:window=10' sets a parameter."
 _FIVE = "'all': every registered one. Default: five baselines that suit the scenario."
@@ -67,7 +60,6 @@ CAMPAIGN_PROGRESS = "Called with a `simnav.leaderboard.campaign.campaign.Progres
 FOLDER = "Folder that a campaign wrote."
 _PROFILE = "What is run: smoke, quick, standard, full, robustness, or a TOML file of your own."
 _OWN_SCENARIOS = "TOML files of scenarios outside the catalogue."
-_SEALED_RUNS = "Derive the seeds from the secret in this file, as 'campaign --sealed' does."
 _FIRST_SEED = "Seed of the first run; the others count up."
 
 
@@ -75,79 +67,15 @@ _FIRST_SEED = "Seed of the first run; the others count up."
 class RecordRequest:
     """Run a scenario to its end: measurements, labels and truth."""
 
-    scenario: ScenarioLike = option(help=_SCENARIO, more=_SCENARIO_MORE, argument=True, metavar="SCENARIO")
+    scenario: ScenarioLike = option(help=SCENARIO, more=SCENARIO_MORE, argument=True, metavar="SCENARIO")
     seed: int = option(default=0, help="Seed of the run.", least=0)
-
-
-@request
-class ScoreRequest:
-    """Score estimates that were made elsewhere, with the scores and the page of a run."""
-
-    scenario: ScenarioLike = option(help=_SCENARIO, more=_SCENARIO_MORE, argument=True, metavar="SCENARIO")
-    files: Iterable[PathLike] = option(
-        help="Files of estimates, CSV or TUM; see docs/how-to/connect-a-program.md.",
-        argument=True,
-        metavar="FILES",
-        cli=list[Path],
-    )
-    _: KW_ONLY
-    seed: int = option(default=0, help="Seed of the run; with --sealed, its number.", least=0)
-    sealed: PathLike | None = option("--sealed", default=None, metavar="KEYFILE", help=_SEALED_RUNS)
-
-
-@request
-class ExportRequest:
-    """Write what an estimator receives, for programs of others: measurements, start and datasheets."""
-
-    scenarios: Scenarios = option(
-        help="Names, tracks or TOML files.", argument=True, metavar="SCENARIOS", cli=list[str]
-    )
-    output: PathLike = option("--output", "-o", help="File or folder to write; of several runs a folder.")
-    _: KW_ONLY
-    form: str = option("--format", default="csv", help="Format, such as csv, npz, gpx, kml, tum, nmea or mcap.")
-    seed: int = option(default=0, help="Seed of the first run; the others count up.", least=0)
-    runs: int = option("--runs", "-n", default=1, help="Seeds of each scenario.", least=1)
-    truth: bool = option("--truth", default=False, help="Write truth and fault labels, too.")
-    blind: bool = option(
-        "--blind",
-        default=False,
-        help="Neither truth, nor labels, nor seeds: for estimates that 'campaign --external' ranks; with --sealed.",
-    )
-    sealed: PathLike | None = option("--sealed", default=None, metavar="KEYFILE", help=_SEALED_RUNS)
-
-
-@request
-class AlignRequest:
-    """Compare every instrument of a log with the reference: delay, lever arm, offset, scale, each with its sigma."""
-
-    scenario: ScenarioLike = option(help=_SCENARIO, more=_SCENARIO_MORE, argument=True, metavar="SCENARIO")
-    seed: int = option(default=0, help="Number of the recording.", least=0)
-
-
-@request
-class TuneNoiseRequest:
-    """Propose noise figures for the datasheets of a log, from its reference and the stillest stretches of its IMU."""
-
-    scenario: ScenarioLike = option(help=_SCENARIO, more=_SCENARIO_MORE, argument=True, metavar="SCENARIO")
-    seed: int = option(default=0, help="Number of the recording.", least=0)
-
-
-@request
-class InspectRequest:
-    """Show what the files of a log hold, and write a scenario to begin with."""
-
-    files: Iterable[PathLike] = option(help="Files or folders.", argument=True, metavar="FILES", cli=list[Path])
-    _: KW_ONLY
-    output: PathLike | None = option(
-        "--output", "-o", default=None, help="Write a scenario to begin with to this TOML file."
-    )
 
 
 @request
 class RunRequest:
     """Run estimators once over one scenario, in this process, and score them."""
 
-    scenario: ScenarioLike = option(help=_SCENARIO, more=_SCENARIO_MORE, argument=True, metavar="SCENARIO")
+    scenario: ScenarioLike = option(help=SCENARIO, more=SCENARIO_MORE, argument=True, metavar="SCENARIO")
     estimators: Estimators = option("--estimator", "-e", default=None, help=f"{_ESTIMATORS} {_FIVE}")
     _: KW_ONLY
     seed: int = option(default=0, help="Seed of the run.", least=0)
@@ -240,7 +168,7 @@ class SweepRequest(RunOptions):
     All values use the same seeds, so only the dial differs. Started again, the sweep continues where it stopped.
     """
 
-    scenario: ScenarioLike = option(help=_SCENARIO, more=_SCENARIO_MORE, argument=True, metavar="SCENARIO")
+    scenario: ScenarioLike = option(help=SCENARIO, more=SCENARIO_MORE, argument=True, metavar="SCENARIO")
     dials: Mapping[str, Sequence[float]] | Sequence[str] | str = option(
         "--dial",
         cli=list[str],
@@ -509,54 +437,12 @@ class BoundRequest:
     """
 
     scenario: ScenarioLike = option(
-        help="A name or a TOML file; a simulated one.", more=_SCENARIO_MORE, argument=True, metavar="SCENARIO"
+        help="A name or a TOML file; a simulated one.", more=SCENARIO_MORE, argument=True, metavar="SCENARIO"
     )
     _: KW_ONLY
     runs: int = option("--runs", "-n", default=12, help="Seeds over which it is averaged.", least=1)
     smoothed: bool = option("--smoothed", default=False, help="Bound of smoothed output, not of real-time output.")
     progress: Bar = option(default=None, help=PROGRESS, hidden=True)
-
-
-@request
-class AllanRequest:
-    """The Allan deviation of an IMU and its noise coefficients, beside its datasheet.
-
-    Of a simulated scenario it is that of the errors at rest; of a log, that of the recorded samples, with all motion
-    that is in them.
-    """
-
-    scenario: ScenarioLike = option(
-        help="A scenario, simulated or recorded, or a recording (.npz).",
-        more=_SCENARIO_MORE,
-        argument=True,
-        metavar="SCENARIO_OR_LOG",
-    )
-    _: KW_ONLY
-    seed: int = option(default=0, help="Seed of the simulated errors; of a log, the number of the recording.", least=0)
-    duration: float = option(default=21600.0, least=1.0, help="Seconds that are simulated.")
-    start: float = option(default=0.0, least=0.0, help="Of a log: begin here, in seconds.")
-    end: float | None = option(default=None, least=0.0, help="Of a log: end here, in seconds. Default: at its end.")
-
-
-@request
-class RealismRequest:
-    """Whether the simulated errors of instruments are like those of a recording.
-
-    A logistic classifier is trained on windows of 60 s of the errors, real and simulated, and tried on recordings that
-    it has not seen. It needs scikit-learn (the extra ``realism``).
-    """
-
-    scenario: ScenarioLike = option(help=_SCENARIO, more=_SCENARIO_MORE, argument=True, metavar="SCENARIO")
-    log: ScenarioLike = option(help="A recorded scenario, likewise.", more=_SCENARIO_MORE, argument=True, metavar="LOG")
-    _: KW_ONLY
-    instrument: Sequence[str] | str | None = option(
-        "--instrument",
-        default=None,
-        help="Names of instruments, separated by commas, or imu. Default: all but the imu.",
-        cli=list[str] | None,
-    )
-    runs: int = option("--runs", "-n", default=12, least=3, help="Number of simulated runs.")
-    seed: int = option(default=0, least=0, help="Seed of the first of them.")
 
 
 @request

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from simnav.leaderboard.given import scenario_of
+from simnav.leaderboard.log_requests import AlignRequest
+from simnav.leaderboard.logs import align
 from simnav.leaderboard.ranking import tables
-from simnav.leaderboard.requests import AlignRequest
-from simnav.leaderboard.results.errors import RequestError, mistakes
-from simnav.log.alignment import align
 
 from .console import Output
 
@@ -18,10 +19,7 @@ __all__ = ["show"]
 def show(out: Output, request: AlignRequest) -> None:
     """Compare every instrument of a log with the reference."""
     scenario = scenario_of(request.scenario)
-    if scenario.log is None:
-        raise RequestError(f"{scenario.id} has no [log]: it is simulated, and its instruments are aligned")
-    with mistakes(ValueError, OSError):
-        found = align(scenario, request.seed)
+    found = align.of(replace(request, scenario=scenario))
     out.document({"scenario": scenario.id, "instruments": [a.to_dict() for a in found]})
     rows = []
     for a in found:

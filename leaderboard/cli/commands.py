@@ -10,6 +10,14 @@ from typing import TYPE_CHECKING, Any
 
 from simnav.leaderboard.calls import option, request
 from simnav.leaderboard.claim_requests import ClaimRequest
+from simnav.leaderboard.error_requests import AllanRequest, RealismRequest
+from simnav.leaderboard.log_requests import (
+    AlignRequest,
+    ExportRequest,
+    InspectRequest,
+    ScoreRequest,
+    TuneNoiseRequest,
+)
 from simnav.leaderboard.publishing_requests import (
     AuditRequest,
     BundleOptions,
@@ -20,28 +28,21 @@ from simnav.leaderboard.publishing_requests import (
     SubmitRequest,
 )
 from simnav.leaderboard.requests import (
-    AlignRequest,
-    AllanRequest,
     BenchRequest,
     BoundRequest,
     CampaignRequest,
     CiteRequest,
     EvaluateRequest,
-    ExportRequest,
-    InspectRequest,
     MergeRequest,
     Parameters,
-    RealismRequest,
     RecordRequest,
     ReproduceRequest,
     RescoreRequest,
     RobustnessRequest,
     RunRequest,
     Scenarios,
-    ScoreRequest,
     SealRequest,
     SweepRequest,
-    TuneNoiseRequest,
     TuneRequest,
     VerifyRequest,
 )

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from simnav.leaderboard.inspection import export
-from simnav.leaderboard.requests import ExportRequest
+from simnav.leaderboard.log_requests import ExportRequest
+from simnav.leaderboard.logs import export
 
 from .console import Output
 

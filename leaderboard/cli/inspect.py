@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
+from simnav.leaderboard.log_requests import InspectRequest
+from simnav.leaderboard.logs import inspect_log
 from simnav.leaderboard.ranking import tables
-from simnav.leaderboard.requests import InspectRequest
-from simnav.leaderboard.results.errors import RequestError
-from simnav.leaderboard.results.files import write_whole
-from simnav.log import LogError
 from simnav.log.check import described
-from simnav.log.draft import draft, guesses
-from simnav.log.inspection import inspect_log
+from simnav.log.draft import guesses
 
 from .console import FAILED, Output
 from .options import absolute
@@ -19,13 +16,7 @@ __all__ = ["show"]
 
 def show(out: Output, request: InspectRequest) -> None:
     """Show what the files of a log hold, and write a scenario to begin with."""
-    try:
-        streams, failed = inspect_log([absolute(path) for path in request.files])
-    except LogError as error:
-        raise RequestError(str(error)) from None
-    target = None if request.output is None else absolute(request.output)
-    if target is not None and target.suffix != ".toml":
-        raise RequestError(f"--output {request.output}: the file should end in .toml")
+    streams, failed = inspect_log.of(request)
     found = [list(guesses(stream)) for stream in streams]
     pairs = list(zip(streams, found, strict=True))
     told = [{**s.to_dict(), "guesses": [g.sentence() for g in of]} for s, of in pairs]
@@ -37,10 +28,7 @@ def show(out: Output, request: InspectRequest) -> None:
     out.print(tables.table("what the files hold", ["stream", "format", "times", "columns, guessed"], rows))
     for sentence in failed:
         out.remark(sentence)
-    if target is not None and streams:
-        name = "-".join("".join(c if c.isalnum() else " " for c in target.stem.lower()).split()) or "my-log"
-        write_whole(target, draft(streams, name))
-        out.print(
-            f"scenario: {target}", f"next:     look at what is marked 'check', then simnav check {request.output}"
-        )
+    if request.output is not None and streams:
+        out.print(f"scenario: {absolute(request.output)}",
+                  f"next:     look at what is marked 'check', then simnav check {request.output}")  # fmt: skip
     out.code = 0 if streams else FAILED

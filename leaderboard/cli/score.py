@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from simnav.leaderboard.figures.style import save_as
-from simnav.leaderboard.inspection import score_files
+from simnav.leaderboard.logs import score_files
 
 from .commands import ScoreCommand
 from .console import FAILED, Output

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from simnav.spec import SpecError
 from simnav.types import Array
@@ -95,7 +96,7 @@ def judge(real: Windows, simulated: Windows, seed: int = 0) -> Verdict:
     )
 
 
-def _groups(windows: Windows) -> tuple[Array, bool]:
+def _groups(windows: Windows) -> tuple[NDArray[np.int64], bool]:
     """A number for each window: its run, or, where runs are few, the part of the run that it begins in."""
     if len(np.unique(windows.run)) >= _RECORDINGS:
         return windows.run, False
@@ -107,7 +108,7 @@ def _groups(windows: Windows) -> tuple[Array, bool]:
     return group, True
 
 
-def _fitted(values: Array, label: Array) -> Any:
+def _fitted(values: Array, label: NDArray[np.int64]) -> Any:
     try:
         linear = importlib.import_module("sklearn.linear_model")  # an extra: there or not
         pipeline = importlib.import_module("sklearn.pipeline")
@@ -118,7 +119,7 @@ def _fitted(values: Array, label: Array) -> Any:
     return pipeline.make_pipeline(scaling.StandardScaler(), model).fit(values, label)
 
 
-def _interval(score: Array, label: Array, group: Array, seed: int) -> tuple[float, float]:
+def _interval(score: Array, label: NDArray[np.int64], group: NDArray[np.int64], seed: int) -> tuple[float, float]:
     rng, areas = np.random.default_rng(seed), []
     by_group = [[score[(label == side) & (group == g)] for g in np.unique(group[label == side])] for side in (0, 1)]
     for _ in range(_RESAMPLES):

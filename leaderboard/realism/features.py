@@ -9,14 +9,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from simnav.types import Array
 
 from .errors import ErrorSeries
 
 __all__ = ["LAGS", "WINDOW", "Windows", "autocorrelation", "feature_names", "imu_windows", "on_grid", "windows_of"]
+
+Mask: TypeAlias = NDArray[np.bool_]
 
 #: Length of a window, and lags of the autocorrelation [s].
 WINDOW, LAGS = 60.0, (1.0, 10.0, 60.0)
@@ -36,14 +40,14 @@ class Windows:
     ----------
     values : (w, f) array
         A row for each window.
-    run : (w,) array of int
+    run : (w,) int array
         Number of the run that a window is of.
     start : (w,) array
         Beginning of each window [s].
     """
 
     values: Array
-    run: Array
+    run: NDArray[np.int64]
     start: Array
 
 
@@ -70,7 +74,7 @@ def windows_of(series: Sequence[ErrorSeries]) -> Windows:
     return Windows(np.array(values).reshape(len(values), -1), np.array(run, dtype=np.int64), np.array(start))
 
 
-def on_grid(series: ErrorSeries) -> tuple[Array, Array]:
+def on_grid(series: ErrorSeries) -> tuple[Array, Mask]:
     """The error on the grid of its rate, less its mean, zero where there is no reading; and where there is one."""
     n = max(1, round(series.duration * series.rate))
     place = np.floor(series.time * series.rate + 1e-6).astype(np.int64)
@@ -81,7 +85,7 @@ def on_grid(series: ErrorSeries) -> tuple[Array, Array]:
     return grid, there
 
 
-def autocorrelation(x: Array, there: Array, lag: int) -> float:
+def autocorrelation(x: Array, there: Mask, lag: int) -> float:
     """The autocorrelation of a series with zero mean at a lag, over the pairs of which both are there; 0 for none."""
     if lag >= len(x):
         return 0.0
@@ -92,7 +96,7 @@ def autocorrelation(x: Array, there: Array, lag: int) -> float:
     return float(np.mean(x[:-lag][both] * x[lag:][both]) / power)
 
 
-def _features(x: Array, there: Array, first: int, n: int, rate: float) -> list[float]:
+def _features(x: Array, there: Mask, first: int, n: int, rate: float) -> list[float]:
     inside = there[first : first + n]
     window = x[first : first + n][inside]
     window = window - window.mean()

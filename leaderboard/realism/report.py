@@ -84,7 +84,8 @@ class InstrumentRealism:
             return []
         rows = []
         for k, component in enumerate(self.kind.components):
-            factor, row = UNITS[component.error_unit], {"instrument": self.name, "component": component.error}
+            factor = UNITS[component.error_unit]
+            row: dict[str, Any] = {"instrument": self.name, "component": component.error}
             sd = [float(np.sqrt(c[0, k])) / factor for c in (self.real, self.simulated)]
             row |= {"unit": component.error_unit, "sd": sd[0], "sd_simulated": sd[1]}
             close = abs(sd[1] / sd[0] - 1.0) <= PART if sd[0] else sd[1] == 0.0

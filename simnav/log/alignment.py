@@ -37,6 +37,8 @@ _KNOWN = 2.0
 _NORMAL = 1.4826
 #: A scale is found where speeds differ by this part of the largest.
 _SPREAD = 0.3
+#: A delay is another one than none if the sum of squares falls by this multiple of the variance of a residual.
+_SIGNIFICANT = 16.0
 
 
 @dataclass(frozen=True)
@@ -137,6 +139,9 @@ def _aligned(recording: str, name: str, kind: str, series: Series, source: LogSo
         return _with(blank, remark=f"fewer than {_LEAST} readings are where the reference is known")
     fine = np.arange(best - _COARSE, best + _COARSE + 0.5 * _FINE, _FINE)
     delay = float(min(fine, key=cost))
+    readings = attempts[delay][4].size
+    if readings * (cost(0.0) / cost(delay) - 1.0) < _SIGNIFICANT:  # no worse than without a delay
+        delay = 0.0
     _, solution, covariance, parameters, residual = attempts[delay]
     count = residual.size
     scatter = {
@@ -148,6 +153,8 @@ def _aligned(recording: str, name: str, kind: str, series: Series, source: LogSo
     sigma = float(np.sqrt(2.0 * cost(delay) / (max(count - len(solution), 1) * curvature))) if sharp else np.nan
     remark = ""
     if not sharp or sigma > 1.0 or abs(delay) >= _WIDEST - _FINE:
+        if delay != 0.0 and np.isfinite(cost(0.0)):
+            _, solution, covariance, parameters, residual = attempts[0.0]
         delay, sigma, remark = np.nan, np.nan, "the motion is too steady to tell a delay"
     spread = np.sqrt(np.diag(covariance))
     told = {n: (float(s), float(e)) for n, s, e in zip(parameters, solution, spread, strict=True)}
@@ -173,10 +180,11 @@ def _fit(
     if len(difference) < _LEAST:
         return np.inf, np.zeros(p), np.full((p, p), np.inf), names, difference
     a, b = derivative.reshape(-1, p), difference.reshape(-1)
-    weight = np.ones(len(b))
-    solution = np.zeros(p)
+    weight: Array = np.ones(len(b))
+    solution: Array = np.zeros(p)
     for _ in range(4):  # Huber's weights, with the scale of the residuals
-        solution = np.linalg.lstsq(a * weight[:, None], b * weight, rcond=None)[0] if p else solution
+        if p:
+            solution = np.asarray(np.linalg.lstsq(a * weight[:, None], b * weight, rcond=None)[0], dtype=np.float64)
         residual = b - a @ solution
         scale = max(1.345 * _NORMAL * float(np.median(np.abs(residual))), 1e-12)
         weight = np.sqrt(np.minimum(1.0, scale / np.maximum(np.abs(residual), 1e-300)))

@@ -178,7 +178,11 @@ def _read_csv(path: Path, comment: str, _mtime: int, _size: int) -> Table:
     except (pa.ArrowInvalid, pa.ArrowKeyError) as error:
         lines = enumerate(content.split(b"\n")[begin:], begin + 1)
         kept = [(n, line) for n, line in lines if not _marked(line, mark)]
-        raise LogError(_ragged(path, kept, delimiter, len(names)) or f"{path}: {error}") from None
+        what = " ".join(str(error).split())[:200]
+        raise LogError(
+            _ragged(path, kept, delimiter, len(names))
+            or f"{path}: {what} (is there a quotation mark that is not closed?)"
+        ) from None
     while data.num_rows and all(c[-1].as_py() is None for c in data.columns):  # empty lines at the end
         data = data.slice(0, data.num_rows - 1)
     columns: dict[str, NDArray[np.float64] | NDArray[np.object_]] = {}

@@ -10,7 +10,7 @@ import math
 import warnings
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol, Self
 
 import numpy as np
 
@@ -26,8 +26,11 @@ from simnav.types import KINDS, Array, ImuSamples, NavigationStates, TapStates
 from simnav.world.initial_state import draw_start
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
     from simnav.log.spec import RecordedSpec
-    from simnav.scenario import Scenario
+    from simnav.sensors import AidSpec, AnyFault
+    from simnav.types import Instruments
     from simnav.world import Surroundings
 
 __all__ = ["LogSource"]
@@ -44,6 +47,70 @@ _UNKNOWN_HEADING = math.radians(90.0)
 _EARLY = 60.0
 #: How long the accelerometers are averaged for roll and pitch [s].
 _LEVELLING = 2.0
+
+
+class RecordedScenario(Protocol):
+    """What a source reads of a `simnav.scenario.Scenario`, which is on a floor above."""
+
+    @property
+    def id(self) -> str:
+        """Name and version."""
+        ...
+
+    @property
+    def log(self) -> RecordedSpec | None:
+        """The files."""
+        ...
+
+    @property
+    def duration(self) -> float:
+        """Length of the run [s]."""
+        ...
+
+    @property
+    def step(self) -> float:
+        """From one estimate to the next [s]."""
+        ...
+
+    @property
+    def aids(self) -> Mapping[str, AidSpec]:
+        """The aiding instruments."""
+        ...
+
+    @property
+    def faults(self) -> Sequence[AnyFault]:
+        """The faults."""
+        ...
+
+    @property
+    def initial_error(self) -> Any:
+        """Standard deviations of the initial state."""
+        ...
+
+    @property
+    def draws(self) -> Mapping[str, Any]:
+        """The drawn values."""
+        ...
+
+    def drawn(self, seed: int) -> Self:
+        """The scenario of one run."""
+        ...
+
+    def root(self, seed: int) -> int:
+        """The number from which random streams start."""
+        ...
+
+    def surround(self, seed: int) -> Surroundings:
+        """The surroundings of one run."""
+        ...
+
+    def instruments_sheet(self) -> Instruments:
+        """The datasheets."""
+        ...
+
+    def actual_sheet(self) -> Instruments | None:
+        """The true datasheets."""
+        ...
 
 
 class LogSource:
@@ -78,9 +145,9 @@ class LogSource:
         If the log is absent or cannot be used: one sentence with file, line and column.
     """
 
-    def __init__(self, scenario: Scenario, seed: int):
+    def __init__(self, scenario: RecordedScenario, seed: int):
         scenario = scenario.drawn(seed)
-        self.scenario = scenario
+        self.scenario: Any = scenario
         root = scenario.root(seed)
         log = scenario.log
         if log is None:
@@ -149,7 +216,7 @@ class LogSource:
         return self._reference.states(time)
 
     def _measure(
-        self, scenario: Scenario, log: RecordedSpec, seed: int, surroundings: Surroundings
+        self, scenario: RecordedScenario, log: RecordedSpec, seed: int, surroundings: Surroundings
     ) -> dict[str, AidStream]:
         """The streams of all aiding instruments, without faults."""
         streams = {}

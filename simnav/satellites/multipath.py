@@ -23,7 +23,7 @@ import numpy as np
 from simnav.satellites.orbit import SPEED_OF_LIGHT
 from simnav.types import Array
 
-__all__ = ["CHIP", "WAVELENGTH", "multipath_error", "strength_change"]
+__all__ = ["CHIP", "WAVELENGTH", "multipath_error", "sea_reflection", "strength_change"]
 
 #: Length of a chip of GPS C/A, Galileo E1 and BeiDou B1C [m].
 CHIP = SPEED_OF_LIGHT / 1.023e6
@@ -35,14 +35,47 @@ def _phase(excess: Array) -> Array:
     return np.asarray(2.0 * np.pi * excess / WAVELENGTH + np.pi)
 
 
-def multipath_error(excess: Array, amplitude: float, spacing: float) -> Array:
+def sea_reflection(height: Array, elevation: Array, amplitude: float, significant_height: float) -> tuple[Array, Array]:
+    """The signal that the sea reflects to an antenna above it, as a plane mirror with waves.
+
+    With the height h above the sea and the elevation e of the satellite the reflected way is ``2 h sin(e)`` longer.
+    Waves of the standard deviation ``s = Hs / 4`` weaken the coherent part by ``exp(-8 pi^2 s^2 sin^2(e) / w^2)``, w
+    being the wavelength (W. S. Ament, *Toward a theory of reflection by a rough surface*, Proc. IRE 1953; P. Beckmann
+    and A. Spizzichino, *The Scattering of Electromagnetic Waves from Rough Surfaces*, 1963). The rest is diffuse, and
+    not modelled.
+
+    Parameters
+    ----------
+    height : array
+        Of the antenna above the sea [m]; below it there is no reflection.
+    elevation : array
+        Of the satellite [rad], of a shape that goes with that of the height.
+    amplitude : float
+        Of the signal that a smooth sea reflects, in units of the direct one, after the antenna's suppression [-].
+    significant_height : float
+        Of the waves [m].
+
+    Returns
+    -------
+    excess : array
+        How much longer the reflected way is [m]; infinite without a reflection.
+    amplitude : array
+        Amplitude of the reflected signal [-].
+    """
+    up = np.sin(elevation)
+    excess = np.where((height > 0.0) & (up > 0.0), 2.0 * height * up, np.inf)
+    rough = 0.25 * significant_height * up / WAVELENGTH
+    return excess, np.asarray(amplitude * np.exp(-8.0 * np.pi**2 * rough**2))
+
+
+def multipath_error(excess: Array, amplitude: Array | float, spacing: float) -> Array:
     """Error of the range when direct and reflected signal arrive [m].
 
     Parameters
     ----------
     excess : array
         Excess path of the reflected signal [m]; infinite without one.
-    amplitude : float
+    amplitude : array_like
         Of the reflected signal, in units of the direct one, below 1 [-].
     spacing : float
         Of early and late correlator [chips].
@@ -56,7 +89,7 @@ def multipath_error(excess: Array, amplitude: float, spacing: float) -> Array:
     return np.asarray(np.where(there, error * fading, 0.0))
 
 
-def strength_change(excess: Array, amplitude: float) -> Array:
+def strength_change(excess: Array, amplitude: Array | float) -> Array:
     """Change of C/N0 by a reflected signal that arrives with the direct one [dB]; arguments as above."""
     there = excess < CHIP
     phase = _phase(np.where(there, excess, 0.0))

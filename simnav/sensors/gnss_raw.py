@@ -14,7 +14,7 @@ error of the satellite's clock, and says where the satellite is. With two freque
 
 If the surroundings have ``obstacles`` (`simnav.world.obstacles`), a signal whose direct way is blocked arrives by a
 reflection or not at all, and a signal with a reflection has the error of `simnav.satellites.multipath`. The vessel's
-own structures block, too (`shadows`). Estimators are not told of either.
+own structures block, too (`shadows`), and the sea reflects (`sea_reflection`). Estimators are told of none of them.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ from simnav.blocks import StateBlock
 from simnav.geometry.earth import displace
 from simnav.kinds import Component, Kind
 from simnav.satellites.ephemeris import Ephemerides
-from simnav.satellites.multipath import multipath_error, strength_change
+from simnav.satellites.multipath import multipath_error, sea_reflection, strength_change
 from simnav.satellites.receiver_clock import Grade, clock_block
 from simnav.satellites.rinex_navigation import read_navigation
 from simnav.satellites.signal_errors import amplification, density_ratio, noise_factor, range_error
@@ -144,6 +144,9 @@ class GnssRaw(AidSpec):
         up to an elevation above the deck [rad].
     reflection : float
         Amplitude of a signal reflected by an obstacle, in units of the direct one.
+    sea_reflection : float
+        Amplitude of a signal reflected by a smooth sea, in units of the direct one, after the antenna's suppression;
+        waves weaken it (`simnav.satellites.multipath.sea_reflection`).
     spacing : float
         Of early and late correlator [chips].
     signal_error : float
@@ -193,6 +196,7 @@ class GnssRaw(AidSpec):
     sigma_range_rate: NonNegative = quantity("m_s")
     shadows: _Shadows = quantity("deg", ())
     reflection: float = Field(0.5, ge=0.0, lt=1.0)
+    sea_reflection: float = Field(0.0, ge=0.0, lt=1.0)
     spacing: float = Field(0.1, gt=0.0, le=1.0)
     signal_error: NonNegative = quantity("m", 0.5)
     multipath: NonNegative = 1.0
@@ -310,19 +314,29 @@ class RawReceiver(ChannelInstrument):
         return self._seen(tap)[0]
 
     def detour(self, tap: TapStates) -> tuple[Array, Array]:
-        """(n, c) errors of ranges [m] and rates [m/s] by obstacles; zero for signals that are blocked altogether."""
+        """(n, c) errors of ranges [m] and rates [m/s] by obstacles and the sea; zero for signals that are blocked."""
         seen, paths = self._seen(tap)
+        sea = 0.0 if self.spec.sea_reflection == 0.0 else multipath_error(*self.from_sea(tap), self.spec.spacing)
         if paths is None:
-            return np.zeros(seen.range.shape), np.zeros(seen.range.shape)
+            return np.zeros(seen.range.shape) + sea, np.zeros(seen.range.shape)
         alone = paths.blocked & np.isfinite(paths.excess)
         both = multipath_error(paths.excess, self.spec.reflection, self.spec.spacing)
-        error = np.where(alone, paths.excess, np.where(paths.blocked, 0.0, both))
+        error = np.where(alone, paths.excess, np.where(paths.blocked, 0.0, both + sea))
         return error, np.where(alone, paths.excess_rate, 0.0)
+
+    def from_sea(self, tap: TapStates) -> tuple[Array, Array]:
+        """(n, c) excess paths [m] and amplitudes of the signals that the sea reflects."""
+        seen, waves = self.sight(tap), self.surroundings.get("sea")
+        height = displace(tap.position, self.lever_displacement(tap))[:, 2:]
+        swell = 0.0 if waves is None else waves.sea.significant_height
+        return sea_reflection(height, seen.elevation, self.spec.sea_reflection, swell)
 
     def ratio(self, tap: TapStates) -> Array:
         """(n, c) C/N0 [dB-Hz]; minus infinity for signals that are blocked altogether."""
         seen, paths = self._seen(tap)
         ratio = density_ratio(seen.elevation)
+        if self.spec.sea_reflection:
+            ratio = ratio + strength_change(*self.from_sea(tap))
         if paths is not None:
             weaker = 20.0 * np.log10(max(self.spec.reflection, 1e-9))
             alone = np.where(np.isfinite(paths.excess), weaker, -np.inf)

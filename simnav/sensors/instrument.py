@@ -46,6 +46,7 @@ from simnav.sensors.figures import (
     times_datasheet,
 )  # fmt: skip
 from simnav.sensors.processes import GaussMarkov
+from simnav.sensors.rows import checked_rows
 from simnav.sensors.turning import turn_to_body, turn_to_ned
 from simnav.spec import UNITS, NonNegative, Positive, Spec, SpecError, closest, entries, quantity, unit_of
 from simnav.streams import stream
@@ -489,7 +490,7 @@ class Instrument(ABC):
 
     def reading(self, tap: TapStates) -> tuple[Array, Array, NDArray[np.bool_] | None]:
         """The results of `observe`, `noise_sigma` and `available`."""
-        value = _checked_rows(self, "observe()", self.observe(tap), tap)
+        value = checked_rows(self, "observe()", self.observe(tap), tap)
         return value, self.noise_sigma(value), self.available(tap)
 
     def lever_displacement(self, tap: TapStates) -> Array:
@@ -570,8 +571,8 @@ def _checked_reading(instrument: Instrument, tap: TapStates) -> tuple[Array, Arr
     label = partial(label_of, instrument.name, instrument.kind, type(instrument))
     try:
         value, sigma, there = instrument.reading(tap)
-        value = _checked_rows(instrument, "observe()", value, tap)
-        sigma = _checked_rows(instrument, "noise_sigma()", sigma, tap)
+        value = checked_rows(instrument, "observe()", value, tap)
+        sigma = checked_rows(instrument, "noise_sigma()", sigma, tap)
         there = None if there is None else np.asarray(there)
     except (InstrumentError, MemoryError):
         raise
@@ -596,19 +597,3 @@ def _checked_reading(instrument: Instrument, tap: TapStates) -> tuple[Array, Arr
                 f"{label()}: {method} returned {array[row].tolist()} at {tap.time[row]:g} s; it should be {right}"
             )
     return value, sigma, there
-
-
-def _checked_rows(instrument: Instrument, method: str, array: Array, tap: TapStates) -> Array:
-    """The result of a method, after a check that it has a row for each time and a column for each component."""
-    array = np.asarray(array, dtype=np.float64)
-    components = instrument.definition.values
-    shape = (len(tap.time), len(components))
-    if not len(tap.time) and not array.size:
-        return array.reshape(shape)
-    if array.shape != shape:
-        raise InstrumentError(
-            f"{label_of(instrument.name, instrument.kind, type(instrument))}: {method} returned an array of shape "
-            f"{array.shape}, where {shape} is wanted: a row for each of {shape[0]} times, a column for each component "
-            f"({', '.join(components)})"
-        )
-    return array

@@ -144,6 +144,7 @@ CALLS: dict[str, tuple[list[str], Callable[[], Any]]] = {
 
 #: Commands whose calls are compared where their own tests are: they take minutes, or need what another one makes.
 ELSEWHERE = {"claim", "merge", "reference", "reproduce", "rescore", "robustness", "seal", "submit", "tune", "verify"}
+ELSEWHERE |= {"inspect", "align", "tune-noise", "export", "score"}
 ELSEWHERE |= {"show", "standard run", "standard check", "standard audit", "standard publish", "train anfis"}
 
 
@@ -193,7 +194,8 @@ OTHER_NAMES: dict[str, Callable[..., Any] | None] = {
     "list": simnav.names, "simulate": simnav.record, "leaderboard": simnav.site, "new-estimator": write_estimator,
     "warmup": warmup, "reference": None, "show": None, "train anfis": None, "standard run": simnav.run_standard,
     "standard check": simnav.check_standard, "standard audit": simnav.audit_standard,
-    "standard publish": simnav.publish_standard,
+    "standard publish": simnav.publish_standard, "inspect": simnav.inspect_log, "score": simnav.score_files,
+    "tune-noise": simnav.tune_noise,
 }  # fmt: skip
 
 #: Options that are no argument of the call: what is done with the object that it returns, and files that it writes.
@@ -201,6 +203,7 @@ OF_THE_RESULT = {
     "list": {"topic"},
     "run": {"plot", "stanford", "alert_limit"},
     "simulate": {"output", "csv"},
+    "score": {"plot"},
     "sweep": {"plot"},
     "robustness": {"plot"},
     "claim": {"plot"},

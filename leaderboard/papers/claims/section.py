@@ -53,6 +53,8 @@ def claim_sheets(answers: Sequence[Answer]) -> list[Sheet]:
         "A condition was found on seeds of a search, and its gain is of other seeds. It is sufficient, and does not "
         "say what the authors did.",
     ]
+    firsts = sorted({min(a.ours.seeds) for a in answers if a.ours.seeds})
+    notes.append(f"The judgement is on seeds from {' and '.join(map(str, firsts))} on.")
     if any(a.derived for a in answers):
         notes.insert(0, "~ follows from other figures of the paper or from its text")
     first = Sheet("When do the claims hold?", "", [Column(t, n) for t, n in head], rows, notes)

@@ -37,7 +37,10 @@ def read(path: Path, file: FileSpec, sentence: str | None, talker: str | None) -
             plain = values.cast(pa.int8()) if pa.types.is_boolean(kind) else values
             columns[name] = np.asarray(plain.cast(pa.float64(), safe=False).to_numpy(), dtype=np.float64)
         elif pa.types.is_string(kind) or pa.types.is_large_string(kind) or pa.types.is_dictionary(kind):
-            columns[name] = np.array(values.to_pylist(), dtype=object)
+            try:
+                columns[name] = np.array(values.to_pylist(), dtype=object)
+            except UnicodeDecodeError:
+                raise LogError(f"{path}: the column {name!r} is no text in UTF-8; the file is damaged") from None
     if not columns or not content.num_rows:
         raise LogError(f"{path}: there are no rows of numbers")
     return rows_of(Table(str(path), columns, np.arange(1, content.num_rows + 1)), file)

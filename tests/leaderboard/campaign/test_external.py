@@ -11,7 +11,7 @@ from simnav.estimator import make
 from simnav.leaderboard.campaign.external import add_external
 from simnav.leaderboard.campaign.seal import PUBLIC, make_key
 from simnav.leaderboard.given import results_of
-from simnav.leaderboard.inspection import export, score_files
+from simnav.leaderboard.logs import export, score_files
 from simnav.leaderboard.results import store
 from simnav.leaderboard.results.errors import RequestError
 from simnav.leaderboard.results.hidden import without_truth

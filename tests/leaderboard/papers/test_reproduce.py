@@ -385,7 +385,7 @@ def test_what_is_undecided_in_the_stored_results_is_so_for_no_lack_of_runs(paper
             continue
         assert f.ours is not None
         if isinstance(f.row, Gain):
-            width, band = math.log(f.ours.high / f.ours.low), (GAIN - 1.0 / GAIN) * abs(math.log(f.row.paper))
+            width, band = math.log(f.ours.high / f.ours.low), (GAIN - 1.0 / GAIN) * abs(math.log(1.0 - f.row.paper))
         else:
             least, most = f.row.paper if isinstance(f.row.paper, tuple) else (f.row.paper, f.row.paper)
             width, band = f.ours.high - f.ours.low, most * (1.0 + TOLERANCE) - least / (1.0 + TOLERANCE)

@@ -68,7 +68,8 @@ def test_what_was_put_in_is_found(log):
     offset, sigma = found["compass"].parameters["offset"]
     assert np.degrees(offset) == pytest.approx(3.0, abs=0.1)
     assert 0.0 < np.degrees(sigma) < 0.1
-    assert found["compass"].delay == pytest.approx(0.0, abs=0.1)
+    # The vessel turns at a constant rate, so a delay of the compass would be an offset.
+    assert np.isnan(found["compass"].delay) or found["compass"].delay_sigma > 0.05
 
 
 def test_the_figures_for_datasheets(log):

@@ -10,6 +10,7 @@ from simnav.geometry.earth import displace
 from simnav.geometry.ecef import ecef_from_geodetic
 from simnav.geometry.rotation import dcm_from_rotation_vector, dcm_from_rpy
 from simnav.kinds import NavigationPoint
+from simnav.satellites.multipath import sea_reflection
 from simnav.satellites.receiver_clock import GRADES
 from simnav.satellites.signal_errors import density_ratio, noise_factor, range_error
 from simnav.sensors.gnss_raw import SHIPPED, GnssRaw
@@ -215,3 +216,30 @@ def test_the_digest_of_a_scenario_depends_on_its_navigation_file(tmp_path):
 def test_a_wrong_table_gets_a_sentence(change, message):
     with pytest.raises(SpecError, match=message):
         spec(**change)
+
+
+def test_the_sea_reflects_as_a_mirror_and_waves_weaken_it():
+    """Against the closed form for one antenna at rest, and its vanishing under water and in a heavy sea."""
+    table = TABLE | {"sea_reflection": 0.4, "sigma_pseudorange_m": 0.0, "sigma_range_rate_m_s": 0.0}
+    time, still = np.arange(1.0, 601.0), np.zeros((600, 3))
+    place = still + np.array([np.radians(54.0), np.radians(7.9), 12.0])
+    tap = TapStates(time, place, still, still, still, still)
+    with_sea, without = (GnssRaw.from_toml(table | c).build("gnss", 1) for c in ({}, {"sea_reflection": 0.0}))
+    error = (with_sea.observe(tap) - without.observe(tap))[..., 0]
+    height = 12.0 - with_sea.lever_arm[2]
+    excess = 2.0 * height * np.sin(with_sea.sight(tap).elevation)
+    phase = 2.0 * np.pi * excess / (299792458.0 / 1575.42e6) + np.pi
+    share = 0.4 * np.cos(phase)
+    wanted = np.where(
+        np.abs(share * excess / (1.0 + share)) < np.abs(share * 0.05 * 299792458.0 / 1.023e6),
+        share * excess / (1.0 + share), share * 0.05 * 299792458.0 / 1.023e6,
+    )  # fmt: skip
+    np.testing.assert_allclose(error, wanted, atol=1e-6)
+    assert np.abs(error).max() > 1.0
+    e = np.array([np.radians(5.0), np.radians(40.0)])
+    _, calm = sea_reflection(np.array([12.0]), e, 0.4, 0.0)
+    _, rough = sea_reflection(np.array([12.0]), e, 0.4, 2.0)
+    np.testing.assert_allclose(calm, 0.4)
+    np.testing.assert_allclose(rough[0], 0.4 * np.exp(-0.5 * (4.0 * np.pi * 0.5 * np.sin(e[0]) / 0.190293673) ** 2))
+    assert rough[1] < 1e-6
+    assert np.isinf(sea_reflection(np.array([-1.0]), e, 0.4, 0.0)[0]).all()

@@ -1,0 +1,82 @@
+"""The requests of the calls for logs, and for estimates that were made elsewhere."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import KW_ONLY
+from pathlib import Path
+
+from simnav.leaderboard.campaign.options import PathLike
+
+from .calls import option, request
+from .requests import ScenarioLike, Scenarios
+
+__all__ = ["AlignRequest", "ExportRequest", "InspectRequest", "ScoreRequest", "TuneNoiseRequest"]
+
+_SCENARIO = "Name, versioned id, or path of a TOML file."
+_SCENARIO_MORE = "Or the `simnav.scenario.Scenario` itself."
+_SEALED_RUNS = "Derive the seeds from the secret in this file, as 'campaign --sealed' does."
+
+
+@request
+class ScoreRequest:
+    """Score estimates that were made elsewhere, with the scores and the page of a run."""
+
+    scenario: ScenarioLike = option(help=_SCENARIO, more=_SCENARIO_MORE, argument=True, metavar="SCENARIO")
+    files: Iterable[PathLike] = option(
+        help="Files of estimates, CSV or TUM; see docs/how-to/connect-a-program.md.",
+        argument=True,
+        metavar="FILES",
+        cli=list[Path],
+    )
+    _: KW_ONLY
+    seed: int = option(default=0, help="Seed of the run; with --sealed, its number.", least=0)
+    sealed: PathLike | None = option("--sealed", default=None, metavar="KEYFILE", help=_SEALED_RUNS)
+
+
+@request
+class ExportRequest:
+    """Write what an estimator receives, for programs of others: measurements, start and datasheets."""
+
+    scenarios: Scenarios = option(
+        help="Names, tracks or TOML files.", argument=True, metavar="SCENARIOS", cli=list[str]
+    )
+    output: PathLike = option("--output", "-o", help="File or folder to write; of several runs a folder.")
+    _: KW_ONLY
+    form: str = option("--format", default="csv", help="Format, such as csv, npz, gpx, kml, tum, nmea or mcap.")
+    seed: int = option(default=0, help="Seed of the first run; the others count up.", least=0)
+    runs: int = option("--runs", "-n", default=1, help="Seeds of each scenario.", least=1)
+    truth: bool = option("--truth", default=False, help="Write truth and fault labels, too.")
+    blind: bool = option(
+        "--blind",
+        default=False,
+        help="Neither truth, nor labels, nor seeds: for estimates that 'campaign --external' ranks; with --sealed.",
+    )
+    sealed: PathLike | None = option("--sealed", default=None, metavar="KEYFILE", help=_SEALED_RUNS)
+
+
+@request
+class AlignRequest:
+    """Compare every instrument of a log with the reference: delay, lever arm, offset, scale, each with its sigma."""
+
+    scenario: ScenarioLike = option(help=_SCENARIO, more=_SCENARIO_MORE, argument=True, metavar="SCENARIO")
+    seed: int = option(default=0, help="Number of the recording.", least=0)
+
+
+@request
+class TuneNoiseRequest:
+    """Propose noise figures for the datasheets of a log, from its reference and the stillest stretches of its IMU."""
+
+    scenario: ScenarioLike = option(help=_SCENARIO, more=_SCENARIO_MORE, argument=True, metavar="SCENARIO")
+    seed: int = option(default=0, help="Number of the recording.", least=0)
+
+
+@request
+class InspectRequest:
+    """Show what the files of a log hold, and write a scenario to begin with."""
+
+    files: Iterable[PathLike] = option(help="Files or folders.", argument=True, metavar="FILES", cli=list[Path])
+    _: KW_ONLY
+    output: PathLike | None = option(
+        "--output", "-o", default=None, help="Write a scenario to begin with to this TOML file."
+    )

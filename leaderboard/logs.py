@@ -1,0 +1,172 @@
+"""Calls for logs, and for estimates that were made elsewhere. `simnav.leaderboard.interface` has these calls, too."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from simnav.leaderboard.results.errors import RequestError, mistakes
+
+from .calls import call, whole_number
+from .given import absolute, scenario_of, scenarios_of
+from .log_requests import AlignRequest, ExportRequest, InspectRequest, ScoreRequest, TuneNoiseRequest
+
+if TYPE_CHECKING:
+    from simnav.log.alignment import Alignment
+    from simnav.log.inspection import Stream
+    from simnav.log.noise_figures import Figure
+    from simnav.scenario import Scenario
+
+    from .single_run import RunReport
+
+__all__ = ["align", "export", "inspect_log", "score_files", "tune_noise"]
+
+
+@call(ScoreRequest)
+def score_files(request: ScoreRequest) -> RunReport:
+    """Score estimates that were made elsewhere.
+
+    Returns
+    -------
+    RunReport
+        As of a run; the estimators are the files, by their names.
+
+    Raises
+    ------
+    RequestError
+        If a file cannot be read: one sentence with file, line and column.
+    """
+    from simnav.leaderboard.campaign.seal import read_seal
+
+    from .single_run import score_of_files
+
+    given = [request.files] if isinstance(request.files, (str, os.PathLike)) else list(request.files)
+    if not given:
+        raise RequestError("no file of estimates was named")
+    chosen, number = scenario_of(request.scenario), whole_number("seed", request.seed, 0)
+    seed = read_seal(request.sealed).seed(chosen.id, number)
+    return score_of_files(chosen, [absolute(path) for path in given], seed)
+
+
+@call(ExportRequest)
+def export(request: ExportRequest) -> list[Path]:
+    """Write what an estimator receives.
+
+    Returns
+    -------
+    list of Path
+        The files that were written.
+
+    Raises
+    ------
+    RequestError
+        If the format is unknown or needs the truth, or options contradict each other.
+    """
+    from simnav.leaderboard.campaign.seal import read_seal
+    from simnav.source import record
+
+    from .results.formats import formats, write
+    from .results.hidden import without_truth
+
+    seal, chosen = read_seal(request.sealed), scenarios_of(request.scenarios)
+    if request.blind and request.truth:
+        raise RequestError("'blind' and 'truth' exclude each other")
+    if request.blind and not seal.secret:
+        raise RequestError(
+            "'blind' needs 'sealed': without a key anybody can make the runs again; make one with 'simnav seal KEYFILE'"
+        )
+    if request.form not in formats("recording"):
+        raise RequestError(f"format = {request.form!r} is unknown; there are: {', '.join(formats('recording'))}")
+    output, runs = absolute(request.output), whole_number("runs", request.runs, 1)
+    first, written = whole_number("seed", request.seed, 0), list[Path]()
+    for scenario in chosen:
+        for number in range(first, first + runs):
+            with mistakes(ValueError, OSError):
+                recording = record(scenario, seal.seed(scenario.id, number))
+                told = recording if request.truth else without_truth(recording)
+                several = runs > 1 or len(chosen) > 1 or request.blind
+                ending = "" if request.form == "csv" else f".{request.form}"
+                target = output / f"{scenario.id}-{number}{ending}" if several else output
+                target.parent.mkdir(parents=True, exist_ok=True)
+                written += write("recording", request.form, told, target)
+    return written
+
+
+@call(InspectRequest)
+def inspect_log(request: InspectRequest) -> tuple[list[Stream], list[str]]:
+    """What the files of a log hold.
+
+    Returns
+    -------
+    list of simnav.log.inspection.Stream, list of str
+        The streams, and a sentence for each file that cannot be read.
+
+    Raises
+    ------
+    RequestError
+        If a file does not exist, or the scenario cannot be written.
+    """
+    from simnav.log.draft import draft
+    from simnav.log.inspection import inspect_log
+
+    from .results.files import write_whole
+
+    given = [request.files] if isinstance(request.files, (str, os.PathLike)) else list(request.files)
+    target = None if request.output is None else absolute(request.output)
+    if target is not None and target.suffix != ".toml":
+        raise RequestError(f"output = {request.output}: the file should end in .toml")
+    with mistakes(ValueError, OSError):
+        streams, failed = inspect_log([absolute(path) for path in given])
+        if target is not None and streams:
+            words = "".join(c if c.isascii() and c.isalnum() else " " for c in target.stem.lower()).split()
+            write_whole(target, draft(streams, "-".join(words) or "my-log"))
+    return streams, failed
+
+
+@call(AlignRequest)
+def align(request: AlignRequest) -> list[Alignment]:
+    """Delays, lever arms, offsets and scales of the instruments of a log, by comparison with its reference.
+
+    Returns
+    -------
+    list of simnav.log.alignment.Alignment
+
+    Raises
+    ------
+    RequestError
+        If the scenario has no log, or the log cannot be used.
+    """
+    from simnav.log.alignment import align
+
+    scenario = _recorded(request.scenario)
+    with mistakes(ValueError, OSError):
+        return align(scenario, whole_number("seed", request.seed, 0))
+
+
+@call(TuneNoiseRequest)
+def tune_noise(request: TuneNoiseRequest) -> list[Figure]:
+    """Noise figures for the datasheets of a log.
+
+    Returns
+    -------
+    list of simnav.log.noise_figures.Figure
+
+    Raises
+    ------
+    RequestError
+        If the scenario has no log, or the log cannot be used.
+    """
+    from simnav.log.alignment import align
+    from simnav.log.noise_figures import noise_figures
+
+    scenario, seed = _recorded(request.scenario), whole_number("seed", request.seed, 0)
+    with mistakes(ValueError, OSError):
+        return noise_figures(scenario, align(scenario, seed), seed)
+
+
+def _recorded(given: str | Path | Scenario) -> Scenario:
+    scenario = scenario_of(given)
+    if scenario.log is None:
+        raise RequestError(f"{scenario.id} has no [log]: it is simulated, and there is nothing to compare")
+    return scenario
