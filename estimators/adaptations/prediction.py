@@ -44,11 +44,12 @@ class PredictionTest:
 
     - the recent innovations of the instrument are correlated from one to the next, and too large for R and H P H'; and
     - no witness is against it. A witness is another instrument that would notice the same error of the prediction
-      (`simnav.estimators.models.roles.witnesses`): it is heard, and its own innovations were not correlated at some
-      time since those of the first instrument persist. So a lasting error of the fixes is found if a log agrees with
-      the prediction, and the other way round. (A filter that is pulled by wrong fixes soon disagrees with the log, too,
-      and one that is pulled by a wrong log with the fixes. So what the witness said at first stands until the first
-      instrument agrees again. Fixes that are too coarse to notice a wrong velocity at first are wrong witnesses.)
+      (`simnav.estimators.models.roles.witnesses`): it is heard, and its own innovations are not correlated. So a
+      lasting error of the fixes is found if a log agrees with the prediction, and the other way round. A filter that
+      believes wrong fixes soon disagrees with the log, too. So what the log said at first stands until the fixes agree
+      again. What fixes say of a log does not stand: they see a wrong velocity only when the position has drifted. (Its
+      price: where a wrong log pulls the position, as with Huber's weights, which never vanish, it may be believed
+      later. The row then has about the error of the plain filter.)
 
     So a lasting error is blamed on an instrument only by a witness. Without one it cannot be told from a wrong
     prediction, however large it is: a gyroscope that is disturbed for a second makes errors of any size. The instrument
@@ -87,7 +88,7 @@ class PredictionTest:
             self._group = {}
         self._recent = {name: max(self.RECENT, 3.0 / sheet.rate) for name, sheet in instruments.items()}
         self._witnesses = witnesses(instruments) if together and self._inertial else {}
-        self._condemned: set[str] = set()  # instruments that a witness was against since their innovations persist
+        self._condemned: set[str] = set()  # fixes that a log was against since their innovations persist
         self._courses: dict[str, Course] = {}
         self._failures: dict[str, tuple[int, float]] = {}
         self._first: Array | None = None
@@ -138,7 +139,8 @@ class PredictionTest:
         if not heard:
             self._condemned.discard(name)
         elif name in self._condemned or not all(witness.correlated(self._white) for witness in heard):
-            self._condemned.add(name)
+            if self._group.get(name):
+                self._condemned.add(name)
             return False
         return True
 

@@ -46,6 +46,7 @@ class SageHusaKf(_Adaptive, adaptation=SageHusa):
     3
         A lasting error is blamed on an instrument only by a witness, whatever its size. Before, one that an IMU of 20
         times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
+        Fixes that see no error of a log at first may see it later.
     """
 
     version = 3
@@ -68,6 +69,7 @@ class SageHusaPaper(
     3
         A lasting error is blamed on an instrument only by a witness, whatever its size. Before, one that an IMU of 20
         times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
+        Fixes that see no error of a log at first may see it later.
     """
 
     version = 3
@@ -92,6 +94,7 @@ class Iae(_Adaptive, adaptation=piece(InnovationBased, source="innovation")):
     3
         A lasting error is blamed on an instrument only by a witness, whatever its size. Before, one that an IMU of 20
         times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
+        Fixes that see no error of a log at first may see it later.
     """
 
     version = 3
@@ -111,6 +114,7 @@ class IaeFixed(_Adaptive, adaptation=piece(FixedWindow, source="innovation")):
     3
         A lasting error is blamed on an instrument only by a witness, whatever its size. Before, one that an IMU of 20
         times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
+        Fixes that see no error of a log at first may see it later.
     """
 
     version = 3
@@ -131,6 +135,7 @@ class Rae(_Adaptive, adaptation=piece(FixedWindow, source="residual", newest=Fal
     3
         A lasting error is blamed on an instrument only by a witness, whatever its size. Before, one that an IMU of 20
         times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
+        Fixes that see no error of a log at first may see it later.
     """
 
     version = 3
@@ -156,6 +161,7 @@ class Adkf(_Adaptive, adaptation=AdaptiveFactor):
     3
         A lasting error is blamed on an instrument only by a witness, whatever its size. Before, one that an IMU of 20
         times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
+        Fixes that see no error of a log at first may see it later.
     """
 
     version = 3
@@ -199,6 +205,7 @@ class Igg3(_Adaptive, adaptation=Igg3Weights):
     3
         A lasting error is blamed on an instrument only by a witness, whatever its size. Before, one that an IMU of 20
         times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
+        Fixes that see no error of a log at first may see it later.
     """
 
     version = 3
@@ -218,6 +225,7 @@ class HuberKf(_Adaptive, adaptation=HuberWeights):
     3
         A lasting error is blamed on an instrument only by a witness, whatever its size. Before, one that an IMU of 20
         times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
+        Fixes that see no error of a log at first may see it later.
     """
 
     version = 3
@@ -242,6 +250,7 @@ class GatedEkf(_Adaptive, adaptation=ChiSquareGate):
     3
         A lasting error is blamed on an instrument only by a witness, whatever its size. Before, one that an IMU of 20
         times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
+        Fixes that see no error of a log at first may see it later.
     """
 
     version = 3
@@ -274,6 +283,7 @@ class VbAkf(_Adaptive, adaptation=VariationalBayes):
     3
         A lasting error is blamed on an instrument only by a witness, whatever its size. Before, one that an IMU of 20
         times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
+        Fixes that see no error of a log at first may see it later.
     """
 
     version = 3
@@ -293,6 +303,7 @@ class Mckf(_Adaptive, adaptation=piece(MaximumCorrentropy, smallest=1e-3)):
     3
         A lasting error is blamed on an instrument only by a witness, whatever its size. Before, one that an IMU of 20
         times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
+        Fixes that see no error of a log at first may see it later.
     """
 
     version = 3
@@ -317,6 +328,7 @@ class Imm(Row, solver=ImmEstimator, model=Suitable):
     3
         A lasting error is blamed on an instrument only by a witness, whatever its size. Before, one that an IMU of 20
         times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
+        Fixes that see no error of a log at first may see it later.
     """
 
     version = 3

@@ -32,6 +32,7 @@ class StudentTKf(Row, solver=KalmanEstimator, model=Suitable, adaptation=Student
     3
         A lasting error is blamed on an instrument only by a witness, whatever its size. Before, one that an IMU of 20
         times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
+        Fixes that see no error of a log at first may see it later.
     """
 
     version = 3
@@ -52,6 +53,7 @@ class StudentTRts(StudentTKf, smoother=StudentTSmoother):
     3
         A lasting error is blamed on an instrument only by a witness, whatever its size. Before, one that an IMU of 20
         times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
+        Fixes that see no error of a log at first may see it later.
     """
 
     version = 3
