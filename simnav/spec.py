@@ -43,6 +43,7 @@ __all__ = [
     "spec_types",
     "toml_number",
     "unit_of",
+    "without_later",
 ]
 
 _DEG = math.pi / 180.0
@@ -212,6 +213,14 @@ def toml_number(value: float, unit: str) -> float:
         if candidate * factor == value:
             return candidate
     return near
+
+
+def without_later(table: dict[str, Any], later: Mapping[str, Any]) -> dict[str, Any]:
+    """A dumped specification without the fields that were added later and that have their default.
+
+    Digests of scenarios count what is there: so a new field changes no digest of a scenario that does not use it.
+    """
+    return {k: v for k, v in table.items() if k not in later or v != later[k]}
 
 
 class Spec(BaseModel):

@@ -2,27 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
 from simnav.log.same_time import SameTime
 from simnav.log.units import check_dimension, check_units
-from simnav.spec import Positive, Spec, quantity
+from simnav.spec import Positive, Spec, quantity, without_later
 
-__all__ = ["Column", "FileSpec", "without_later"]
+__all__ = ["Column", "FileSpec"]
 
 #: A column: its header, or its number counted from 1; a minus before it flips the sign; ``"=0.0"`` is a constant.
 Column = int | str
-
-
-def without_later(table: dict[str, Any], later: Mapping[str, Any]) -> dict[str, Any]:
-    """A dumped specification without the keys that were added later and that have their default.
-
-    Digests of scenarios count what is there: so a new key changes no digest of a scenario that does not use it.
-    """
-    return {k: v for k, v in table.items() if k not in later or v != later[k]}
 
 
 class FileSpec(Spec):
@@ -75,7 +66,7 @@ class FileSpec(Spec):
 
     @model_serializer(mode="wrap")
     def _without_empty(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """See `without_later`."""
+        """See `simnav.spec.without_later`."""
         return without_later(handler(self), {"options": {}, "same_time": None})
 
     @model_validator(mode="after")

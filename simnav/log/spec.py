@@ -11,11 +11,11 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
-from simnav.log.files import Column, FileSpec, without_later
+from simnav.log.files import Column, FileSpec
 from simnav.log.reader import READERS
 from simnav.log.row_filter import RowFilter
 from simnav.log.units import check_dimension, check_units
-from simnav.spec import NonNegative, Positive, Spec, Vector, closest, quantity
+from simnav.spec import NonNegative, Positive, Spec, Vector, closest, quantity, without_later
 
 __all__ = [
     "ChannelSpec",

@@ -6,7 +6,8 @@ tide, air pressure). Estimators take it for the ellipsoid.
 
 from __future__ import annotations
 
-from typing import Literal
+from collections.abc import Mapping
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,6 +40,8 @@ class Depth(AidSpec):
     times exp(-k z), with its wave number k and the depth z of the sensor (linear waves in deep water, DNV-RP-C205
     section 3.2; near the bottom the factor is larger).
     """
+
+    later: ClassVar[Mapping[str, Any]] = {**AidSpec.later, "waves": False}
 
     kind: Literal["depth"] = "depth"
     sigma: NonNegative = quantity("m")

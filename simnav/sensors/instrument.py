@@ -48,7 +48,18 @@ from simnav.sensors.figures import (
 from simnav.sensors.processes import GaussMarkov
 from simnav.sensors.rows import checked_rows
 from simnav.sensors.turning import turn_to_body, turn_to_ned
-from simnav.spec import UNITS, NonNegative, Positive, Spec, SpecError, closest, entries, quantity, unit_of
+from simnav.spec import (
+    UNITS,
+    NonNegative,
+    Positive,
+    Spec,
+    SpecError,
+    closest,
+    entries,
+    quantity,
+    unit_of,
+    without_later,
+)  # fmt: skip
 from simnav.streams import stream
 from simnav.types import Array, Datasheet, TapStates
 from simnav.world.surroundings import Surroundings
@@ -90,14 +101,10 @@ class AidSpec(Spec):
     definition: ClassVar[Kind]
     example: ClassVar[Mapping[str, Any]]
     errors: ClassVar[tuple[str, ...]] = (
-        "sigma",
-        "bias",
-        "bias_instability",
-        "scale",
-        "misalignment",
-        "lever_arm_sigma",
-    )
+        "sigma", "bias", "bias_instability", "scale", "misalignment", "lever_arm_sigma",
+    )  # fmt: skip
     unstated: ClassVar[tuple[str, ...]] = ()
+    later: ClassVar[Mapping[str, Any]] = {"processes": (), "lever_arm_sigma": ZERO}  # see `simnav.spec.without_later`
 
     kind: str
     rate: Positive = quantity("hz", 1.0)
@@ -136,14 +143,8 @@ class AidSpec(Spec):
         return self.model_copy(update={**changes, "processes": ()})
 
     @model_serializer(mode="wrap")
-    def _without_empty(self, serialize: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """The digest of a scenario that names no processes and no sigma of a lever arm is what it was before these."""
-        table: dict[str, Any] = serialize(self)
-        if not self.processes:
-            table.pop("processes", None)
-        if not any(np.atleast_1d(self.figure("lever_arm_sigma"))):
-            table.pop("lever_arm_sigma", None)
-        return table
+    def _without_later(self, serialize: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        return without_later(serialize(self), self.later)
 
     @model_validator(mode="after")
     def _fitting_processes(self) -> Self:

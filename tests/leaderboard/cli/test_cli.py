@@ -287,7 +287,9 @@ def test_simulate_writes_the_recording_and_its_csv(here):
     assert (recording.scenario, recording.seed) == ("pond-v1", 5)
     stream = recording.data.aids["gnss_position"]
     assert found["measurements"] == {"gnss_position": len(stream)}
-    assert {Path(p).name for p in found["csv"]} == {"truth.csv", "gnss_position.csv"}
+    assert {Path(p).name for p in found["csv"]} == {
+        "truth.csv", "gnss_position.csv", "README.md", "start.json",
+    }  # fmt: skip
     fixes = np.genfromtxt(here / "tables" / "gnss_position.csv", delimiter=",", names=True)
     np.testing.assert_allclose(np.radians(fixes["latitude_deg"]), stream.value[:, 0], rtol=1e-15)
     np.testing.assert_array_equal(fixes["height_m"], stream.value[:, 2])
