@@ -86,7 +86,7 @@ def test_the_python_example_runs(capsys):
 
 def test_no_table_is_overlooked():
     assert len(KEYS) == 16
-    assert len(KINDS) == 4
+    assert len(KINDS) == 5
 
 
 def _one_spec_tables() -> Iterator[tuple[type[Spec], list[list[str]], int]]:
