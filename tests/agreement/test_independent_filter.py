@@ -12,7 +12,7 @@ import warnings
 import numpy as np
 import pandas as pd
 import pytest
-from pyins import filters, inertial_sensor, measurements, strapdown
+from pyins import _numba_integrate, filters, inertial_sensor, measurements, strapdown
 
 import simnav
 from simnav.estimator import make
@@ -69,6 +69,15 @@ def theirs(recording: Recording, times: Array) -> tuple[Array, Array]:
     sigmas = found.trajectory_sd.iloc[found_at[1]][["north", "east", "down"]].to_numpy()
     assert np.abs(found.trajectory.index[found_at[0]] - times).max() < 1e-6
     return np.column_stack([np.radians(positions[:, :2]), positions[:, 2]]), sigmas
+
+
+@pytest.fixture(autouse=True)
+def as_python(monkeypatch: pytest.MonkeyPatch):
+    """Their integration without Numba, which takes twenty seconds to compile it, and a second to run it once."""
+    for name in ("gravity", "mat_from_rotvec", "integrate"):
+        function = getattr(_numba_integrate, name)
+        monkeypatch.setattr(_numba_integrate, name, function.py_func)
+    monkeypatch.setattr(strapdown, "integrate", _numba_integrate.integrate)
 
 
 @pytest.mark.parametrize("seed", [1000, 1001])

@@ -493,11 +493,16 @@ def made(name, **options):
     return env
 
 
+def hash_of(name):
+    """A number that stays the same."""
+    return sum(name.encode())
+
+
 #: Whose pictures are looked at, too, which takes longer than all the rest: a vessel, a ship, a family, a log.
 DRAWN = ("open-sea-v1", "coastal-voyage-v1", "random-voyages-v1", "ship-nbp1406-v1")
 
 
-@pytest.mark.parametrize("header", headers(), ids=lambda h: h.id)
+@pytest.mark.parametrize("header", [h for h in headers() if h.id in DRAWN or hash_of(h.id) % 2], ids=lambda h: h.id)
 def test_check_env_passes_without_a_warning(header, monkeypatch):
     monkeypatch.setenv("MPLBACKEND", "Agg")
     made(header.id)
