@@ -18,6 +18,7 @@ import numpy as np
 
 from simnav import kinds
 from simnav.blocks import LEVER_ARM, NAVIGATION
+from simnav.geometry.rotation import skew
 from simnav.kinds import NavigationPoint, Observation
 from simnav.types import KINDS, Array, Datasheet, Instruments
 
@@ -64,27 +65,20 @@ def _observe(point: NavigationPoint, sheet: Datasheet) -> tuple[Array, Mapping[s
         return None
     navigation, by_arm = _DERIVATIVES[sheet.equation](point, arm)
     blocks = {NAVIGATION: navigation, LEVER_ARM: by_arm}
-    known = sum(block.size for block in sheet.blocks if block.name in ("scale", "misalignment"))
-    if known:
+    if not errors.keys().isdisjoint(("scale", "misalignment")):
         bare = equation.read(point, sheet, {LEVER_ARM: errors[LEVER_ARM]})
         assert bare is not None, "it has a reading with its other errors"
         if "scale" in errors:
             blocks["scale"] = bare[:, None]
         if "misalignment" in errors:
-            blocks["misalignment"] = _across(bare)
+            blocks["misalignment"] = skew(bare)
     return reading, blocks
-
-
-def _across(vector: Array) -> Array:
-    """``[vector x]``."""
-    x, y, z = vector.tolist()
-    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
 
 
 def _position(point: NavigationPoint, arm: Array) -> tuple[Array, Array]:
     jacobian = np.zeros((3, 9))
     jacobian[:, :3] = np.eye(3)
-    jacobian[:, 6:] = -_across(point.dcm @ arm)
+    jacobian[:, 6:] = -skew(point.dcm @ arm)
     return jacobian, point.dcm
 
 
@@ -99,17 +93,17 @@ def _depth(point: NavigationPoint, arm: Array) -> tuple[Array, Array]:
 
 
 def _velocity(point: NavigationPoint, arm: Array) -> tuple[Array, Array]:
-    jacobian, turning = np.zeros((3, 9)), _across(point.angular_rate)
+    jacobian, turning = np.zeros((3, 9)), skew(point.angular_rate)
     jacobian[:, 3:6] = np.eye(3)
-    jacobian[:, 6:] = -_across(point.dcm @ (turning @ arm))
+    jacobian[:, 6:] = -skew(point.dcm @ (turning @ arm))
     return jacobian, point.dcm @ turning
 
 
 def _body_velocity(point: NavigationPoint, arm: Array) -> tuple[Array, Array]:
     jacobian, to_body = np.zeros((3, 9)), point.dcm.T
     jacobian[:, 3:6] = to_body
-    jacobian[:, 6:] = to_body @ _across(point.velocity)
-    return jacobian, _across(point.angular_rate)
+    jacobian[:, 6:] = to_body @ skew(point.velocity)
+    return jacobian, skew(point.angular_rate)
 
 
 #: The Jacobians of a reading without scale factor and misalignment, which change them in second order only.

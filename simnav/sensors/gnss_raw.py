@@ -25,7 +25,7 @@ from datetime import datetime
 from functools import lru_cache
 from math import radians
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,13 +45,13 @@ from simnav.satellites.ephemeris import Ephemerides
 from simnav.satellites.multipath import multipath_error, sea_reflection, strength_change
 from simnav.satellites.receiver_clock import Grade, clock_block
 from simnav.satellites.rinex_navigation import read_navigation
-from simnav.satellites.signal_errors import amplification, density_ratio, noise_factor, range_error
+from simnav.satellites.signal_errors import amplification, density_ratio, range_error
 from simnav.satellites.sky import Sight, Sky
 from simnav.satellites.time_scales import gps_time
 from simnav.sensors.channels import ChannelInstrument
-from simnav.sensors.gnss_observation import DENSITY_RATIO, SIDE, observe, observe_all, reading_sigma
+from simnav.sensors.gnss_observation import SIDE, observe, observe_all, reading_sigma
 from simnav.sensors.instrument import ZERO, AidSpec, Instrument, register_instrument, turn_to_body, turn_to_ned
-from simnav.spec import NonNegative, Positive, SpecError, Vector, closest, quantity
+from simnav.spec import NonNegative, Positive, SpecError, Vector, closest, quantity, without_later
 from simnav.types import NO_SIDE, Array, TapStates
 from simnav.world.obstacles import Paths
 
@@ -181,6 +181,8 @@ class GnssRaw(AidSpec):
         "clock_bias",
     )  # fmt: skip
 
+    later: ClassVar[Mapping[str, Any]] = {**AidSpec.later, "sea_reflection": 0.0}
+
     kind: Literal["gnss_raw"] = "gnss_raw"
     navigation: str = ""
     epoch: str = SHIPPED_EPOCH
@@ -233,7 +235,7 @@ class GnssRaw(AidSpec):
     @model_serializer(mode="wrap")
     def _with_content(self, serialize: SerializerFunctionWrapHandler) -> dict[str, Any]:
         """The digest of a scenario changes with the content of its navigation file."""
-        table: dict[str, Any] = serialize(self)
+        table = without_later(serialize(self), self.later)
         if self.navigation:
             ephemerides = self.ephemerides()
             content = repr(ephemerides.satellite).encode() + ephemerides.numbers.tobytes()
@@ -293,7 +295,7 @@ class RawReceiver(ChannelInstrument):
 
     def __init__(self, spec: GnssRaw, name: str, seed: int):
         super().__init__(spec, name, seed)
-        self.spec = spec
+        self.spec, self._sheet = spec, spec.datasheet(name)
         self.sky = Sky(spec.ephemerides(), self.channels, _epoch(spec.epoch))
         self._last: tuple[TapStates, Sight, Paths | None] | None = None
 
@@ -386,9 +388,7 @@ class RawReceiver(ChannelInstrument):
 
     def noise_sigma(self, observed: Array, side: Array = NO_SIDE) -> Array:
         """See `ChannelInstrument.noise_sigma`: `reading_sigma` of all readings at once."""
-        sigma = self.sigma * noise_factor(side[..., DENSITY_RATIO])[..., None]
-        sigma[..., 0] *= amplification(self.spec.frequencies)
-        return np.asarray(sigma)
+        return reading_sigma(side, self._sheet)
 
     def available(self, tap: TapStates) -> NDArray[np.bool_]:
         """See `ChannelInstrument.available`: where the satellite is above the mask, and its signal strong enough."""
