@@ -28,7 +28,7 @@ from functools import cache
 from typing import Any, ClassVar
 
 from simnav.estimator import Estimator, Needs
-from simnav.estimator.late_arrivals import LateArrivals, Manner, TrueTimes, is_late, parts_of, true_times
+from simnav.estimator.late_arrivals import LateArrivals, Manner, TrueTimes, is_untimely, parts_of, true_times
 from simnav.estimator.parameters import former_names, under_present_names
 from simnav.types import Array, Estimate, InitialState, Instruments, Measurements, NavigationStates
 
@@ -242,7 +242,7 @@ class Row(Estimator):
     def update(self, measurements: Measurements) -> Estimate:
         """Take one step's measurements, each at its own time, also those that arrive late."""
         if self._late is None:
-            if not is_late(measurements):
+            if not is_untimely(measurements):
                 return self.solver.update(measurements)
             self._late = self._late_arrivals()
         self.solver, estimate = self._late.update(self.solver, measurements)

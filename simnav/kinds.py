@@ -106,6 +106,8 @@ class NavigationPoint(NamedTuple):
         The channel whose reading is predicted; empty for an instrument without channels.
     side : (s,) array
         Side information of the reading, components as in `Kind.side`.
+    acceleration : (3,) array or None
+        Relative to the Earth, north-east-down [m/s^2]. None: it is not known, or no instrument needs it.
     """
 
     time: float
@@ -116,6 +118,7 @@ class NavigationPoint(NamedTuple):
     blocks: Mapping[str, Array] = MappingProxyType({})
     channel: str = ""
     side: Array = NO_SIDE
+    acceleration: Array | None = None
 
 
 class NavigationPoints(NamedTuple):

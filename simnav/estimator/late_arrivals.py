@@ -9,10 +9,11 @@ for every solver: the estimate is the one that the same readings in the right or
 node at the time of the reading, a smoother its stop. Earlier estimates stay as they were given, so nothing is known
 before it arrives.
 
-Stamps are corrected before by what the datasheet says of them: a stamp that is set at arrival is later than the time of
-validity by the mean latency. Memory is bounded: copies and packets are kept for the longest latency of the datasheets,
-or `REACH` where these say nothing. What arrives later still is left out. Each copy takes half a millisecond for a
-filter, once a step. Nothing is copied where no datasheet has a clock and no reading has come late.
+A stamp that is ahead of its step waits for the step in which its time comes. Stamps are corrected before by what the
+datasheet says of them: a stamp that is set at arrival is later than the time of validity by the mean latency. Memory is
+bounded: copies and packets are kept for the longest latency of the datasheets, or `REACH` where these say nothing. What
+arrives later still is left out. Each copy takes half a millisecond for a filter, once a step. Nothing is copied where
+no datasheet has a clock and no reading has come late.
 """
 
 from __future__ import annotations
@@ -30,7 +31,17 @@ from simnav.types import Estimate, Instruments, Measurement, Measurements
 if TYPE_CHECKING:
     from simnav.recording import Recording
 
-__all__ = ["LATE", "MANNERS", "LateArrivals", "Manner", "TrueTimes", "is_late", "manner_of", "parts_of", "true_times"]
+__all__ = [
+    "LATE",
+    "MANNERS",
+    "LateArrivals",
+    "Manner",
+    "TrueTimes",
+    "is_untimely",
+    "manner_of",
+    "parts_of",
+    "true_times",
+]
 
 #: Name of the parameter.
 LATE = "late"
@@ -65,10 +76,10 @@ def manner_of(given: Any) -> Manner:
     return manner
 
 
-def is_late(measurements: Measurements) -> bool:
-    """Whether a packet has a reading from before its step."""
-    limit = measurements.start - _LATE
-    return any(m.time < limit for m in measurements.aids)
+def is_untimely(measurements: Measurements) -> bool:
+    """Whether a packet has a reading from before or after its step."""
+    first, last = measurements.start - _LATE, measurements.time + _LATE
+    return any(not first <= m.time <= last for m in measurements.aids)
 
 
 def true_times(recording: Recording) -> TrueTimes:
@@ -144,6 +155,7 @@ class LateArrivals:
         reaches = [clock.longest for clock in self._clocks.values()]
         self.reach = (max(reaches) if reaches and len(reaches) == len(self._clocks) else REACH) + instruments.step
         self._history: deque[_Step] = deque()
+        self._waiting: list[Measurement] = []
         self._newest: dict[str, float] = defaultdict(lambda: -math.inf)
         self._stamps: dict[tuple[str, float], float] = {}
         self.used = self.missed = 0
@@ -190,12 +202,12 @@ class LateArrivals:
         """The packet of the present step, and the readings that belong to earlier ones."""
         start, end = measurements.start, measurements.time
         present, late = [], []
-        for m in measurements.aids:
-            time = min(self._validity(m), end)
-            if time != m.time:
-                self._stamps[m.source, time] = m.time
-                m = m._replace(time=time)
-            if time > start + _TOLERANCE or (not self._history and time >= start - _LATE):
+        ahead, self._waiting = self._waiting, []
+        for m in [*ahead, *(self._timed(m, end) for m in measurements.aids)]:
+            time = m.time
+            if time > end + _LATE:
+                self._waiting.append(m._replace(value=m.value.copy(), side=m.side.copy()))
+            elif time > start + _TOLERANCE or (not self._history and time >= start - _LATE):
                 present.append(m)
             elif self.manner == "arrival":
                 while any(other.source == m.source and other.time == start for other in present):
@@ -211,6 +223,16 @@ class LateArrivals:
                 self.missed += 1
         present.sort(key=self._place)
         return Measurements(start, end, measurements.imu, present), late
+
+    def _timed(self, m: Measurement, end: float) -> Measurement:
+        """A reading at its time of validity; one from a far future is of the end of the step."""
+        time = self._validity(m)
+        if time > end + self.reach:
+            time = end
+        if time == m.time:
+            return m
+        self._stamps[m.source, time] = m.time
+        return m._replace(time=time)
 
     def _validity(self, m: Measurement) -> float:
         """When a reading was valid, as far as that is known."""
