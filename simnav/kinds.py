@@ -25,6 +25,7 @@ from simnav.declared_process import DeclaredProcess
 from simnav.geometry.earth import displace_scalar, relative_position
 from simnav.geometry.rotation import wrap_angle, wrap_scalar
 from simnav.plugins import PluginError, Registry
+from simnav.timing import TimingSheet
 
 __all__ = [
     "BODY_VELOCITY",
@@ -499,6 +500,8 @@ class Datasheet:
         at a time. Empty: it has no channels, and gives one reading at a time.
     processes : tuple of DeclaredProcess
         Further coloured processes of the error. White ones are in ``sigma``.
+    timing : TimingSheet or None
+        What is known of its time stamps, and of how late readings arrive. None: nothing, or that both are perfect.
     """
 
     name: str
@@ -516,6 +519,7 @@ class Datasheet:
     blocks: tuple[StateBlock, ...] = ()
     channels: tuple[str, ...] = ()
     processes: tuple[DeclaredProcess, ...] = ()
+    timing: TimingSheet | None = None
 
     def __post_init__(self) -> None:
         if self.kind not in KINDS:
