@@ -68,7 +68,10 @@ def manner_of(given: Any) -> Manner:
 def is_late(measurements: Measurements) -> bool:
     """Whether a packet has a reading from before its step."""
     limit = measurements.start - _LATE
-    return any(m.time < limit for m in measurements.aids)
+    for m in measurements.aids:  # noqa: SIM110 (each step of each run comes here, and any() takes three times as long)
+        if m.time < limit:
+            return True
+    return False
 
 
 def true_times(recording: Recording) -> TrueTimes:
