@@ -183,7 +183,8 @@ def test_a_compass_is_believed_only_while_another_instrument_finds_the_predictio
         wrong = 10 <= k < 20
         others.append(test.fails(given((9.0, -14.0, -17.0) if wrong else np.zeros(3), k + 0.5, "dvl")))
     assert found == others[:-1]
-    assert all(found[12:21]) and not any(found[:12])
+    assert all(found[12:21])
+    assert not any(found[:12])
     assert not found[-1]
 
 
