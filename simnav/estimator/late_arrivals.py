@@ -79,7 +79,10 @@ def manner_of(given: Any) -> Manner:
 def is_untimely(measurements: Measurements) -> bool:
     """Whether a packet has a reading from before or after its step."""
     first, last = measurements.start - _LATE, measurements.time + _LATE
-    return any(not first <= m.time <= last for m in measurements.aids)
+    for m in measurements.aids:  # noqa: SIM110 (each step of each run comes here, and any() takes three times as long)
+        if not first <= m.time <= last:
+            return True
+    return False
 
 
 def true_times(recording: Recording) -> TrueTimes:
