@@ -26,9 +26,9 @@ if TYPE_CHECKING:
 
 __all__ = ["JUDGED_FROM", "MOST", "SEARCHED_FROM", "search"]
 
-#: Seeds of the search and of the judgement begin here. The papers' tables are of seeds from 0 on. Seeds from 2000 on
-#: were looked at while the dials of the papers' claims were chosen, so nothing is judged on them.
-SEARCHED_FROM, JUDGED_FROM = 1000, 3000
+#: Seeds of the search and of the judgement begin here. The papers' tables are of seeds from 0 on. Seeds from 2000 to
+#: 5000 were looked at while claims and dials of the papers were chosen, so nothing is judged on them.
+SEARCHED_FROM, JUDGED_FROM = 1000, 10000
 #: Values of a dial that are judged at most, one after the other, and the distance of their seeds.
 TRIES, APART = 3, 1000
 #: Where a judgement is undecided the number of its seeds is doubled, up to so many times the first number.
