@@ -16,11 +16,13 @@ fields whose default is infinite.
 from __future__ import annotations
 
 import difflib
+import functools
 import math
 import re
 import types
 import typing
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Annotated, Any, Self
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
@@ -254,20 +256,19 @@ class Spec(BaseModel):
         """
         if not isinstance(table, Mapping):
             raise SpecError(f"{source}: {path or 'the file'} = {table!r} should be a table")
-        keys, others = cls.toml_keys(), cls._keys_in_other_units()
+        keys = _keys_of(cls)
         values: dict[str, Any] = {}
         for key, raw in table.items():
             where = f"{path}.{key}" if path else key
-            if key not in keys and key not in others:
-                raise SpecError(f"{source}: unknown key '{where}' (value {raw!r}){_hint(key, keys)}")
-            name, info = keys[key] if key in keys else others[key][:2]
-            unit = unit_of(info) if key in keys else others[key][2]
-            if name in values:
+            if key not in keys:
+                raise SpecError(f"{source}: unknown key '{where}' (value {raw!r}){_hint(key, cls.toml_keys())}")
+            found = keys[key]
+            if found.name in values:
                 raise SpecError(f"{source}: '{where}' says the same as another key, in another unit; give one of them")
-            if unit is not None:
-                values[name] = _convert(raw, UNITS[unit], _may_be_infinite(info), source, where)
+            if found.unit is not None:
+                values[found.name] = _convert(raw, UNITS[found.unit], found.infinite, source, where)
             else:
-                values[name] = _descend(raw, info, source, where)
+                values[found.name] = _descend(raw, found, source, where)
         try:
             return cls(**values)
         except ValidationError as error:
@@ -417,10 +418,41 @@ def _containers(annotation: Any) -> set[Any]:
     return {origin or annotation}
 
 
-def _descend(raw: Any, info: FieldInfo, source: str, where: str) -> Any:
-    specs, top, opened = spec_types(info.annotation), _containers(info.annotation), _one_of(info.annotation)
+@dataclass(frozen=True, eq=False, slots=True)
+class _Key:
+    """What reading a key of a class needs. It is found once, since runs with drawn values read many tables."""
+
+    name: str
+    unit: str | None
+    infinite: bool
+    annotation: Any
+    containers: set[Any]
+    leaves: set[Any]
+    specs: list[type[Spec]]  # without those of an open list, which may grow
+    opened: OneOf | None
+
+    @classmethod
+    def of(cls, name: str, info: FieldInfo, unit: str | None) -> _Key:
+        annotation = info.annotation
+        opened = _one_of(annotation)
+        containers, leaves = _containers(annotation), _leaves(annotation)
+        specs = [] if opened else spec_types(annotation)
+        return cls(name, unit, _may_be_infinite(info), annotation, containers, leaves, specs, opened)
+
+
+@functools.cache
+def _keys_of(cls: type[Spec]) -> dict[str, _Key]:
+    """All keys of a class, also those in further units."""
+    others = cls._keys_in_other_units()
+    keys = {key: _Key.of(name, info, unit) for key, (name, info, unit) in others.items()}
+    return keys | {key: _Key.of(name, info, unit_of(info)) for key, (name, info) in cls.toml_keys().items()}
+
+
+def _descend(raw: Any, key: _Key, source: str, where: str) -> Any:
+    top, opened = key.containers, key.opened
+    specs = key.specs if opened is None else spec_types(key.annotation)
     if not specs and opened is None:
-        _check_plain(raw, _leaves(info.annotation), _may_be_infinite(info), source, where)
+        _check_plain(raw, key.leaves, key.infinite, source, where)
         return raw
     if top & {list, tuple}:
         if not isinstance(raw, list):
@@ -464,6 +496,7 @@ def _check_plain(raw: Any, leaves: set[Any], infinite: bool, source: str, where:
         raise SpecError(f"{source}: {where} = {raw!r} should be a number")
 
 
+@functools.cache
 def _kind(spec: type[Spec]) -> str | None:
     """The ``kind`` of a class, which is a ``Literal`` with a default."""
     info = spec.model_fields.get("kind")

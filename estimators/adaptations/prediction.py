@@ -56,6 +56,14 @@ class PredictionTest:
     is then believed, as in the plain filter. Its error is bounded, and the error of an IMU alone is not. Without an IMU
     this test is not made.
 
+    *A log that is left alone.* Fixes that get no weight for some seconds cost little, because the next one restores the
+    position. What a log says of a motion is said once: if it gets no weight, the position has lost it. So a log that no
+    witness is heard beside is believed as soon as two or more successive innovations fail their tests in about the
+    same direction, which a larger noise does in one case of ten (`Course.directed`). A single gross error is no run.
+
+    *Compasses.* A lasting disagreement of a compass and the gyroscopes alone is that of the compass. But while another
+    instrument finds the prediction wrong, so may be the heading, which the same IMU predicts: the compass is believed.
+
     Parameters
     ----------
     instruments : Instruments
@@ -75,6 +83,7 @@ class PredictionTest:
     RECENT = 5.0  # s; what another instrument did before, or before its last three periods, does not count
     PERSISTENT = 0.99  # probability that the innovations of a white noise are not found correlated
     WHITE = 0.95  # the same for a witness, which must be beyond doubt
+    ALONE = 0.9  # probability that failures of a lone log by white noise are not found to have a common direction
     LARGEST, TOTAL = 100.0, 1e8
 
     def __init__(self, instruments: Instruments, together: int = 3, probability: float = 0.999):
@@ -82,6 +91,7 @@ class PredictionTest:
         self._limits = chi_square_limits(probability)
         self._large = normal_quantile(probability)
         self._persistent, self._white = normal_quantile(self.PERSISTENT), normal_quantile(self.WHITE)
+        self._alone = normal_quantile(self.ALONE)
         self._group = fixes_and_logs(instruments) if together else {}
         self._inertial = instruments.imu is not None
         if not self._inertial and len(set(self._group.values())) < 2:
@@ -90,6 +100,7 @@ class PredictionTest:
         self._witnesses = witnesses(instruments) if together and self._inertial else {}
         self._condemned: set[str] = set()  # fixes that a log was against since their innovations persist
         self._courses: dict[str, Course] = {}
+        self._wrong: dict[str, float] = {}  # when an instrument last found the prediction wrong, if it still does
         self._failures: dict[str, tuple[int, float]] = {}
         self._first: Array | None = None
         self._blamed = 0
@@ -99,12 +110,17 @@ class PredictionTest:
         self.disturbed = False
         name, time = innovation.measurement.instrument, innovation.measurement.time
         if name not in self._group and name not in self._witnesses:
-            return False
+            return any(time - t <= self._recent[other] for other, t in self._wrong.items())
         components = standardised(innovation.residual, innovation.predicted, innovation.noise)
         count = len(innovation.residual)
         if name in self._group:
             self.disturbed = self._fails_jointly(name, time, components, count)
-        return (name in self._witnesses and self._persists(name, time, components, count)) or self.disturbed
+        wrong = (name in self._witnesses and self._persists(name, time, components, count)) or self.disturbed
+        if wrong and self._inertial:
+            self._wrong[name] = time
+        else:
+            self._wrong.pop(name, None)
+        return wrong
 
     def _fails_jointly(self, name: str, time: float, components: tuple[float, float, float], count: int) -> bool:
         """Whether this instrument and one of the other group have failed often enough in a row, this time included.
@@ -127,15 +143,13 @@ class PredictionTest:
         course = self._courses.get(name)
         if course is None:
             course = self._courses[name] = Course()
-        course.add(components, count, time)
+        course.add(components, count, time, sum(u * u for u in components) > self._limits[count])
+        if self._group.get(name) is False and course.directed(self._alone) and not self._heard(name, time):
+            return True
         if not (course.correlated(self._persistent) and course.large(self._large)):
             self._condemned.discard(name)
             return False
-        heard = [
-            self._courses[other]
-            for other in self._witnesses[name]
-            if other in self._courses and time - self._courses[other].time <= self._recent[other]
-        ]
+        heard = self._heard(name, time)
         if not heard:
             self._condemned.discard(name)
         elif name in self._condemned or not all(witness.correlated(self._white) for witness in heard):
@@ -143,6 +157,14 @@ class PredictionTest:
                 self._condemned.add(name)
             return False
         return True
+
+    def _heard(self, name: str, time: float) -> list[Course]:
+        """The courses of those witnesses of an instrument that are heard."""
+        return [
+            self._courses[other]
+            for other in self._witnesses[name]
+            if other in self._courses and time - self._courses[other].time <= self._recent[other]
+        ]
 
     def inflation(self, innovation: Innovation) -> float:
         """Factor of P after a failure of the prediction: once for every ``together`` failures.

@@ -46,7 +46,8 @@ class SageHusaKf(_Adaptive, adaptation=SageHusa):
     3
         A lasting error is blamed on an instrument only by a witness, whatever its size. Before, one that an IMU of 20
         times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
-        Fixes that see no error of a log at first may see it later.
+        Fixes that see no error of a log at first may see it later. A log without fixes is believed from its second
+        failure in one direction on, and a compass while another instrument finds the prediction wrong.
     """
 
     version = 3
@@ -69,7 +70,8 @@ class SageHusaPaper(
     3
         A lasting error is blamed on an instrument only by a witness, whatever its size. Before, one that an IMU of 20
         times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
-        Fixes that see no error of a log at first may see it later.
+        Fixes that see no error of a log at first may see it later. A log without fixes is believed from its second
+        failure in one direction on, and a compass while another instrument finds the prediction wrong.
     """
 
     version = 3
@@ -94,7 +96,8 @@ class Iae(_Adaptive, adaptation=piece(InnovationBased, source="innovation")):
     3
         A lasting error is blamed on an instrument only by a witness, whatever its size. Before, one that an IMU of 20
         times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
-        Fixes that see no error of a log at first may see it later.
+        Fixes that see no error of a log at first may see it later. A log without fixes is believed from its second
+        failure in one direction on, and a compass while another instrument finds the prediction wrong.
     """
 
     version = 3
@@ -114,7 +117,8 @@ class IaeFixed(_Adaptive, adaptation=piece(FixedWindow, source="innovation")):
     3
         A lasting error is blamed on an instrument only by a witness, whatever its size. Before, one that an IMU of 20
         times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
-        Fixes that see no error of a log at first may see it later.
+        Fixes that see no error of a log at first may see it later. A log without fixes is believed from its second
+        failure in one direction on, and a compass while another instrument finds the prediction wrong.
     """
 
     version = 3
@@ -135,7 +139,8 @@ class Rae(_Adaptive, adaptation=piece(FixedWindow, source="residual", newest=Fal
     3
         A lasting error is blamed on an instrument only by a witness, whatever its size. Before, one that an IMU of 20
         times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
-        Fixes that see no error of a log at first may see it later.
+        Fixes that see no error of a log at first may see it later. A log without fixes is believed from its second
+        failure in one direction on, and a compass while another instrument finds the prediction wrong.
     """
 
     version = 3
@@ -161,7 +166,8 @@ class Adkf(_Adaptive, adaptation=AdaptiveFactor):
     3
         A lasting error is blamed on an instrument only by a witness, whatever its size. Before, one that an IMU of 20
         times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
-        Fixes that see no error of a log at first may see it later.
+        Fixes that see no error of a log at first may see it later. A log without fixes is believed from its second
+        failure in one direction on, and a compass while another instrument finds the prediction wrong.
     """
 
     version = 3
@@ -205,7 +211,8 @@ class Igg3(_Adaptive, adaptation=Igg3Weights):
     3
         A lasting error is blamed on an instrument only by a witness, whatever its size. Before, one that an IMU of 20
         times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
-        Fixes that see no error of a log at first may see it later.
+        Fixes that see no error of a log at first may see it later. A log without fixes is believed from its second
+        failure in one direction on, and a compass while another instrument finds the prediction wrong.
     """
 
     version = 3
@@ -225,7 +232,8 @@ class HuberKf(_Adaptive, adaptation=HuberWeights):
     3
         A lasting error is blamed on an instrument only by a witness, whatever its size. Before, one that an IMU of 20
         times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
-        Fixes that see no error of a log at first may see it later.
+        Fixes that see no error of a log at first may see it later. A log without fixes is believed from its second
+        failure in one direction on, and a compass while another instrument finds the prediction wrong.
     """
 
     version = 3
@@ -250,7 +258,8 @@ class GatedEkf(_Adaptive, adaptation=ChiSquareGate):
     3
         A lasting error is blamed on an instrument only by a witness, whatever its size. Before, one that an IMU of 20
         times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
-        Fixes that see no error of a log at first may see it later.
+        Fixes that see no error of a log at first may see it later. A log without fixes is believed from its second
+        failure in one direction on, and a compass while another instrument finds the prediction wrong.
     """
 
     version = 3
@@ -283,7 +292,8 @@ class VbAkf(_Adaptive, adaptation=VariationalBayes):
     3
         A lasting error is blamed on an instrument only by a witness, whatever its size. Before, one that an IMU of 20
         times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
-        Fixes that see no error of a log at first may see it later.
+        Fixes that see no error of a log at first may see it later. A log without fixes is believed from its second
+        failure in one direction on, and a compass while another instrument finds the prediction wrong.
     """
 
     version = 3
@@ -303,7 +313,8 @@ class Mckf(_Adaptive, adaptation=piece(MaximumCorrentropy, smallest=1e-3)):
     3
         A lasting error is blamed on an instrument only by a witness, whatever its size. Before, one that an IMU of 20
         times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
-        Fixes that see no error of a log at first may see it later.
+        Fixes that see no error of a log at first may see it later. A log without fixes is believed from its second
+        failure in one direction on, and a compass while another instrument finds the prediction wrong.
     """
 
     version = 3
@@ -328,7 +339,8 @@ class Imm(Row, solver=ImmEstimator, model=Suitable):
     3
         A lasting error is blamed on an instrument only by a witness, whatever its size. Before, one that an IMU of 20
         times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
-        Fixes that see no error of a log at first may see it later.
+        Fixes that see no error of a log at first may see it later. A log without fixes is believed from its second
+        failure in one direction on, and a compass while another instrument finds the prediction wrong.
     """
 
     version = 3

@@ -32,7 +32,8 @@ class StudentTKf(Row, solver=KalmanEstimator, model=Suitable, adaptation=Student
     3
         A lasting error is blamed on an instrument only by a witness, whatever its size. Before, one that an IMU of 20
         times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
-        Fixes that see no error of a log at first may see it later.
+        Fixes that see no error of a log at first may see it later. A log without fixes is believed from its second
+        failure in one direction on, and a compass while another instrument finds the prediction wrong.
     """
 
     version = 3
@@ -53,7 +54,8 @@ class StudentTRts(StudentTKf, smoother=StudentTSmoother):
     3
         A lasting error is blamed on an instrument only by a witness, whatever its size. Before, one that an IMU of 20
         times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
-        Fixes that see no error of a log at first may see it later.
+        Fixes that see no error of a log at first may see it later. A log without fixes is believed from its second
+        failure in one direction on, and a compass while another instrument finds the prediction wrong.
     """
 
     version = 3

@@ -37,7 +37,8 @@ class SolutionSeparationEkf(Row, solver=SolutionSeparation, model=Suitable):
     2
         The IMU is a suspect also beside a single fix or log. The last fix or log that delivers is not excluded if a
         disturbed IMU would explain why it disagrees, and an excluded one is used again where the position without it
-        becomes more uncertain than the separation was.
+        becomes more uncertain than the separation was. What a compass says does not condemn it, nor does a filter that
+        has just begun.
     """
 
     version = 2

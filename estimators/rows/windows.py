@@ -66,7 +66,8 @@ class IaeFgo(Row, solver=_WINDOW, model=Suitable, adaptation=piece(InnovationBas
     3
         A lasting error is blamed on an instrument only by a witness, whatever its size. Before, one that an IMU of 20
         times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
-        Fixes that see no error of a log at first may see it later.
+        Fixes that see no error of a log at first may see it later. A log without fixes is believed from its second
+        failure in one direction on, and a compass while another instrument finds the prediction wrong.
     """
 
     version = 3
@@ -87,7 +88,8 @@ class IaeFgoFixed(Row, solver=_WINDOW, model=Suitable, adaptation=piece(FixedWin
     3
         A lasting error is blamed on an instrument only by a witness, whatever its size. Before, one that an IMU of 20
         times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
-        Fixes that see no error of a log at first may see it later.
+        Fixes that see no error of a log at first may see it later. A log without fixes is believed from its second
+        failure in one direction on, and a compass while another instrument finds the prediction wrong.
     """
 
     version = 3

@@ -35,8 +35,8 @@ again.
 
 The last fix or log that delivers has the IMU alone against it. A filter that expects a disturbed IMU follows any single
 instrument, so that its agreement does not show that the IMU is wrong, but neither does the disagreement of the main
-filter show that the instrument is. The error of an instrument is bounded, and that of an IMU alone is not. So the last
-instrument is excluded only if it also disagrees with that filter, that is, if even a disturbed IMU does not explain it.
+filter show that the instrument is. The error of an instrument is bounded, that of an IMU alone is not. So the last one
+is excluded only if it, and not only a compass, disagrees with that filter after `_RECENT` seconds of it, too.
 
 **The alternative.** If a fix is excluded, the sub-filter without the log is kept, and the other way round: it is the
 alternative hypothesis. If the log then fails a test, and the excluded fix agrees with all others in that sub-filter,
@@ -106,14 +106,7 @@ from simnav.estimators.models.suitable import ModelChoice
 from simnav.types import KINDS, Array, Estimate, InitialState, Instruments, Measurements
 
 from .exclusion_rules import COASTING, ExclusionRules, RulesWithoutImu
-from .hypotheses import (
-    Exclusion,
-    Hypothesis,
-    ImuHypothesis,
-    WatchedFilter,
-    disturbed_imu,
-    uncertain_start,
-)
+from .hypotheses import Exclusion, Hypothesis, ImuHypothesis, WatchedFilter, disturbed_imu, uncertain_start
 from .iterated import Iteration
 from .kalman import KalmanEstimator
 from .separation import KNOWN_HEADING, SeparationTest
@@ -452,7 +445,9 @@ class SolutionSeparation(Solver):
         left = set(self._delivering(self._group)) - {name, *self._exclusion.excluded}
         if self._imu is None or self._disturbed or name not in self._group or left:
             return False
-        return self._disagreement(self._imu.filter, self._imu.exclusion.excluded) <= _AGREEMENT
+        if self._time - self._imu.start < _RECENT:
+            return True  # it has begun from the main filter, whose state may be wrong
+        return self._disagreement(self._imu.filter, {*self._names} - {name}) <= _AGREEMENT
 
     def _delivering(self, names: Iterable[str]) -> list[str]:
         """Those of the instruments that are not silent."""

@@ -20,6 +20,13 @@ from simnav.world.manoeuvres import (
     Waypoints,
     ZigZag,
 )
+from simnav.world.manoeuvring.auv import Auv
+from simnav.world.manoeuvring.ferry import Ferry
+from simnav.world.manoeuvring.hull import Hull, Superstructure
+from simnav.world.manoeuvring.surface_drone import SurfaceDrone
+from simnav.world.manoeuvring.survey_ship import SurveyShip
+from simnav.world.manoeuvring.vessel import ManoeuvringVessel
+from simnav.world.manoeuvring.workboat import Workboat
 from simnav.world.obstacles import Obstacle, Obstacles
 from simnav.world.sea import Sea
 from simnav.world.start import Start
@@ -33,6 +40,7 @@ from simnav.world.surroundings import (
 from simnav.world.trajectory import SampledTrajectory, Steered, Trajectory, Voyage, WorldBlock
 from simnav.world.vessel import VESSELS, KinematicVessel, Vessel, register_vessel
 from simnav.world.water_level import WaterLevel
+from simnav.world.wind import AirFlow, Wind
 from simnav.world.world import World
 
 #: Any registered vessel; its ``kind`` decides the class.
@@ -44,19 +52,24 @@ __all__ = [
     "SURROUNDINGS",
     "VESSELS",
     "Accelerate",
+    "AirFlow",
     "AnySurrounding",
     "AnyVessel",
+    "Auv",
     "Current",
     "Dive",
+    "Ferry",
     "FlatBottom",
     "GivenTrack",
     "GivenVessel",
     "GivenWaypoints",
     "Hold",
+    "Hull",
     "KinematicVessel",
     "LawnMower",
     "Limits",
     "Manoeuvre",
+    "ManoeuvringVessel",
     "Obstacle",
     "Obstacles",
     "Poses",
@@ -65,9 +78,12 @@ __all__ = [
     "Ship",
     "Start",
     "Steered",
+    "Superstructure",
     "Surface",
+    "SurfaceDrone",
     "SurroundingSpec",
     "Surroundings",
+    "SurveyShip",
     "Trajectory",
     "Turn",
     "Uuv",
@@ -75,6 +91,8 @@ __all__ = [
     "Voyage",
     "WaterLevel",
     "Waypoints",
+    "Wind",
+    "Workboat",
     "World",
     "WorldBlock",
     "ZigZag",

@@ -98,8 +98,8 @@ def of_rows(row: str = "", than: str = "") -> Callable[[Setting], Setting]:
     """A choice of `choice_dial`: other estimators, as they are typed; an empty name leaves the one that is there."""
 
     def with_them(setting: Setting) -> Setting:
-        chosen = {whose: request(name) for whose, name in (("row", row), ("than", than)) if name}
-        return replace(setting, **chosen)
+        chosen = request(row) if row else setting.row
+        return replace(setting, row=chosen, than=request(than) if than else setting.than)
 
     return with_them
 

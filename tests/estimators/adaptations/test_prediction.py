@@ -131,6 +131,63 @@ def test_without_a_witness_an_error_of_any_size_is_that_of_the_prediction():
     assert not any(judged(False, lambda k: off, lambda k: off, dvl_until=-1.0))
 
 
+def lone_log(says, fixes: bool = False) -> list[bool]:
+    """The verdicts on 20 velocities, six seconds after the last fix or with a sound fix after each."""
+    test, rng, found = PredictionTest(Instruments(SHEETS, IMU)), np.random.default_rng(8), []
+    for k in range(20):
+        found.append(test.fails(given(says(k), float(k), "dvl")))
+        if fixes:
+            test.fails(given(rng.standard_normal(3), k + 0.5, "gnss"))
+    return found
+
+
+def test_a_lone_log_is_believed_from_its_second_failure_in_one_direction_on():
+    """What a log says is said once, so it is not waited until six innovations are found correlated."""
+    rng = np.random.default_rng(7)
+    good = rng.standard_normal((20, 3))
+    drift = np.outer(np.arange(20) - 9.0, (9.0, -14.0, -17.0))
+    off = [good[k] if k < 10 else drift[k] for k in range(20)]
+    assert lone_log(lambda k: off[k])[9:] == [False, False, *9 * [True]]
+    assert not any(lone_log(lambda k: off[k], fixes=True))
+
+
+def test_a_gross_error_or_a_larger_noise_of_a_lone_log_has_no_direction():
+    rng = np.random.default_rng(9)
+    single = [40.0 * rng.standard_normal(3) if k % 4 == 0 else rng.standard_normal(3) for k in range(20)]
+    assert not any(lone_log(lambda k: single[k]))
+    noise = 30.0 * np.random.default_rng(10).standard_normal((4000, 3))
+    test = PredictionTest(Instruments(SHEETS, IMU))
+    found = [test.fails(given(u if k % 8 else 0.0 * u, float(k), "dvl")) for k, u in enumerate(noise)]
+    assert 0.05 < np.mean(found) < 0.15  # 1 - PredictionTest.ALONE
+
+
+@pytest.mark.parametrize("count", [2, 3])
+def test_the_cosine_of_isotropic_innovations_has_unit_variance_over_their_number(count: int):
+    """The statistic of runs is exceeded as often as a standard normal, for any law of the sizes."""
+    rng, course, found = np.random.default_rng(11), Course(), []
+    for k in range(20_000):
+        u = np.zeros(3)
+        u[:count] = rng.standard_normal(count) * np.exp(2.0 * rng.standard_normal())
+        course.add(tuple(u), count, float(k), failed=k % 6 != 0)
+        if k % 6 == 5:
+            found.append(course.directed(normal_quantile(0.9)))
+    assert 0.08 < np.mean(found) < 0.12
+
+
+def test_a_compass_is_believed_only_while_another_instrument_finds_the_prediction_wrong():
+    sheet = Datasheet("compass", "gyrocompass", 1.0, np.ones(1))
+    test, found, others = PredictionTest(Instruments((*SHEETS, sheet), IMU)), [], [False]
+    for k in range(60):
+        m = Measurement(float(k), "compass", "gyrocompass", np.zeros(1))
+        found.append(test.fails(Innovation(m, np.array([9.0]), 0.5 * np.eye(1), np.eye(1))))
+        wrong = 10 <= k < 20
+        others.append(test.fails(given((9.0, -14.0, -17.0) if wrong else np.zeros(3), k + 0.5, "dvl")))
+    assert found == others[:-1]
+    assert all(found[12:21])
+    assert not any(found[:12])
+    assert not found[-1]
+
+
 def depth_judged(with_dvl: bool) -> list[bool]:
     """The verdicts on 30 depths that are wrong by five sigma, with or without a sound DVL beside them."""
     sheet = Datasheet("depth", "depth", 1.0, np.ones(1))

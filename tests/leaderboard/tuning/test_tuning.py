@@ -18,7 +18,7 @@ from simnav.leaderboard.tuning.objective import CLEAN, LARGEST, PRICE, Voyages
 from simnav.leaderboard.tuning.space import Range, read_range, space_of
 from simnav.leaderboard.tuning.tuning import TUNED, Evaluation, ranges_of, read, search
 from simnav.scenario import load
-from simnav.scenario import names as scenario_names
+from simnav.scenario.catalogue import headers
 
 FILES = sorted(TUNED.glob("*.json"))
 
@@ -161,7 +161,7 @@ def test_a_stored_tuning_of_former_names_is_read(tmp_path: Path):
 # --- the board is out of bounds -----------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", [n for n in scenario_names() if not load(n).training])
+@pytest.mark.parametrize("name", sorted({h.name for h in headers() if not h.training}))
 def test_what_is_ranked_cannot_be_tuned_on(name: str):
     if not has_recordings(load(name)):
         pytest.skip("its recordings are not on this machine")

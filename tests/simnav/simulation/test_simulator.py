@@ -12,12 +12,13 @@ import pytest
 from simnav.geometry.earth import displace
 from simnav.geometry.rotation import dcm_from_rpy
 from simnav.recording import Block, Recording
-from simnav.scenario import Scenario, load, names
+from simnav.scenario import Scenario, load
+from simnav.scenario.catalogue import headers
 from simnav.simulation.simulator import Simulator, ideal, sample_times, simulate, simulate_many
 from simnav.spec import SpecError
 from simnav.strapdown import integrate
 
-SIMULATED = [n for n in names() if not load(n).recorded]
+SIMULATED = sorted({h.name for h in headers() if not h.recorded})
 
 
 def shortened(name: str, duration: float = 120.0, **changes) -> Scenario:
