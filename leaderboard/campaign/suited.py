@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from simnav.estimator import UnsuitableScenario, find, lacking
@@ -14,7 +16,7 @@ if TYPE_CHECKING:
     from simnav.leaderboard.campaign.request import EstimatorRequest
     from simnav.scenario import Scenario
 
-__all__ = ["require_suited"]
+__all__ = ["require_suited", "with_long_windows"]
 
 
 def require_suited(scenario: Scenario, asked: Iterable[EstimatorRequest], *, lags_only: bool = False) -> None:
@@ -54,3 +56,20 @@ def require_suited(scenario: Scenario, asked: Iterable[EstimatorRequest], *, lag
                 continue  # the run says so
             except ValueError as error:
                 raise RequestError(f"{request.label} on {scenario.id}: {error}") from None
+
+
+def with_long_windows(scenario: Scenario, asked: Iterable[EstimatorRequest]) -> list[EstimatorRequest]:
+    """The same estimators of simnav, with windows that are long enough for their lags."""
+    from simnav.source import open_source
+
+    instruments = open_source(scenario, 0).instruments
+    made = []
+    for request in asked:
+        estimator = request.make()
+        if isinstance(estimator, LookingBack):
+            longest = estimator.lags[-1]
+            if longest > estimator.inner.longest_lag(instruments):
+                window = math.ceil(longest / instruments.step) + 1
+                request = replace(request, parameters={**request.parameters, "window": window}, label="")
+        made.append(request)
+    return made
