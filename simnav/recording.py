@@ -163,6 +163,13 @@ class AidStream:
         names += tuple(n for n in _CLOCK_ARRAYS if len(getattr(self, n)))
         return replace(self, **{n: getattr(self, n)[keep] for n in names})
 
+    def as_delivered(self) -> AidStream:
+        """The readings in order of their stamps, which take the place of the times of validity; arrivals stay."""
+        if not self.has_clock:
+            return self
+        stream = self.rows(np.argsort(self.stamps, kind="stable"))
+        return replace(stream, time=stream.stamps, stamp=np.empty(0), arrival=stream.arrivals)
+
     def delivered(self, edges: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
         """In which order the readings are delivered, and in which step: the one in which each arrives.
 
