@@ -256,6 +256,10 @@ class Row(Estimator):
         """The states of earlier times of a solver that looks back; else None."""
         return self.solver.earlier(lags)
 
+    def longest_lag(self, instruments: Instruments) -> float:
+        """How far a solver looks back [s]."""
+        return self.solver.longest_lag(instruments)
+
     def reveal(self, recording: Recording) -> None:
         """Pass the truth to a solver that is a reference."""
         self._truth = true_times(recording) or None

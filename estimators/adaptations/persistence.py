@@ -38,8 +38,9 @@ class Course:
         Time of the last innovation [s].
     """
 
-    __slots__ = ("_before", "_cosines", "_count", "_failed", "_freedom", "_pairs", "_product", "_square", "_squares")
-    __slots__ += ("time",)
+    __slots__ = (
+        "_before", "_cosines", "_count", "_failed", "_freedom", "_pairs", "_product", "_square", "_squares", "time",
+    )  # fmt: skip
 
     def __init__(self) -> None:
         self.time = -np.inf

@@ -116,10 +116,8 @@ def rows(found: Mapping[str, Any]) -> Iterator[tuple[str, str, str, bool]]:
     for label, part in found.items():
         first = int(label.split("-")[1])
         for name in part.keys() & PLAIN.keys():
-            pairs = zip(part[name], part[PLAIN[name]], strict=True)
-            by_row.setdefault(name, []).extend(
-                (first + k, one, beside) for k, (one, beside) in enumerate(pairs) if beside is not None
-            )
+            both = enumerate(zip(part[name], part[PLAIN[name]], strict=True), first)
+            by_row.setdefault(name, []).extend((k, one, beside) for k, (one, beside) in both if beside is not None)
     for name, pairs in sorted(by_row.items()):
         ratio = np.array([np.inf if one is None else one[0] / beside[0] for _, one, beside in pairs])
         share, worst = float(np.mean(ratio > WORSE)), float(ratio.max())

@@ -278,6 +278,15 @@ def test_two_rows_are_compared_run_by_run(visit, results):
     page.wait_for_function("document.querySelector('[data-verdict]').textContent.includes('of ekf is')")
     assert "larger" in page.inner_text("[data-verdict]")
     assert "a=ekf" in page.url
+    page.select_option("[data-tracks] select", "other")
+    page.wait_for_function("simnav.charts.wins?.given.data.cells.page[0].includes('track=other')")
+    chart(page, "wins")
+    share = page.evaluate("simnav.charts.wins.given.data.cells")
+    cells = list(zip(share["row"], share["other"], strict=True))
+    at = cells.index(("sw-fgo", "ekf"))
+    assert share["share"][at] + share["share"][cells.index(("ekf", "sw-fgo"))] == pytest.approx(100.0)
+    page.locator("#chart-wins .mark-rect path").nth(at).click()
+    page.wait_for_function("document.querySelector('[data-verdict]').textContent.includes('of sw-fgo is')")
 
 
 def test_p_values_in_the_browser_are_those_of_the_board(visit):
