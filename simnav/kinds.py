@@ -499,6 +499,8 @@ class Datasheet:
         at a time. Empty: it has no channels, and gives one reading at a time.
     processes : tuple of DeclaredProcess
         Further coloured processes of the error. White ones are in ``sigma``.
+    sources : tuple of str
+        Names of the instruments whose readings it solves: its errors are theirs. Whoever uses both counts them twice.
     """
 
     name: str
@@ -516,6 +518,7 @@ class Datasheet:
     blocks: tuple[StateBlock, ...] = ()
     channels: tuple[str, ...] = ()
     processes: tuple[DeclaredProcess, ...] = ()
+    sources: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         if self.kind not in KINDS:

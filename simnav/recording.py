@@ -34,10 +34,12 @@ from simnav.types import (
     TriadDatasheet,
 )
 
-__all__ = ["AidStream", "Block", "FaultLabel", "ImuLabels", "Recording", "RecordingError", "packets"]
+__all__ = ["REFLECTION", "AidStream", "Block", "FaultLabel", "ImuLabels", "Recording", "RecordingError", "packets"]
 
 #: Version of the files that `Recording.save` writes. It is increased when their format changes.
 FORMAT = 1
+#: Kind of the label of errors by reflections, which the surroundings make and no fault of a scenario.
+REFLECTION = "reflection"
 
 
 class RecordingError(ValueError):
@@ -364,7 +366,7 @@ _STATES_OF: dict[type[NavigationStates], tuple[str, ...]] = {
 }
 
 #: Fields of a datasheet that most have not.
-_OPTIONAL = ("details", "blocks", "channels", "processes")
+_OPTIONAL = ("details", "blocks", "channels", "processes", "sources")
 
 
 def _sheet(sheet: Datasheet | ImuDatasheet) -> dict[str, Any]:
@@ -437,6 +439,7 @@ def _instruments(sheets: Mapping[str, Any], step: float) -> Instruments:
         fields["blocks"] = tuple(StateBlock(**block) for block in aid.get("blocks", ()))
         fields["channels"] = tuple(aid.get("channels", ()))
         fields["processes"] = tuple(_process(p) for p in aid.get("processes", ()))
+        fields["sources"] = tuple(aid.get("sources", ()))
         aids.append(Datasheet(**fields))
     return Instruments(aids, imu, step)
 
