@@ -28,6 +28,7 @@ from functools import cache
 from typing import Any, ClassVar
 
 from simnav.estimator import Estimator, Needs
+from simnav.estimator.late_arrivals import LateArrivals, Manner, TrueTimes, is_untimely, parts_of, true_times
 from simnav.estimator.parameters import former_names, under_present_names
 from simnav.types import Array, Estimate, InitialState, Instruments, Measurements, NavigationStates
 
@@ -190,6 +191,11 @@ class Row(Estimator):
 
     recipe: ClassVar[Mapping[str, Piece]] = {}
     solver: Estimator
+    #: What is done with readings that arrive late: the parameter ``late`` of `simnav.estimator.make`.
+    late: Manner = "replay"
+    _late: LateArrivals | None = None
+    _truth: TrueTimes | None = None
+    _shared: Sequence[object] = ()
 
     def __init__(self, **parameters: Any):  # type checkers see it where a row has no stub
         raise TypeError(f"{type(self).__name__} names no solver")
@@ -226,11 +232,21 @@ class Row(Estimator):
 
     def reset(self, start: InitialState, instruments: Instruments) -> None:
         """Begin a run; UnsuitableScenario where the pieces lack an instrument."""
+        self._instruments = instruments
+        self._late = self._late_arrivals() if any(sheet.timing for sheet in instruments.values()) else None
         self.solver.reset(start, instruments)
 
+    def _late_arrivals(self) -> LateArrivals:
+        return LateArrivals(self._instruments, self.late, self._truth, self._shared)
+
     def update(self, measurements: Measurements) -> Estimate:
-        """Take one step's measurements, each at its own time."""
-        return self.solver.update(measurements)
+        """Take one step's measurements, each at its own time, also those that arrive late."""
+        if self._late is None:
+            if not is_untimely(measurements):
+                return self.solver.update(measurements)
+            self._late = self._late_arrivals()
+        self.solver, estimate = self._late.update(self.solver, measurements)
+        return estimate
 
     def smooth(self) -> NavigationStates | None:
         """The trajectory of a solver that smooths; else None."""
@@ -240,8 +256,15 @@ class Row(Estimator):
         """The states of earlier times of a solver that looks back; else None."""
         return self.solver.earlier(lags)
 
+    def longest_lag(self, instruments: Instruments) -> float:
+        """How far a solver looks back [s]."""
+        return self.solver.longest_lag(instruments)
+
     def reveal(self, recording: Recording) -> None:
         """Pass the truth to a solver that is a reference."""
+        self._truth = true_times(recording) or None
+        if self._truth is not None:
+            self._shared = parts_of(recording)
         self.solver.reveal(recording)
 
     def __getattr__(self, name: str) -> Any:

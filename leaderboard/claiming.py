@@ -8,7 +8,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from simnav.leaderboard.results.errors import RequestError, mistakes
+from simnav.leaderboard.results.errors import RequestError, mistakes, sentence
+from simnav.scoring import SCORES
+from simnav.scoring.lagged import seconds_of
 
 from .calls import call, whole_number
 from .claim_requests import ClaimRequest
@@ -63,6 +65,7 @@ def claim(request: ClaimRequest) -> Answer:
         chosen, _dials(chosen, request.holds_if), absolute(request.output or Path("results") / "claims"),
         runs=whole_number("runs", request.runs, 1), judged=whole_number("judged", request.judged, 1),
         workers=whole_number("workers", request.workers, 1), progress=request.progress,
+        judged_from=whole_number("judged_from", request.judged_from),
     )  # fmt: skip
 
 
@@ -88,6 +91,9 @@ def _own(request: ClaimRequest) -> Claim:
         raise RequestError("a claim compares one estimator with one other")
     row, than = found
     setting = Setting(scenario, scenario, row, than, request.score, request.score)
+    lag = _lag_of(request.score)
+    if lag:  # the score needs estimates of earlier times of both
+        setting = setting.with_parameters("both", lags=lag)
     sentence = f"{request.score} of {row.label} is {request.gain:g} % below that of {than.label} on {scenario.name}"
     made = Claim("own", "", sentence, request.gain / 100.0, lambda: setting, ())
     dials = [_own_dial(made, text) for text in _texts(request.holds_if)]
@@ -112,17 +118,32 @@ def _own_dial(claim: Claim, text: str) -> Dial:
     if name == "lag":
         if not all(lag >= 0.0 for lag in numbers):
             raise RequestError(f"--holds-if {text}: a lag is a time of 0 s or more")
+        score = claim.base().score
+        if f"{score}_lag_1" not in SCORES:
+            raise RequestError(f"--holds-if {text}: {score} is no score of a late output; horizontal_rmse has one")
         return lag_dial(numbers)
     if dot and whose in ("row", "than", "both"):
         made = parameter_dial(name, f"{parameter} of {whose}", whose, parameter, numbers)
-        with mistakes():
-            for number in numbers:
-                checked = made.set(claim.base(), number)
-                for request in (checked.row, checked.than):
+        for number in numbers:
+            checked = made.set(claim.base(), number)
+            for request in (checked.row, checked.than):
+                try:
                     request.make()
+                except (ValueError, TypeError, LookupError) as error:
+                    raise RequestError(f"--holds-if {text}: {sentence(error)}") from None
         return made
     (dial, _), *_ = chosen_dials(claim.base().scenario, {name: numbers})
     return scenario_dial(name, dial.title, dial.unit, numbers, lambda x: {dial.key: int(x) if x.is_integer() else x})
+
+
+def _lag_of(score: str) -> str:
+    """The lag of a score of late outputs as the parameter ``lags`` has it; empty for another score.
+
+    >>> _lag_of("horizontal_rmse_lag_0p5"), _lag_of("horizontal_rmse")
+    ('0.5', '')
+    """
+    _, between, lag = score.rpartition("_lag_")
+    return f"{seconds_of(lag):g}" if between else ""
 
 
 def _dials(claim: Claim, asked: Sequence[str]) -> list[Dial]:

@@ -14,6 +14,7 @@ from simnav.estimator.looking_back import LAGS, lags_of
 from simnav.leaderboard.campaign.options import RunOptions, shared
 from simnav.leaderboard.campaign.request import EstimatorLike, EstimatorRequest, Estimators, requests, together
 from simnav.leaderboard.campaign.request import request as one_request
+from simnav.leaderboard.campaign.suited import require_suited, with_long_windows
 from simnav.leaderboard.results.errors import RequestError, StoreError, mistakes
 from simnav.leaderboard.results.scratch import scratch
 
@@ -131,6 +132,10 @@ def run(request: RunRequest) -> RunReport:
         with mistakes():
             lags = "/".join(f"{lag:g}" for lag in lags_of(request.lags))
         asked = requests([one_request(r, {LAGS: lags}) for r in asked])
+        if request.estimators is None:
+            asked = with_long_windows(chosen, asked)
+        else:
+            require_suited(chosen, asked, lags_only=True)
     return run_once(chosen, asked, seed, request.progress)
 
 

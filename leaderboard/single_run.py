@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from simnav.estimator.looking_back import PREFIX
 from simnav.kinds import EQUATIONS, KINDS
 from simnav.leaderboard.campaign.recorder import record_here
 from simnav.leaderboard.campaign.request import EstimatorRequest
@@ -249,7 +250,17 @@ def lag_table(estimators: Sequence[EstimatorRun]) -> tables.Fitted:
     columns = ["estimator", "newest", *(f"{lag:g} s late" for lag, _ in names)]
     cells = [[e.estimator, *(tables.number(e.scores.get(s)) for s in (base, *(s for _, s in names)))]
              for e in estimators]  # fmt: skip
-    return tables.Fitted("Horizontal RMSE [m] of an output that is late", columns, cells, columns, numeric=columns[1:])
+    same = ", ".join(e.estimator for e in estimators if _repeats(e.trial))
+    caption = f"Without an estimate of earlier times; what they gave then is repeated: {same}." if same else ""
+    return tables.Fitted("Horizontal RMSE [m] of an output that is late", columns, cells, columns, numeric=columns[1:],
+                         caption=caption)  # fmt: skip
+
+
+def _repeats(trial: Trial) -> bool:
+    """Whether the estimates of earlier times are those that were given then, for all lags above 0."""
+    late = [change for name, change in trial.diagnostics.items()
+            if name.startswith(PREFIX) and seconds_of(name.removeprefix(PREFIX)) > 0.0]  # fmt: skip
+    return bool(late) and not any(np.nan_to_num(change).any() for change in late)
 
 
 def run_table(recording: Recording, estimators: Sequence[EstimatorRun]) -> tables.Fitted:

@@ -25,6 +25,7 @@ from simnav.declared_process import DeclaredProcess
 from simnav.geometry.earth import displace_scalar, relative_position
 from simnav.geometry.rotation import wrap_angle, wrap_scalar
 from simnav.plugins import PluginError, Registry
+from simnav.timing import TimingSheet
 
 __all__ = [
     "BODY_VELOCITY",
@@ -105,6 +106,8 @@ class NavigationPoint(NamedTuple):
         The channel whose reading is predicted; empty for an instrument without channels.
     side : (s,) array
         Side information of the reading, components as in `Kind.side`.
+    acceleration : (3,) array or None
+        Relative to the Earth, north-east-down [m/s^2]. None: it is not known, or no instrument needs it.
     """
 
     time: float
@@ -115,6 +118,7 @@ class NavigationPoint(NamedTuple):
     blocks: Mapping[str, Array] = MappingProxyType({})
     channel: str = ""
     side: Array = NO_SIDE
+    acceleration: Array | None = None
 
 
 class NavigationPoints(NamedTuple):
@@ -499,6 +503,8 @@ class Datasheet:
         at a time. Empty: it has no channels, and gives one reading at a time.
     processes : tuple of DeclaredProcess
         Further coloured processes of the error. White ones are in ``sigma``.
+    timing : TimingSheet or None
+        What is known of its time stamps, and of how late readings arrive. None: nothing, or that both are perfect.
     """
 
     name: str
@@ -516,6 +522,7 @@ class Datasheet:
     blocks: tuple[StateBlock, ...] = ()
     channels: tuple[str, ...] = ()
     processes: tuple[DeclaredProcess, ...] = ()
+    timing: TimingSheet | None = None
 
     def __post_init__(self) -> None:
         if self.kind not in KINDS:

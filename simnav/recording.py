@@ -11,7 +11,7 @@ import json
 import os
 import zipfile
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simnav.declared_process import DeclaredProcess, Factor
+from simnav.timing import TimingSheet
 from simnav.types import (
     Array,
     Datasheet,
@@ -85,6 +86,10 @@ def _no_sides() -> Array:
     return np.empty((0, 0))
 
 
+def _no_times() -> Array:
+    return np.empty(0)
+
+
 @dataclass(frozen=True, eq=False)
 class AidStream:
     """All k measurements of one aiding instrument in an interval of time, with their labels.
@@ -94,7 +99,7 @@ class AidStream:
     name, kind : str
         Name of the instrument in its scenario, and its kind.
     time : (k,) array
-        Times of validity [s], ascending.
+        True times of validity [s], ascending. An estimator receives the stamps (``stamp``).
     value : (k, d) array
         Measured values, including faults; components as in ``KINDS[kind].values``.
     faults : (k,) uint32 array
@@ -115,6 +120,8 @@ class AidStream:
         Side information of each reading; components as in ``KINDS[kind].side``.
     dropped_channel : (m,) int16 array
         The channel of each missing measurement.
+    stamp, arrival : (k,) array
+        Time stamp with which each reading is delivered, and when it arrives [s]. Empty: both are ``time``.
     """
 
     name: str
@@ -129,15 +136,67 @@ class AidStream:
     channel: NDArray[np.int16] = field(default_factory=_no_channel)
     side: Array = field(default_factory=_no_sides)
     dropped_channel: NDArray[np.int16] = field(default_factory=_no_channel)
+    stamp: Array = field(default_factory=_no_times)
+    arrival: Array = field(default_factory=_no_times)
 
     def __len__(self) -> int:
         return len(self.time)
+
+    @property
+    def has_clock(self) -> bool:
+        """Whether stamps or arrivals may differ from the times of validity."""
+        return len(self.stamp) > 0 or len(self.arrival) > 0
+
+    @property
+    def stamps(self) -> Array:
+        """(k,) array: the time stamps with which the readings are delivered [s]."""
+        return self.stamp if len(self.stamp) else self.time
+
+    @property
+    def arrivals(self) -> Array:
+        """(k,) array: when the readings arrive [s]."""
+        return self.arrival if len(self.arrival) else self.time
+
+    def rows(self, keep: NDArray[Any] | slice) -> AidStream:
+        """Some of the readings: a mask, or the indices of rows."""
+        names = (*_AID_ARRAYS[:-1], *(("channel", "side") if self.channels else ()))
+        names += tuple(n for n in _CLOCK_ARRAYS if len(getattr(self, n)))
+        return replace(self, **{n: getattr(self, n)[keep] for n in names})
+
+    def as_delivered(self) -> AidStream:
+        """The readings in order of their stamps, which take the place of the times of validity; arrivals stay."""
+        if not self.has_clock:
+            return self
+        stream = self.rows(np.argsort(self.stamps, kind="stable"))
+        return replace(stream, time=stream.stamps, stamp=np.empty(0), arrival=stream.arrivals)
+
+    def delivered(self, edges: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+        """In which order the readings are delivered, and in which step: the one in which each arrives.
+
+        Parameters
+        ----------
+        edges : (n,) array
+            Ends of n steps [s].
+
+        Returns
+        -------
+        order, step : (k,) int array
+            Rows, by step and then by stamp; and the step of each of these rows. It is n for what arrives later.
+        """
+        step = np.searchsorted(edges, self.arrivals)
+        if not self.has_clock:
+            return np.arange(len(self)), step
+        order = np.lexsort((self.stamps, step))
+        return order, step[order]
 
     @staticmethod
     def concatenate(parts: Sequence[AidStream]) -> AidStream:
         """Join the measurements of consecutive intervals."""
         names = _CHANNEL_ARRAYS if parts[0].channels else _AID_ARRAYS
         joined = {n: np.concatenate([getattr(p, n) for p in parts]) for n in names}
+        for name in _CLOCK_ARRAYS:
+            if any(len(getattr(p, name)) for p in parts):
+                joined[name] = np.concatenate([getattr(p, f"{name}s") for p in parts])
         return AidStream(parts[0].name, parts[0].kind, **joined, channels=parts[0].channels)
 
     def places(self, time: Array, channel: NDArray[np.int16]) -> NDArray[np.intp]:
@@ -151,10 +210,10 @@ class AidStream:
     def measurements(self) -> Iterator[Measurement]:
         """The readings as an estimator receives them, in order."""
         if not self.channels:
-            for t, v in zip(self.time, self.value, strict=True):
+            for t, v in zip(self.stamps, self.value, strict=True):
                 yield Measurement(float(t), self.name, self.kind, v)
             return
-        for t, v, c, side in zip(self.time, self.value, self.channel, self.side, strict=True):
+        for t, v, c, side in zip(self.stamps, self.value, self.channel, self.side, strict=True):
             yield Measurement(float(t), self.name, self.kind, v, self.channels[c], side)
 
 
@@ -336,13 +395,16 @@ def packets(data: Block, ends: Array) -> Iterator[Measurements]:
     Yields
     ------
     Measurements
-        The packet of each step: the IMU samples and aiding measurements within it.
+        The packet of each step: the IMU samples within it, and the aiding measurements that arrive within it.
     """
-    aids = [m for s in data.aids.values() for m in s.measurements()]
-    aids.sort(key=lambda m: m.time)  # stable: ties keep the scenario's order of instruments
     # Times are multiples of the sample interval up to rounding: half a microsecond decides.
     edges = np.asarray(ends) + 0.5e-6
-    cut = np.searchsorted([m.time for m in aids], edges, side="right")
+    streams = list(data.aids.values())
+    every = [m for s in streams for m in s.measurements()]
+    step = np.concatenate([np.searchsorted(edges, s.arrivals) for s in streams] or [np.empty(0, np.intp)])
+    # Stable: ties keep the scenario's order of instruments.
+    order = np.lexsort((np.array([m.time for m in every]), step)).tolist()
+    aids, cut = [every[k] for k in order], np.searchsorted(step[order], np.arange(len(edges)), side="right")
     cut_imu = None if data.imu is None else np.searchsorted(data.imu.time, edges, side="right")
     start, i, j = data.start, 0, 0
     for k, end in enumerate(ends):
@@ -356,6 +418,8 @@ def packets(data: Block, ends: Array) -> Iterator[Measurements]:
 
 _AID_ARRAYS = ("time", "value", "faults", "fault_error", "sigma", "dropped")
 _CHANNEL_ARRAYS = (*_AID_ARRAYS, "channel", "side", "dropped_channel")
+#: Arrays that a stream has where its clock is not perfect.
+_CLOCK_ARRAYS = ("stamp", "arrival")
 _IMU_ARRAYS = ("time", "interval", "angular_rate", "specific_force")
 _STATE_ARRAYS = ("time", "position", "velocity", "attitude")
 _STATES_OF: dict[type[NavigationStates], tuple[str, ...]] = {
@@ -364,7 +428,7 @@ _STATES_OF: dict[type[NavigationStates], tuple[str, ...]] = {
 }
 
 #: Fields of a datasheet that most have not.
-_OPTIONAL = ("details", "blocks", "channels", "processes")
+_OPTIONAL = ("details", "blocks", "channels", "processes", "timing")
 
 
 def _sheet(sheet: Datasheet | ImuDatasheet) -> dict[str, Any]:
@@ -419,6 +483,7 @@ def _to_arrays(recording: Recording) -> dict[str, Any]:
         add("imu_labels", data.imu_labels, ("faults", "fault_error"))
     for name, stream in data.aids.items():
         add(f"aid.{name}", stream, _CHANNEL_ARRAYS if stream.channels else _AID_ARRAYS)
+        add(f"aid.{name}", stream, [n for n in _CLOCK_ARRAYS if len(getattr(stream, n))])
     return arrays
 
 
@@ -436,6 +501,7 @@ def _instruments(sheets: Mapping[str, Any], step: float) -> Instruments:
         }
         fields["blocks"] = tuple(StateBlock(**block) for block in aid.get("blocks", ()))
         fields["channels"] = tuple(aid.get("channels", ()))
+        fields["timing"] = TimingSheet(**aid["timing"]) if "timing" in aid else None
         fields["processes"] = tuple(_process(p) for p in aid.get("processes", ()))
         aids.append(Datasheet(**fields))
     return Instruments(aids, imu, step)
@@ -455,7 +521,8 @@ def _from_arrays(meta: dict[str, Any], arrays: dict[str, Any]) -> Recording:
     channels = {aid["name"]: tuple(aid.get("channels", ())) for aid in meta["aids"]}
 
     def stream(name: str, kind: str) -> AidStream:
-        names = _CHANNEL_ARRAYS if channels.get(name) else _AID_ARRAYS
+        names: tuple[str, ...] = _CHANNEL_ARRAYS if channels.get(name) else _AID_ARRAYS
+        names += tuple(n for n in _CLOCK_ARRAYS if f"aid.{name}.{n}" in arrays)
         arrays_of = dict(zip(names, get(f"aid.{name}", names), strict=True))
         return AidStream(name, kind, **arrays_of, channels=channels.get(name, ()))
 

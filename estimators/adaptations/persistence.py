@@ -39,7 +39,7 @@ class Course:
     """
 
     __slots__ = (
-        "_before", "_cosines", "_count", "_failed", "_freedom", "_pairs", "_product", "_square", "_squares", "time"
+        "_before", "_cosines", "_count", "_failed", "_freedom", "_pairs", "_product", "_square", "_squares", "time",
     )  # fmt: skip
 
     def __init__(self) -> None:

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from simnav.geometry.earth import principal_radii, relative_position
 from simnav.scenario import Scenario
 from simnav.types import Array
-from simnav.world import KinematicVessel, World
+from simnav.world import AirFlow, KinematicVessel, Wind, World
 from simnav.world.track import PlannedTrack
 
 from .guidance_kernels import Tracks
@@ -94,11 +94,12 @@ def _planned(scenario: Scenario) -> PlannedTrack:
     assert scenario.start is not None
     assert isinstance(vessel, KinematicVessel)
     voyage = scenario.start, vessel, scenario.manoeuvres, scenario.current
-    key = repr((voyage, scenario.duration))
+    wind = next((spec for spec in scenario.surroundings.values() if isinstance(spec, Wind)), None)
+    key = repr((voyage, wind, scenario.duration))
     if key not in _tracks:
         if len(_tracks) > 4:
             _tracks.pop(next(iter(_tracks)))
-        _tracks[key] = track = World.plan(*voyage)
+        _tracks[key] = track = World.plan(*voyage, None if wind is None else AirFlow(wind, 0))
         track.reach(scenario.duration)
     return _tracks[key]
 

@@ -183,7 +183,10 @@ class AboutTruthModel(ErrorModel):
         self._aids[name] = _AidErrors(bias, scale, misalignment, deviation, self._processes(sheet))
         none = np.zeros_like(sheet.bias)
         white = sheet.bias_instability if errors["bias"].fast else none
-        return replace(sheet, bias=none, bias_instability=white, scale=0.0, misalignment=np.zeros(3), processes=())
+        return replace(
+            sheet, bias=none, bias_instability=white, scale=0.0, misalignment=np.zeros(3), processes=(),
+            timing=None,  # the times of validity are known
+        )  # fmt: skip
 
     def _processes(self, sheet: Datasheet) -> list[tuple[int, int, FactorsAboutTruth]]:
         """Make the states of the processes that a datasheet declares by name, each as it is."""

@@ -264,8 +264,11 @@ class Chain(ABC):
     def __init__(self, front: ErrorModel):
         self.front = front
 
-    #: Further arrays of the model that a node stores, in addition to those of its ``state``.
-    node_arrays: tuple[str, ...] = ()
+    @property
+    def node_arrays(self) -> tuple[str, ...]:
+        """Further arrays of the model that a node stores, in addition to those of its ``state``."""
+        return ()
+
     #: Components of the model's error from this index on are independent and only decay.
     coupled: ClassVar[int] = 10**9
 

@@ -70,15 +70,15 @@ class DvlCalibrationModel(InertialModel):
     """The model of the module; 23 states.
 
     Datasheets give the size of a DVL's scale factor and misalignment, and some also say how well the lever arm was
-    measured, but none how well clocks agree: that is a parameter, and so is the lever arm where the datasheet says
-    nothing. A second DVL counts as an instrument without states.
+    measured, or how well clocks agree. Where one says nothing, these are parameters. A second DVL counts as an
+    instrument without states.
 
     Parameters
     ----------
     lever_arm : float
         Sigma of each component of the lever-arm error [m], if the datasheet has no ``lever_arm_sigma``.
     delay : float
-        Sigma of the DVL's time error [s].
+        Sigma of the DVL's time error [s], if the datasheet has no sigma of the offset of its stamps.
     preset : "default" or "paper"
         "paper": the noise of GNSS and DVL as printed, 5 m and 0.1 m/s, instead of the datasheets'.
     """
@@ -117,7 +117,9 @@ class DvlCalibrationModel(InertialModel):
         arm = declared or StateBlock(blocks.LEVER_ARM, 3, "m", self.lever_arm)
         self.blocks.add(name, arm.name, arm.rates())
         self.blocks.add(name, "scale", merged(errors["scale"]))
-        self.blocks.add(name, "delay", StateBlock("delay", 1, "s", self.delay).rates())
+        timing = self._dvl.timing
+        sigma = self.delay if timing is None or not timing.offset else timing.offset
+        self.blocks.add(name, "delay", StateBlock("delay", 1, "s", sigma).rates())
 
     def measure(self, measurement: Measurement) -> Linearised | None:
         """Linearise one measurement: the DVL as in the module, others as in `simnav.estimators.models.measurements`."""

@@ -59,6 +59,7 @@ from simnav.types import (
 
 from .base import ErrorModel, Linearised, Observation
 from .declared_errors import CURRENT, bias_of, bias_of_triad
+from .delayed import is_delayed
 from .equations import EQUATIONS, equation_of
 from .inertial_update import absorb_inertial, assimilate_inertial, innovate_inertial
 from .levered import is_own, with_lever_arms
@@ -135,12 +136,15 @@ class InertialModel(ErrorModel):
         Covariance of the white noise of each instrument.
     uncalibrated : set of str
         Instruments whose noise grows with the velocity (`simnav.estimators.models.equations`).
+    delayed : bool
+        Whether the delay of an instrument is among the states.
     raw_rate, raw_force : (3,) array
         Angular rate at the time of the state (extrapolated) and specific force of the last IMU sample, as measured.
     transition, process_noise : (15, 15) array
         Transition matrix and process noise of the last propagation.
     """
 
+    delayed: bool = False
     state = ("position", "velocity", "dcm", "bias", "calibration")
     memory = ("_memory", "_turn", "_clock")
     attitude_at = 6
@@ -267,6 +271,7 @@ class InertialModel(ErrorModel):
             self.blocks.bring(own)
         for sheet in own:
             self.own[sheet.name] = OwnObservation(sheet, self.blocks.places(sheet.name, _NAV), self.time)
+        self.delayed = any(is_delayed(sheet) for sheet in own)
         self.many = of_instruments(self.own, self.bias_at)
         self._fused = set(self.noise) - self.uncalibrated - set(self.own) if self.fused else set()
 
@@ -360,7 +365,8 @@ class InertialModel(ErrorModel):
         """Linearise one measurement (`simnav.estimators.models.measurements`)."""
         name = measurement.instrument
         if name in self.own:
-            found = self._linearise_own(name, measurement.time, measurement.value, self._state(), measurement.side)
+            state = self.state_of_own()
+            found = self._linearise_own(name, measurement.time, measurement.value, state, measurement.side)
             if found is None:
                 return None
             noise = self.noise[name] if found[2] is None else self.noise[name] + found[2]
@@ -376,6 +382,13 @@ class InertialModel(ErrorModel):
 
     def _state(self) -> State:
         return self.position, self.velocity, self.dcm, self.raw_rate, self.bias, self.calibration
+
+    def state_of_own(self) -> State:
+        """The state for `observe_own`: with delays among the states, the rate has the specific force behind it."""
+        if not self.delayed:
+            return self._state()
+        inertial = np.concatenate([self.raw_rate, self.raw_force])
+        return self.position, self.velocity, self.dcm, inertial, self.bias, self.calibration
 
     def observe_own(
         self, name: str, time: float, value: Array, state: tuple[Array, ...], side: Array = NO_SIDE

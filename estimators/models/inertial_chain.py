@@ -349,9 +349,13 @@ class InertialChain(Chain):
         Of 15 states, with or without calibration states, or the 9-state model.
     """
 
-    node_arrays = ("raw_rate",)
     coupled = 15
     front: InertialModel
+
+    @property
+    def node_arrays(self) -> tuple[str, ...]:
+        """As `Chain.node_arrays`: the output of the gyroscopes, and of the accelerometers if a delay needs it."""
+        return ("raw_rate", "raw_force") if self.front.delayed else ("raw_rate",)
 
     def begin(self, start: InitialState, instruments: Instruments) -> Array:
         """One node, at the start; its covariance. UnsuitableScenario without an IMU."""
@@ -386,7 +390,8 @@ class InertialChain(Chain):
             aids["components"],
         )  # fmt: skip
         if self.front.own:
-            self.observe_own(first, row, wide, position, velocity, dcm, states["raw_rate"], bias, calibration)
+            inertial = np.hstack([states[name] for name in self.node_arrays])
+            self.observe_own(first, row, wide, position, velocity, dcm, inertial, bias, calibration)
         if wide is not jacobian:
             here = np.flatnonzero(row[first:] >= 0) + first
             jacobian[here] = wide[here, :, : self.size]

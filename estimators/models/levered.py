@@ -23,6 +23,7 @@ from simnav.kinds import NavigationPoint, Observation
 from simnav.types import KINDS, Array, Datasheet, Instruments
 
 from .declared_errors import errors_of
+from .delayed import is_delayed, observation_at_delay, with_delay
 from .equations import equation_of
 
 __all__ = ["is_own", "observation_of", "with_lever_arms"]
@@ -30,23 +31,26 @@ __all__ = ["is_own", "observation_of", "with_lever_arms"]
 
 def is_own(sheet: Datasheet) -> bool:
     """Whether an instrument is observed by a function, and not by a compiled equation."""
-    return KINDS[sheet.kind].observation is not None or _is_levered(sheet)
+    return KINDS[sheet.kind].observation is not None or _has_states(sheet)
 
 
 def observation_of(sheet: Datasheet) -> Observation | None:
     """The function that predicts the reading of an instrument; None if its equation is compiled, or there is none."""
-    return _observe if _is_levered(sheet) else KINDS[sheet.kind].observation
+    observation = _observe if _has_states(sheet) else KINDS[sheet.kind].observation
+    return observation_at_delay(observation) if observation is not None and is_delayed(sheet) else observation
 
 
-def _is_levered(sheet: Datasheet) -> bool:
-    return KINDS[sheet.kind].observation is None and any(block.name == LEVER_ARM for block in sheet.blocks)
+def _has_states(sheet: Datasheet) -> bool:
+    own = any(block.name == LEVER_ARM for block in sheet.blocks) or is_delayed(sheet)
+    return KINDS[sheet.kind].observation is None and own
 
 
 def with_lever_arms(instruments: Instruments) -> Instruments:
-    """The datasheets, with scale factor and misalignment as blocks where the lever arm is one."""
-    if not any(_is_levered(sheet) for sheet in instruments.values()):
+    """The datasheets, with unknown delays as blocks, and scale factor and misalignment where lever arm or delay is."""
+    sheets = [with_delay(sheet) for sheet in instruments.values()]
+    if not any(_has_states(sheet) or is_delayed(sheet) for sheet in sheets):
         return instruments
-    sheets = [_with_blocks(sheet) if _is_levered(sheet) else sheet for sheet in instruments.values()]
+    sheets = [_with_blocks(sheet) if _has_states(sheet) else sheet for sheet in sheets]
     return Instruments(sheets, instruments.imu, instruments.step)
 
 
@@ -56,17 +60,19 @@ def _with_blocks(sheet: Datasheet) -> Datasheet:
     return replace(sheet, blocks=(*sheet.blocks, *more), scale=0.0, misalignment=np.zeros(3))
 
 
-def _observe(point: NavigationPoint, sheet: Datasheet) -> tuple[Array, Mapping[str, Array]] | None:
-    """The reading and its Jacobian by block."""
+def _observe(point: NavigationPoint, sheet: Datasheet) -> tuple[Array, Mapping[str, Array]] | Array | None:
+    """The reading and its Jacobian by block; of a heading the reading alone."""
     equation, errors = equation_of(sheet), point.blocks
-    arm = sheet.lever_arm + errors[LEVER_ARM]
+    arm = sheet.lever_arm + errors.get(LEVER_ARM, 0.0)
     reading = equation.read(point, sheet, errors)
-    if reading is None:
-        return None
+    if reading is None or sheet.equation not in _DERIVATIVES:
+        return reading
     navigation, by_arm = _DERIVATIVES[sheet.equation](point, arm)
-    blocks = {NAVIGATION: navigation, LEVER_ARM: by_arm}
+    blocks = {NAVIGATION: navigation}
+    if LEVER_ARM in errors:
+        blocks[LEVER_ARM] = by_arm
     if not errors.keys().isdisjoint(("scale", "misalignment")):
-        bare = equation.read(point, sheet, {LEVER_ARM: errors[LEVER_ARM]})
+        bare = equation.read(point, sheet, {name: errors[name] for name in (LEVER_ARM,) if name in errors})
         assert bare is not None, "it has a reading with its other errors"
         if "scale" in errors:
             blocks["scale"] = bare[:, None]

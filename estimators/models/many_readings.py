@@ -97,7 +97,7 @@ class ManyReadings:
             Derivative of the prediction by the error state.
         """
         position, velocity, dcm, rate, bias, calibration = state
-        turning = rate - bias[:, :3] - np.einsum("nji,nj->ni", dcm, earth_rate(position[:, 0]))
+        turning = rate[:, :3] - bias[:, :3] - np.einsum("nji,nj->ni", dcm, earth_rate(position[:, 0]))
         at = {name: slice(k, k + self._size(name)) for name, k in self._places.items()}
         n = len(time)
         blocks = {name: np.broadcast_to(zero, (n, zero.shape[1])) for name, zero in self._zeros.items()}

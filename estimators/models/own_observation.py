@@ -30,6 +30,7 @@ from simnav.plugins import place_of
 from simnav.types import KINDS, NO_SIDE, Array, Datasheet
 
 from .channels import ChannelDatasheet, whole
+from .delayed import acceleration
 from .levered import observation_of
 
 __all__ = ["OwnObservation"]
@@ -107,17 +108,18 @@ class OwnObservation:
             Time of validity [s].
         position, velocity, dcm
             As of `simnav.kinds.NavigationPoint`.
-        rate : (3,) array
-            Output of the gyroscopes [rad/s].
+        rate : (3,) or (6,) array
+            Output of the gyroscopes [rad/s], and where a delay needs it that of the accelerometers [m/s^2].
         bias : (3 or more,) array
-            Their bias first [rad/s].
+            Their biases [rad/s], [m/s^2].
         values : (m,) array
             The states among which those of the blocks are.
         side : (s,) array
             Side information of the reading.
         """
-        turning = rate - bias[:3] - dcm.T @ earth_rate(position[0])
-        return NavigationPoint(time, position, velocity, dcm, turning, self.blocks(values), self.channel, side)
+        turning = rate[:3] - bias[:3] - dcm.T @ earth_rate(position[0])
+        moved = acceleration(position, velocity, dcm, rate[3:] - bias[3:6]) if len(rate) == 6 else None
+        return NavigationPoint(time, position, velocity, dcm, turning, self.blocks(values), self.channel, side, moved)
 
     def blocks(self, values: Array) -> Mapping[str, Array]:
         """The values of the blocks, by name."""
@@ -361,7 +363,7 @@ class OwnObservation:
         rates = point.angular_rate - errors[:, 9:12]
         for k, state in enumerate(zip(positions, velocities, attitudes, rates, strict=True)):
             blocks = self._blocks_at(point, errors[k], offset)
-            there = self.read(NavigationPoint(point.time, *state, blocks, point.channel, point.side))
+            there = self.read(NavigationPoint(point.time, *state, blocks, *point[6:]))
             if there is not None:
                 differences[k] = self.kind.difference(there, reading)
         if bias_at >= 0:

@@ -45,7 +45,7 @@ import contextlib
 from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass
-from math import hypot, isfinite
+from math import hypot, inf, isfinite
 from typing import ClassVar
 
 import numpy as np
@@ -160,6 +160,14 @@ class WindowEstimator(LooksBack, Solver):
         self.weighting, self.isolation = weighting, isolation
         self.window, self.tolerance, self.iterations, self.spacing = window, tolerance, iterations, spacing
         self.every_sample = every_sample
+
+    def longest_lag(self, instruments: Instruments) -> float:
+        """The time that the window holds [s]: an epoch is a step, or the interval of the fastest instrument in use."""
+        model = self._choice.choose(by_channel(instruments), self.label)
+        rates = [sheet.rate for sheet in instruments.values() if model.observes(sheet) and sheet.rate > 0.0]
+        if self.window is None or not rates:
+            return inf
+        return (self.window - 1) * max(instruments.step, 1.0 / max(rates))
 
     def reset(self, start: InitialState, instruments: Instruments) -> None:
         """Begin a run; UnsuitableScenario if the model lacks an instrument."""

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 from simnav.estimator import Estimator, describe, find, make, names, register
+from simnav.estimator.late_arrivals import LATE
 from simnav.estimator.looking_back import LAGS
 from simnav.estimator.lookup import former_names_of
 from simnav.estimator.parameters import former_names, under_present_names
@@ -244,7 +245,7 @@ def _items(given: Estimators) -> list[EstimatorLike]:
 def _known(item: EstimatorLike, parameters: Mapping[str, Any]) -> dict[str, Any]:
     """Those of the parameters that an estimator has."""
     about = describe(request(item).name)
-    known = {p.name for p in about.parameters} | set(former_names(about.cls)) | {LAGS}
+    known = {p.name for p in about.parameters} | set(former_names(about.cls)) | {LAGS, LATE}
     return {k: v for k, v in parameters.items() if k in known}
 
 

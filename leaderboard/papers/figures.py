@@ -305,7 +305,8 @@ class _Sketch:
         panels: dict[str, list[Bar]] = {}
         for label, score in entry.series.items():
             papers = {r.method: r.paper for r in self.paper.rows()
-                      if isinstance(r, Value) and (r.scenario, r.score) == (entry.scenario, score)}  # fmt: skip
+                      if isinstance(r, Value) and r.paper is not None
+                      and (r.scenario, r.score) == (entry.scenario, score)}  # fmt: skip
             panels[label] = []
             for method, runs in self._all(entry):
                 values = [value_of(r, score) for r in runs.good]
@@ -320,7 +321,9 @@ class _Sketch:
             papers = {
                 r.than: r.paper
                 for r in self.paper.rows()
-                if isinstance(r, Gain) and (r.scenario, r.method, r.score) == (entry.scenario, first, score)
+                if isinstance(r, Gain)
+                and r.paper is not None
+                and (r.scenario, r.method, r.score) == (entry.scenario, first, score)
             }
             panels[label] = []
             for method, runs in self._all(entry):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 from simnav.scenario import load
 
@@ -22,7 +23,7 @@ from .paper import (
     Table,
     Value,
 )
-from .settings import PaperSetting, Source
+from .settings import setting_of
 
 __all__ = ["CLAIMS", "PAPER"]
 
@@ -107,10 +108,7 @@ def _position(method: str, paper: float, **how: str | bool) -> Value:
     return Value(_SCENARIO, method, "position_rmse", paper, **{"lower": _DISTURBED, "higher": _DISTURBED, **how})  # type: ignore[arg-type]
 
 
-def _set(what: str, source: Source, printed: str = "", key: str = "", ours: str = "") -> PaperSetting:
-    return PaperSetting(what, source, printed, _SCENARIO if key else "", key, ours)
-
-
+_set = partial(setting_of, _SCENARIO)
 _SETTINGS = (
     _set("length [s]", "printed", "6000 s", "duration_s"),
     _set("rate of the IMU [Hz]", "printed", "100 Hz", "instruments.imu.rate_hz"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 
 from simnav.scenario import Scenario, load
 
@@ -10,7 +11,7 @@ from .claims.claim import Claim, Dial, compared
 from .claims.dials import lag_dial, with_keys
 from .declarations import PHOTOGRAPH, drawings, measured
 from .paper import POSITION, Figure, Gain, Method, NotShown, Paper, Row, Table, Value
-from .settings import PaperSetting, Source
+from .settings import setting_of
 
 __all__ = ["CLAIMS", "PAPER"]
 
@@ -124,10 +125,7 @@ def _drive_with(drive: Scenario, dial: str, value: float) -> Scenario:
     return with_keys(drive, dial, value, walks if dial == "imu" else {"fault[0].factor": value})
 
 
-def _set(what: str, source: Source, printed: str = "", key: str = "", ours: str = "") -> PaperSetting:
-    return PaperSetting(what, source, printed, _SCENARIO if key else "", key, ours)
-
-
+_set = partial(setting_of, _SCENARIO)
 _SETTINGS = (
     _set("simulation: length [s]", "printed", "320 s", "duration_s"),
     _set("simulation: rate of the IMU [Hz]", "printed", "100 Hz", "instruments.imu.rate_hz"),

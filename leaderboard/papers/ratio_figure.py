@@ -8,6 +8,7 @@ the two errors is compared, so that "larger" always means a larger error than th
 from __future__ import annotations
 
 import math
+import textwrap
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -29,6 +30,7 @@ __all__ = ["EDGE", "Ratio", "ratio_figure", "ratios"]
 
 #: The axis ends at this multiple of the paper's figure, and at its inverse.
 EDGE = 4.0
+_WIDEST = 56  # characters of a label in a line
 
 _COLOUR = {"agrees": PALETTE[2][0], "differs": PALETTE[1][0], "undecided": PALETTE[5][0]}
 _MARKER = {"agrees": "o", "differs": "s", "undecided": "D"}
@@ -109,8 +111,10 @@ def ratio_figure(rows: Sequence[Ratio], title: str) -> Figure:
     """
     from matplotlib.ticker import NullFormatter, NullLocator
 
+    labels = [textwrap.fill(r.label, _WIDEST, break_on_hyphens=False) for r in rows]
+    lines = max(label.count("\n") for label in labels) + 1
     with styled():
-        fig = figure(8.4, 1.35 + 0.23 * max(len(rows), 2))
+        fig = figure(8.4, 1.35 + (0.13 + 0.1 * lines) * max(len(rows), 2))
         ax = fig.subplots()
         ax.set_xscale("log")
         ax.set_xlim(1.0 / EDGE / 1.25, EDGE * 1.25)
@@ -118,14 +122,14 @@ def ratio_figure(rows: Sequence[Ratio], title: str) -> Figure:
         for y, row in enumerate(rows):
             _row(ax, y, row)
         ax.axvline(1.0, color=INK, lw=0.9, zorder=0.8)
-        ax.set_yticks(range(len(rows)), [r.label for r in rows])
+        ax.set_yticks(range(len(rows)), labels)
         ticks = (0.25, 0.33, 0.5, 0.67, 0.8, 1.0, 1.25, 1.5, 2.0, 3.0, 4.0)
         ax.set_xticks(ticks, [f"{x:g}" for x in ticks])
         ax.xaxis.set_minor_locator(NullLocator())
         ax.xaxis.set_minor_formatter(NullFormatter())
         ax.grid(visible=False, axis="y")
         ax.set_xlabel("our figure, as a multiple of the paper's")
-        fig.suptitle(title, x=0.01, ha="left", fontsize=9.5, fontweight="bold")
+        fig.suptitle(textwrap.fill(title, 100), x=0.01, ha="left", fontsize=9.5, fontweight="bold")
         _legend(fig, {r.verdict for r in rows})
     return fig
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from importlib import resources
 from typing import Any, Literal
 
-__all__ = ["SOURCES", "PaperSetting", "Source", "value_of_key"]
+__all__ = ["SOURCES", "PaperSetting", "Source", "setting_of", "value_of_key"]
 
 #: Where a setting comes from: the paper's text or tables, one of its figures, or our choice.
 Source = Literal["printed", "read from a figure", "ours"]
@@ -52,6 +52,13 @@ class PaperSetting:
         found = value_of_key(self.scenario, self.key)
         text = ", ".join(f"{v:g}" for v in found) if isinstance(found, list) else f"{found:g}"
         return f"{text} {self.ours}".rstrip()
+
+
+def setting_of(
+    scenario: str, what: str, source: Source, printed: str = "", key: str = "", ours: str = ""
+) -> PaperSetting:  # fmt: skip
+    """A setting of a paper whose keys are all those of one scenario."""
+    return PaperSetting(what, source, printed, scenario if key else "", key, ours)
 
 
 def value_of_key(scenario: str, key: str) -> Any:

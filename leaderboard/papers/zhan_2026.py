@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import replace
+from functools import partial
 
-from simnav.leaderboard.campaign.request import request
 from simnav.scenario import Scenario, load
 
-from .claims.claim import Claim, Setting, compared
-from .claims.dials import choice_dial, scenario_dial
+from .claims.claim import Claim, compared
+from .claims.dials import choice_dial, of_rows, scenario_dial
 from .declarations import DRAWING, PHOTOGRAPH, error_figures, measured
 from .paper import (
     ATTITUDE,
@@ -24,7 +22,7 @@ from .paper import (
     Table,
     Value,
 )
-from .settings import PaperSetting, Source
+from .settings import setting_of
 
 __all__ = ["CLAIMS", "PAPER"]
 
@@ -147,10 +145,7 @@ _ADKF_PRINTED = tuple(f"ADKF as printed, {words}" for words in _SCHEMES)
 _COMPARED = ("KF", *_ADKF)
 
 
-def _set(what: str, source: Source, printed: str = "", key: str = "", ours: str = "") -> PaperSetting:
-    return PaperSetting(what, source, printed, _LAKE if key else "", key, ours)
-
-
+_set = partial(setting_of, _LAKE)
 _SETTINGS = (
     _set("length [s]", "printed", "2400 s", "duration_s"),
     _set("distance and speed [m/s]", "printed", "4011 m in 2400 s, which is 1.67 m/s", "start.speed_m_s"),
@@ -270,26 +265,22 @@ PAPER = Paper(
 )  # fmt: skip
 
 
-def _rows(row: str, than: str) -> Callable[[Setting], Setting]:
-    return lambda setting: replace(setting, row=request(row), than=request(than))
-
-
-def _claim(name: str, axis: str, gain: float) -> Claim:
+def _claim(name: str, what: str, score: str, gain: float) -> Claim:
     segments, printed = "factor=three-segment", "ekf-23:preset=paper"
     whitened, as_printed = (f"adkf-23:{segments},{how}" for how in _ADKF_23.values())
-    sentence = f"the {axis} RMSE of the three-segment ADKF is {100.0 * gain:.1f} % below that of the KF"
+    sentence = f"the {what} RMSE of the three-segment ADKF is {100.0 * gain:.1f} % below that of the KF"
     return Claim(
-        name, PAPER.key, sentence, gain, compared(lambda: load(_LAKE), f"adkf:{segments}", "ekf-23", f"{axis}_rmse"),
+        name, PAPER.key, sentence, gain, compared(lambda: load(_LAKE), f"adkf:{segments}", "ekf-23", score),
         (
             choice_dial(
                 "noise", "the measurement noise of the KF and the statistic of the ADKF",
                 {
-                    "datasheet, whitened": _rows(f"adkf:{segments}", "ekf-23"),
-                    "printed, whitened": _rows(f"adkf:{segments}", printed),
-                    "datasheet, as printed": _rows(f"adkf-paper:{segments}", "ekf-23"),
-                    "printed, as printed": _rows(f"adkf-paper:{segments}", printed),
-                    "printed, whitened, both with 23 states": _rows(whitened, printed),
-                    "printed, as printed, both with 23 states": _rows(as_printed, printed),
+                    "datasheet, whitened": of_rows(f"adkf:{segments}", "ekf-23"),
+                    "printed, whitened": of_rows(f"adkf:{segments}", printed),
+                    "datasheet, as printed": of_rows(f"adkf-paper:{segments}", "ekf-23"),
+                    "printed, as printed": of_rows(f"adkf-paper:{segments}", printed),
+                    "printed, whitened, both with 23 states": of_rows(whitened, printed),
+                    "printed, as printed, both with 23 states": of_rows(as_printed, printed),
                 },
                 ours="datasheet, whitened",
                 why="the paper prints the noise of its KF, and a statistic with mixed units that fires on clean data",
@@ -301,4 +292,7 @@ def _claim(name: str, axis: str, gain: float) -> Claim:
     )  # fmt: skip
 
 
-CLAIMS = (_claim("zhan-east", "east", 0.281), _claim("zhan-north", "north", 0.221))
+CLAIMS = (
+    _claim("zhan-east", "east", "east_rmse", 0.281),
+    _claim("zhan-north", "north", "north_rmse", 0.221),
+)

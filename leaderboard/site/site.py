@@ -50,6 +50,7 @@ from .pages import STATIC, TEMPLATES, environment
 from .print_figures import filled, write_figure
 from .scenario_page import RUNS_SHOWN, ScenarioData, scenario_data, seeds_to_show
 from .sweeps import SweepFile
+from .win_matrix import win_matrix
 
 if TYPE_CHECKING:
     from simnav.leaderboard.ranking.board import Ranking
@@ -309,7 +310,8 @@ class _Site:
         index = {"kind": "index", "tracks": headers}
         self._page("index.html", "index.html", index, tracks=tracks, facts=self._counts())
         rows = {label: {"data": e.data, "page": e.page} for label, e in self.estimators.items()}
-        self._page("compare.html", "compare.html", {"kind": "compare", "rows": rows})
+        compared: dict[str, Any] = {"kind": "compare", "rows": rows, "wins": self._wins()}
+        self._page("compare.html", "compare.html", compared)
         self._page("about.html", "about.html", {"kind": "about"}, glossary=glossary(BOARD_COLUMNS))
         for extra in (*self.facts.papers, *self.facts.editions):
             extra.install(self.folder, self.facts)
@@ -319,6 +321,16 @@ class _Site:
         charts = charts.replace("$APPEARANCE", json.dumps(appearance.for_browser()))
         (self.folder / "charts.js").write_text(charts, encoding="utf-8")
         (self.folder / "vega.js").write_text(bundle(), encoding="utf-8")
+
+    def _wins(self) -> list[dict[str, str]]:
+        """The matrix of wins of each track that has one, in files of their own; what a choice of them shows."""
+        found = []
+        for track in self.ranking.tracks:
+            chart = win_matrix(track, [self.ranking.scenario(s) for s in track.scenarios])
+            if chart is not None:
+                self._data(f"wins-{track.track}", chart.to_dict())
+                found.append({"key": track.track, "title": track.title, "file": f"wins-{track.track}"})
+        return found
 
     def _gathered(self, seeds: Mapping[str, Sequence[int]], worst: Sequence[Result]) -> Gathered:
         """What charts need of the series, each part of a file read once."""

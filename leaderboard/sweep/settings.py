@@ -120,7 +120,7 @@ def _chosen(scenario: Scenario, name: str, values: list[float]) -> tuple[Dial, l
                     + f"; name its key to go beyond: {dial.key}"
                 )
         values = values or _spread(low, high)
-    elif re.search(r"[.\[]", name):
+    elif re.search(r"[._\[]", name):
         if len(set(values)) < 2:
             raise RequestError(f"--dial {name}: give it two values or more, like --dial {name}=1,2,4")
         dial = Dial(name="value", key=name, range=(min(values), max(values)), title=name)

@@ -27,6 +27,7 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from simnav.arrivals import Arrivals
 from simnav.environment.charted import ChartedEnv
 from simnav.environment.stretch import LiveStretch, Stretch, horizontal, pack, rows_of
 from simnav.geometry.rotation import dcm_from_rpy, rotation_vector_from_dcm
@@ -157,6 +158,7 @@ class NavigationEnv(ChartedEnv[Observation, Array]):
         self._row = 0
         self._size = _FIRST_STRETCH
         self._steps = 0  # steps that the source has been advanced by
+        self._arrivals = Arrivals()
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -182,6 +184,7 @@ class NavigationEnv(ChartedEnv[Observation, Array]):
             seed = int(self.np_random.integers(2**63 - 1))
         self._source, note = _open(self.scenario, seed)
         self._stretch, self._runs, self._steps, self._size = None, None, 0, _FIRST_STRETCH
+        self._arrivals = Arrivals()
         start: InitialState = self._source.start
         if self.closed_loop:
             truth = self._source.initial_truth
@@ -252,7 +255,7 @@ class NavigationEnv(ChartedEnv[Observation, Array]):
             block = source.advance(source.duration if self._steps == total else self._steps * source.step)
             if len(block.truth):
                 begin = block.start if self._stretch is None else float(self._stretch.intervals[-1, 1])
-                self._stretch, self._row = pack(block, begin, self._most), 0
+                self._stretch, self._row = pack(self._arrivals.of(block), begin, self._most), 0
                 return True
 
     def _advance(self, runs: SteppedRuns) -> bool:
@@ -353,6 +356,9 @@ def most_samples(scenario: Scenario) -> dict[str, int]:
     most = {name: max(1, math.ceil(rate * step - 1e-6)) for name, rate in rates.items()}
     if scenario.recorded:  # real instruments are late, and then deliver several at once; the IMU is on a grid
         most = {name: k if name == "imu" else 2 * k + 1 for name, k in most.items()}
+    for name, spec in scenario.aids.items():
+        if spec.timing is not None:  # what was delayed by up to the spread, and what was not, may come in one step
+            most[name] = max(most[name], math.ceil(spec.rate * (step + spec.timing.spread)) + 1)
     for name, sheet in instruments.items():
         most[name] *= max(1, len(sheet.channels))
     return most

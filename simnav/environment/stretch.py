@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -185,6 +185,9 @@ class LiveStretch(Stretch):
         for name, entry in self.columns.items():
             if name in streams:
                 stream = streams[name]
+                if stream.has_clock:  # all arrive in this step
+                    order = np.argsort(stream.stamps, kind="stable")
+                    stream = replace(stream.rows(order), time=stream.stamps[order])
                 slots = _slots(stream, np.array([0, len(stream)]), entry["time"].shape[1], [self.intervals[i, 1]])[1]
                 entry["time"][i, slots], entry["valid"][i, slots] = stream.time, 1
                 entry["value"][i, slots] = stream.value
@@ -247,11 +250,12 @@ def pack(block: Block, begin: float, most: Mapping[str, int]) -> Stretch:
     edges = truth.time + 0.5e-6  # as `simnav.recording.packets`
     columns: dict[str, dict[str, NDArray[Any]]] = {}
     cuts: dict[str, NDArray[np.intp]] = {}
-    parts: dict[str, tuple[Array, dict[str, Array]]] = {}
+    parts: dict[str, tuple[NDArray[np.intp], dict[str, Array]]] = {}
+    aids = dict(block.aids)
     if block.imu is not None:
         imu = block.imu
         parts["imu"] = (
-            imu.time,
+            np.searchsorted(imu.time, edges, side="right"),
             {
                 "time": imu.time,
                 "length": imu.interval,
@@ -260,13 +264,16 @@ def pack(block: Block, begin: float, most: Mapping[str, int]) -> Stretch:
             },
         )
     for name, s in block.aids.items():
-        parts[name] = s.time, {"time": s.time, "value": s.value}
+        order, step = s.delivered(edges)
+        if s.has_clock:
+            aids[name] = s = replace(s.rows(order), time=s.stamps[order])
+        parts[name] = np.searchsorted(step, np.arange(n), side="right"), {"time": s.time, "value": s.value}
         if s.side.shape[1]:
             parts[name][1]["side"] = s.side
-    for name, (time, arrays) in parts.items():
-        cuts[name] = cut = np.concatenate(([0], np.searchsorted(time, edges, side="right")))
+    for name, (last, arrays) in parts.items():
+        cuts[name] = cut = np.concatenate(([0], last))
         counts, k = np.diff(cut), most[name]
-        stream = block.aids.get(name)
+        stream = aids.get(name)
         if (counts == k).all():  # the usual case needs no copy
             columns[name] = {key: a[: n * k].reshape(n, k, *a.shape[1:]) for key, a in arrays.items()}
             columns[name]["valid"] = np.ones((n, k), np.int8)
@@ -278,14 +285,14 @@ def pack(block: Block, begin: float, most: Mapping[str, int]) -> Stretch:
         else:
             row = np.repeat(np.arange(n), counts)
             where = row, np.arange(cut[-1]) - cut[row]
-        arrays["valid"] = np.ones(len(time), np.int8)
+        arrays["valid"] = np.ones(len(arrays["time"]), np.int8)
         columns[name] = {}
         for key, a in arrays.items():
             columns[name][key] = out = np.zeros((n, k, *a.shape[1:]), a.dtype)
             out[where] = a[: cut[-1]]
     intervals = np.stack([np.concatenate(([begin], truth.time[:-1])), truth.time], axis=1)
     states = np.stack([truth.position, truth.velocity, truth.attitude], axis=1)
-    return Stretch(intervals, columns, states, rows_of(truth.position, truth.attitude), block.aids, cuts)
+    return Stretch(intervals, columns, states, rows_of(truth.position, truth.attitude), aids, cuts)
 
 
 @kernel("void(f8[:, :], f8[:, :], f8[:, ::1])")

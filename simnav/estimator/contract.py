@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -123,6 +124,16 @@ class Estimator(ABC):
             If a lag is longer than the estimator can look back; one sentence.
         """
         return None
+
+    def longest_lag(self, instruments: Instruments) -> float:
+        """Return the longest lag that `earlier` can answer [s], so that a longer one is refused before a run.
+
+        Parameters
+        ----------
+        instruments : Instruments
+            Those of the run.
+        """
+        return math.inf
 
     def reveal(self, recording: Recording) -> None:  # noqa: B027 (a hook: most estimators are told nothing)
         """Receive the recording with truth and labels, before `reset`. Only ``reference`` estimators get it."""

@@ -106,19 +106,29 @@ class LookingBack(Estimator):
         """What the estimator learned from."""
         return self.inner.learned_from
 
-    def reset(self, start: InitialState, instruments: Instruments) -> None:
-        """Start a run.
+    def require(self, instruments: Instruments) -> None:
+        """Refuse lags that a run with these instruments cannot have.
 
         Raises
         ------
         ValueError
-            If a lag is no multiple of the step; one sentence.
+            If a lag is no multiple of the step, or longer than the estimator can look back; one sentence.
         """
         step = instruments.step
-        self._steps = [round(lag / step) for lag in self.lags]
-        for lag, count in zip(self.lags, self._steps, strict=True):
-            if not math.isclose(lag, count * step, abs_tol=_TOLERANCE):
+        for lag in self.lags:
+            if not math.isclose(lag, round(lag / step) * step, abs_tol=_TOLERANCE):
                 raise ValueError(f"a lag of {lag:g} s is no multiple of the step of {step:g} s")
+        reach = self.inner.longest_lag(instruments)
+        if self.lags[-1] > reach + _TOLERANCE:
+            raise ValueError(
+                f"a lag of {self.lags[-1]:g} s is longer than the window, which holds the last {reach:g} s: "
+                "set 'window' to more epochs"
+            )
+
+    def reset(self, start: InitialState, instruments: Instruments) -> None:
+        """Start a run; ValueError as of `require`."""
+        self.require(instruments)
+        self._steps = [round(lag / instruments.step) for lag in self.lags]
         self._given: deque[Array] = deque(maxlen=max(self._steps) + 1)
         self._names = [f"{PREFIX}{lag_text(lag)}" for lag in self.lags]
         self.inner.reset(start, instruments)

@@ -14,6 +14,7 @@ from typing import Any
 
 from simnav.estimator.contract import Estimator, EstimatorError
 from simnav.estimator.files import class_in_file
+from simnav.estimator.late_arrivals import LATE, manner_of
 from simnav.estimator.looking_back import LAGS, LookingBack, lags_of
 from simnav.estimator.parameters import (
     Parameter,
@@ -134,7 +135,8 @@ def make(name_or_path: str, **parameters: Any) -> Estimator:
     **parameters
         Of its constructor; former names are read, too (`Estimator.formerly`). A string is converted to what the
         annotation, or else the default, asks for: numbers, ``true``/``false``, ``none``, a choice, or several values
-        parted by commas. Every estimator also takes ``lags`` (`simnav.estimator.looking_back`).
+        parted by commas. Every estimator also takes ``lags`` (`simnav.estimator.looking_back`), and every row ``late``
+        (`simnav.estimator.late_arrivals`).
 
     Raises
     ------
@@ -146,6 +148,12 @@ def make(name_or_path: str, **parameters: Any) -> Estimator:
     if LAGS in parameters and LAGS not in known:
         lags = lags_of(parameters[LAGS])
         return LookingBack(make(name_or_path, **{k: v for k, v in parameters.items() if k != LAGS}), lags)
+    if LATE in parameters and LATE not in known:
+        made = make(name_or_path, **{k: v for k, v in parameters.items() if k != LATE})
+        if not hasattr(made, LATE):
+            raise EstimatorError(f"estimator {cls.name!r} is not composed of pieces; it has no parameter {LATE!r}")
+        setattr(made, LATE, manner_of(parameters[LATE]))
+        return made
     hints: dict[str, Any] = {}
     constructors = constructors_of(cls)
     for constructor in reversed(constructors):

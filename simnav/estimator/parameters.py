@@ -10,6 +10,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from simnav.estimator.contract import Estimator, EstimatorError
 
 __all__ = [
@@ -117,6 +119,8 @@ _TRUE, _FALSE, _NONE = ("true", "yes", "on", "1"), ("false", "no", "off", "0"), 
 
 def converted(value: Any, hint: Any, default: Any, what: str) -> Any:
     """Convert a parameter's value to the type of its annotation, or else of its default."""
+    if isinstance(value, (float, np.floating)):
+        return _whole(value, hint, default, what)
     if not isinstance(value, str):
         return value
     if hint is None or hint is Any:
@@ -127,6 +131,16 @@ def converted(value: Any, hint: Any, default: Any, what: str) -> Any:
                 return value
         hint = type(default)
     return _as(value, hint, default, what)
+
+
+def _whole(value: Any, hint: Any, default: Any, what: str) -> Any:
+    """A number as a whole one, where that is meant; EstimatorError if it is none."""
+    kinds = typing.get_args(hint) or (type(default) if hint is None or hint is Any else hint,)
+    if int not in kinds or float in kinds:
+        return value
+    if not value.is_integer():
+        raise EstimatorError(f"{what} is a whole number, not {value:g}")
+    return int(value)
 
 
 def _as(text: str, hint: Any, default: Any, what: str) -> Any:

@@ -280,8 +280,7 @@ def _cut(s: AidStream, begin: float, until: float) -> AidStream:
     edges = [begin + _TOLERANCE, until + _TOLERANCE]
     a, b = np.searchsorted(s.time, edges, side="right")
     c, d = np.searchsorted(s.dropped, edges, side="right")
-    parts: dict[str, Any] = {n: getattr(s, n)[a:b] for n in ("time", "value", "faults", "fault_error", "sigma")}
-    return replace(s, **parts, dropped=s.dropped[c:d])
+    return replace(s.rows(slice(a, b)), dropped=s.dropped[c:d])
 
 
 def _reference(log: RecordedSpec, recording: str, imu: ImuSeries | None) -> Reference:

@@ -154,6 +154,8 @@ def _is_reference(value: Any) -> bool:
 
 
 _KINDS_SET = frozenset(_KINDS)
+#: Table of an instrument that few files have; a path may begin it.
+_FACTORS = "times_datasheet"
 _DROPPED = object()
 
 
@@ -391,7 +393,7 @@ def with_values(table: Mapping[str, Any], values: Mapping[str, Any], source: str
         Table as `tomllib` returns it; it may have distributions.
     values : mapping
         The new values in the units of their keys, by key path, like ``fault[0].sigma_m`` or ``draw.length``. The last
-        part of a path may be a new key; the parts before it must exist.
+        part of a path may be a new key; the parts before it must exist, except ``times_datasheet``.
     source : str
         Name of the file, for error messages.
 
@@ -416,11 +418,11 @@ def with_values(table: Mapping[str, Any], values: Mapping[str, Any], source: str
                     place[int(part)] = value
                 else:
                     place = place[int(part)]
-            elif isinstance(place, dict) and not part.isdigit() and (last or part in place):
+            elif isinstance(place, dict) and not part.isdigit() and (last or part in place or part == _FACTORS):
                 if last:
                     place[part] = value
                 else:
-                    place = place[part]
+                    place = place.setdefault(part, {})
             else:
                 near = closest(part, [str(k) for k in place]) if isinstance(place, dict) else ""
                 raise SpecError(f"{source}: there is no key {path!r}, for there is no {part!r} in it{near}")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from simnav.recording import Recording
@@ -40,6 +42,10 @@ def detection(trial: Trial, recording: Recording) -> dict[str, float]:
     end = float(trial.time[-1]) + _TOLERANCE
     faulty = detected = clean = alarms = 0
     for name, stream in recording.data.aids.items():
+        if stream.has_clock:  # what is flagged is named by its stamp
+            stream = stream.rows(stream.arrivals <= end)
+            stream = stream.rows(np.argsort(stream.stamps, kind="stable"))
+            stream = replace(stream, time=stream.stamps)
         n = int(np.searchsorted(stream.time, end, side="right"))
         time, touched = stream.time[:n], stream.faults[:n] != 0
         flagged = np.zeros(n, dtype=bool)

@@ -46,7 +46,8 @@ from simnav.sensors.figures import (
     times_datasheet,
 )  # fmt: skip
 from simnav.sensors.processes import GaussMarkov
-from simnav.sensors.rows import checked_rows
+from simnav.sensors.rows import checked_reading, checked_rows
+from simnav.sensors.timing import TimingSpec
 from simnav.sensors.turning import turn_to_body, turn_to_ned
 from simnav.spec import (
     UNITS,
@@ -104,7 +105,8 @@ class AidSpec(Spec):
         "sigma", "bias", "bias_instability", "scale", "misalignment", "lever_arm_sigma",
     )  # fmt: skip
     unstated: ClassVar[tuple[str, ...]] = ()
-    later: ClassVar[Mapping[str, Any]] = {"processes": (), "lever_arm_sigma": ZERO}  # see `simnav.spec.without_later`
+    #: See `simnav.spec.without_later`.
+    later: ClassVar[Mapping[str, Any]] = {"processes": (), "lever_arm_sigma": ZERO, "timing": None}
 
     kind: str
     rate: Positive = quantity("hz", 1.0)
@@ -114,11 +116,18 @@ class AidSpec(Spec):
         {}, description="figures that really are so many times what the datasheet says, like `sigma = 2.5`"
     )
     processes: tuple[AnyErrorProcess, ...] = entries("error", (), description="further processes of the error")
+    timing: TimingSpec | None = Field(None, description="time stamps and latency; without it both are perfect")
 
     @model_validator(mode="after")
     def _correlated(self) -> Self:
         if np.any(np.asarray(self.figure("bias_instability"))) and "correlation_time" not in self.model_fields_set:
             raise ValueError("bias_instability needs a correlation_time_s (inf for a random walk)")
+        return self
+
+    @model_validator(mode="after")
+    def _fitting_clock(self) -> Self:
+        if self.timing is not None:
+            self.timing.check(self.rate)
         return self
 
     def figure(self, name: str) -> Any:
@@ -140,7 +149,7 @@ class AidSpec(Spec):
             if name.removeprefix("fixed_") in names:
                 value = getattr(self, name)
                 changes[name] = (0.0,) * len(value) if isinstance(value, tuple) else 0.0
-        return self.model_copy(update={**changes, "processes": ()})
+        return self.model_copy(update={**changes, "processes": (), "timing": None})
 
     @model_serializer(mode="wrap")
     def _without_later(self, serialize: SerializerFunctionWrapHandler) -> dict[str, Any]:
@@ -249,6 +258,7 @@ class AidSpec(Spec):
             self.blocks(),
             self.channels(),
             declared_processes(self.processes, definition),
+            None if self.timing is None else self.timing.sheet(),
         )
 
     def build(self, name: str, seed: int) -> Instrument:
@@ -547,7 +557,7 @@ class Instrument(ABC):
             If `observe`, `noise_sigma` or `available` raises, or returns an array of another shape than it should, or a
             number that is not finite or a negative sigma for a sample that is delivered.
         """
-        value, sigma, there = _checked_reading(self, tap)
+        value, sigma, there = checked_reading(self, tap)
         error, variates = self.ahead(tap.time)
         if self._noise is not None:
             error += sigma * variates
@@ -565,36 +575,3 @@ class Instrument(ABC):
         return AidStream(
             self.name, self.kind, time, value, np.zeros(n, np.uint32), np.zeros(value.shape), sigma, dropped
         )
-
-
-def _checked_reading(instrument: Instrument, tap: TapStates) -> tuple[Array, Array, NDArray[np.bool_] | None]:
-    """The checked reading. A mistake in it is an error of the instrument, not of the estimator that receives it."""
-    label = partial(label_of, instrument.name, instrument.kind, type(instrument))
-    try:
-        value, sigma, there = instrument.reading(tap)
-        value = checked_rows(instrument, "observe()", value, tap)
-        sigma = checked_rows(instrument, "noise_sigma()", sigma, tap)
-        there = None if there is None else np.asarray(there)
-    except (InstrumentError, MemoryError):
-        raise
-    except Exception as error:
-        raise raised(label(), type(instrument), error) from error
-    n = len(tap.time)
-    if there is not None and (there.shape != (n,) or there.dtype != np.bool_):
-        raise InstrumentError(
-            f"{label()}: available() returned an array of {there.dtype} of shape {there.shape}, where one of bool of "
-            f"shape {(n,)} is wanted: an entry for each of {n} times"
-        )
-    for method, array, wanted, right in (
-        ("observe()", value, np.isfinite(value), "finite; where nothing is delivered, available() says so"),
-        ("noise_sigma()", sigma, np.isfinite(sigma) & (sigma >= 0.0), "finite and not negative"),
-    ):
-        wrong = ~wanted.all(axis=1) if there is None else there & ~wanted.all(axis=1)
-        if wrong.any():  # the reference of a log may have holes
-            wrong &= np.isfinite(np.hstack([tap.position, tap.velocity, tap.attitude])).all(axis=1)
-        if wrong.any():
-            row = int(np.argmax(wrong))
-            raise InstrumentError(
-                f"{label()}: {method} returned {array[row].tolist()} at {tap.time[row]:g} s; it should be {right}"
-            )
-    return value, sigma, there

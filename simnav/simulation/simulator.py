@@ -16,6 +16,7 @@ from simnav.recording import AidStream, Block, ImuLabels, Recording
 from simnav.scenario import Scenario
 from simnav.sensors import DerivedInstrument
 from simnav.sensors.faults import build_layers, labels
+from simnav.sensors.timing import Clock
 from simnav.spec import SpecError
 from simnav.types import Array, InitialState, NavigationStates
 from simnav.world import Steered, Surroundings, Trajectory, WorldBlock
@@ -99,6 +100,8 @@ class Simulator:
         Empty. For a log it is the name of the recording.
     imu, aids, layers : Imu or None, dict of str to Instrument, tuple of FaultLayer
         The IMU, the aiding instruments by name, and the faults.
+    clocks : dict of str to Clock
+        The clocks of the instruments that have the table, by name.
     surroundings : Surroundings
         Sea, current, bottom and other parts of this run.
 
@@ -127,6 +130,7 @@ class Simulator:
         actual = scenario.actual()
         self.imu = None if actual.imu is None else actual.imu.build(root)
         self.aids = {name: spec.install(name, root, self.surroundings) for name, spec in actual.aids.items()}
+        self.clocks = {n: Clock(spec.timing, n, root) for n, spec in actual.aids.items() if spec.timing is not None}
         kinds = {name: spec.kind for name, spec in scenario.aids.items()}
         self.faults = labels(scenario.faults, scenario.duration, kinds)
         self.layers = build_layers(scenario.faults, root)
@@ -187,6 +191,8 @@ class Simulator:
             for layer in self.layers:
                 stream = layer.laid_over(stream)
             aids[name] = stream
+        for name, clock in self.clocks.items():
+            aids[name] = clock.stamp(aids[name], block.taps[name].time)
         return Block(start, until, imu, imu_labels, {name: aids[name] for name in self.aids}, block.taps[_STEPS])
 
     def _taps(self, start: float, until: float) -> dict[str, Array]:

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from simnav.arrivals import Arrivals
 from simnav.recording import AidStream, packets
 from simnav.sensors.faults.layer import DISTURBS_IMU, STEPS_NOISE, FaultLayer
 from simnav.sensors.observation import CompiledInstrument
@@ -42,7 +43,7 @@ class SteppedRuns:
     ----------
     simulators : list of Simulator
         The simulator of each run; its vessel may be steered if it can.
-    x : (n, 71) array
+    x : (n, 79) array
         States of the worlds (`simnav.world.motion`), for runs whose trajectory is a `simnav.world.World`.
     step : (n,) int array
         Number of steps of each run so far.
@@ -67,6 +68,7 @@ class SteppedRuns:
         # The last step of runs that have only the block form.
         self._packets: list[Measurements | None] = [None] * n
         self._streams: list[dict[str, AidStream]] = [{} for _ in range(n)]
+        self._arrivals = [Arrivals() for _ in range(n)]
         self._compiled, self._stretch = np.zeros(n, np.bool_), np.zeros(n, np.int64)
         self._at, self._end = np.zeros(n, np.int64), np.zeros(n, np.int64)  # within the stretch, and its steps
         self._imu = np.zeros(n, np.bool_)
@@ -86,6 +88,7 @@ class SteppedRuns:
         self.simulators[b] = simulator
         self.step[b] = self._at[b] = self._end[b] = self.count[b] = self.samples[b] = 0
         self._stretch[b], self._packets[b], self._streams[b] = FIRST_STRETCH, None, {}
+        self._arrivals[b] = Arrivals()
         aids = simulator.aids
         self.names[b], self.kinds[b] = list(aids), [a.kind for a in aids.values()]
         layers = [layer for layer in simulator.layers if layer.operation != DISTURBS_IMU]
@@ -96,6 +99,7 @@ class SteppedRuns:
             and all(isinstance(a, CompiledInstrument) and a.in_kernel and a.total is None for a in aids.values())
             and all(layer.operation is not None for layer in simulator.layers)
             and (simulator.imu is None or simulator.imu.effects is None)
+            and not simulator.clocks
         )
         self._compiled[b] = known
         state = simulator.initial_truth
@@ -324,6 +328,7 @@ class SteppedRuns:
         self.step[b] = k
         truth = block.truth
         self.truth[b] = np.concatenate([truth.position[-1], truth.velocity[-1], truth.attitude[-1]])
+        block = self._arrivals[b].of(block)
         (packet,) = packets(block, truth.time)
         self._packets[b] = Measurements(*self.interval_of(b), packet.imu, packet.aids)
         self._streams[b] = block.aids
@@ -339,7 +344,10 @@ class SteppedRuns:
         self.count[b] = n = len(packet.aids)
         self._room(n)
         value, faults = np.zeros((n, 3)), np.zeros(n, np.uint32)
-        rows = {name: iter(stream.faults.tolist()) for name, stream in block.aids.items()}
+        rows = {}
+        for name, stream in block.aids.items():
+            order, _ = stream.delivered(truth.time + TIME_TOLERANCE)
+            rows[name] = iter(stream.faults[order].tolist())
         for j, m in enumerate(packet.aids):  # it has all rows of the block, those of a stream in their order
             value[j, : len(m.value)] = m.value
             faults[j] = next(rows[m.instrument])

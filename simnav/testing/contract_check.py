@@ -21,10 +21,9 @@ from itertools import islice
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from simnav.estimator import Estimator, make
-from simnav.recording import AidStream, Block, Recording
+from simnav.recording import Block, Recording
 from simnav.trial import Trial, run_trial
 from simnav.types import KINDS, Estimate, ImuSamples, Instruments, NavigationStates
 
@@ -536,16 +535,11 @@ def _altered(recording: Recording, after: float) -> Recording:
         )
     aids = {}
     for name, stream in data.aids.items():
-        late = stream.time > after + 1e-6
+        late = stream.arrivals > after + 1e-6
         small = 1e-6 if KINDS[stream.kind].geodetic else 0.1
         changed = replace(stream, value=np.where(late[:, None], stream.value + small, stream.value))
-        aids[name] = _rows(changed, ~late | (np.arange(len(late)) % 3 > 0))
+        aids[name] = changed.rows(~late | (np.arange(len(late)) % 3 > 0))
     return replace(recording, data=replace(data, imu=imu, aids=aids))
-
-
-def _rows(stream: AidStream, keep: NDArray[np.bool_]) -> AidStream:
-    columns = ("time", "value", "faults", "fault_error", "sigma", *(("channel", "side") if stream.channels else ()))
-    return replace(stream, **{c: getattr(stream, c)[keep] for c in columns})
 
 
 def _until(recording: Recording, end: float) -> Recording:
@@ -560,7 +554,7 @@ def _silenced(recording: Recording, after: float, imu: bool) -> Recording:
     samples = data.imu
     if samples is not None and not imu:
         samples = samples[: int(np.searchsorted(samples.time, after + 1e-6))]
-    aids = {n: _rows(s, s.time <= after + 1e-6) for n, s in data.aids.items()}
+    aids = {n: s.rows(s.arrivals <= after + 1e-6) for n, s in data.aids.items()}
     return replace(recording, data=replace(data, imu=samples, aids=aids))
 
 

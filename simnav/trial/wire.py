@@ -96,8 +96,9 @@ class PacketEncoder:
         self._start = float(data.start)
         # Times are multiples of the sample interval up to rounding: half a microsecond decides.
         edges = np.asarray(ends) + 0.5e-6
-        times = np.concatenate([s.time for s in streams]) if streams else np.empty(0)
-        order = np.argsort(times, kind="stable")  # ties keep the scenario's order of instruments
+        times = np.concatenate([s.stamps for s in streams]) if streams else np.empty(0)
+        step = np.concatenate([np.searchsorted(edges, s.arrivals) for s in streams] or [np.empty(0, np.intp)])
+        order = np.lexsort((times, step))  # stable: ties keep the scenario's order of instruments
         widths = np.concatenate([np.full(len(n), 2 + n.shape[1]) for n in numbers]) if streams else order
         first = np.zeros(len(times) + 1, dtype=np.intp)  # where each measurement begins, in order of time
         np.cumsum(widths[order], out=first[1:])
@@ -108,9 +109,9 @@ class PacketEncoder:
         for number, (s, own) in enumerate(zip(streams, numbers, strict=True)):
             at = place[begin : begin + len(s)]
             begin += len(s)
-            self._aids[at], self._aids[at + 1] = number, s.time
+            self._aids[at], self._aids[at + 1] = number, s.stamps
             self._aids[at[:, None] + np.arange(2, 2 + own.shape[1])] = own
-        cut = np.searchsorted(times[order], edges, side="right")
+        cut = np.searchsorted(step[order], np.arange(len(edges)), side="right")
         self._counts = [int(c) for c in np.diff(cut, prepend=0)]
         self._edges = [int(first[c]) for c in cut]
         self._imu: tuple[Array, ...] | None = None

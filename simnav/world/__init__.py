@@ -20,6 +20,13 @@ from simnav.world.manoeuvres import (
     Waypoints,
     ZigZag,
 )
+from simnav.world.manoeuvring.auv import Auv
+from simnav.world.manoeuvring.ferry import Ferry
+from simnav.world.manoeuvring.hull import Hull, Superstructure
+from simnav.world.manoeuvring.surface_drone import SurfaceDrone
+from simnav.world.manoeuvring.survey_ship import SurveyShip
+from simnav.world.manoeuvring.vessel import ManoeuvringVessel
+from simnav.world.manoeuvring.workboat import Workboat
 from simnav.world.obstacles import Obstacle, Obstacles
 from simnav.world.sea import Sea
 from simnav.world.start import Start
@@ -32,7 +39,9 @@ from simnav.world.surroundings import (
 )
 from simnav.world.trajectory import SampledTrajectory, Steered, Trajectory, Voyage, WorldBlock
 from simnav.world.vessel import VESSELS, KinematicVessel, Vessel, register_vessel
+from simnav.world.water_column import WaterColumn
 from simnav.world.water_level import WaterLevel
+from simnav.world.wind import AirFlow, Wind
 from simnav.world.world import World
 
 #: Any registered vessel; its ``kind`` decides the class.
@@ -44,19 +53,24 @@ __all__ = [
     "SURROUNDINGS",
     "VESSELS",
     "Accelerate",
+    "AirFlow",
     "AnySurrounding",
     "AnyVessel",
+    "Auv",
     "Current",
     "Dive",
+    "Ferry",
     "FlatBottom",
     "GivenTrack",
     "GivenVessel",
     "GivenWaypoints",
     "Hold",
+    "Hull",
     "KinematicVessel",
     "LawnMower",
     "Limits",
     "Manoeuvre",
+    "ManoeuvringVessel",
     "Obstacle",
     "Obstacles",
     "Poses",
@@ -65,16 +79,22 @@ __all__ = [
     "Ship",
     "Start",
     "Steered",
+    "Superstructure",
     "Surface",
+    "SurfaceDrone",
     "SurroundingSpec",
     "Surroundings",
+    "SurveyShip",
     "Trajectory",
     "Turn",
     "Uuv",
     "Vessel",
     "Voyage",
+    "WaterColumn",
     "WaterLevel",
     "Waypoints",
+    "Wind",
+    "Workboat",
     "World",
     "WorldBlock",
     "ZigZag",

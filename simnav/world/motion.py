@@ -17,9 +17,21 @@ from simnav.declared_process import oscillation
 from simnav.geometry.rotation import wrap_scalar
 from simnav.strapdown import sample_from_motion
 from simnav.world.manoeuvres import ACCELERATE, COLUMNS, DEPTH, HOLD, TURN, WAYPOINTS, ZIGZAG
+from simnav.world.manoeuvring.dynamics import HULL, RATE, RATE_CHANGE, SAIL, SPEED, SPEED_CHANGE, SWAY, sail
 from simnav.world.sea import ROWS, YAW
 
-__all__ = ["DIVE", "PARAMETERS", "STATE", "TAP_COLUMNS", "advance", "command", "initialise"]
+__all__ = [
+    "DIVE",
+    "HAS_HULL",
+    "HULL_NUMBERS",
+    "HULL_STATE",
+    "PARAMETERS",
+    "STATE",
+    "TAP_COLUMNS",
+    "advance",
+    "command",
+    "initialise",
+]
 
 # Indices in the state vector.
 U, DU, R, DR, PSI, GAMMA, DGAMMA, DEPTH_CALM, NORTH, EAST = range(10)
@@ -41,7 +53,9 @@ ERROR_HEADING, TO_TRACK, TURNED = 56, 57, 58
 #: it (`simnav.world.sea.steady`); without them all are zero.
 ANSWERS = 59
 YAW_ANSWER = ANSWERS + 9
-STATE = 71
+#: State of a hull with three degrees of freedom.
+HULL_STATE = 71
+STATE = HULL_STATE + SAIL
 #: Where the state holds the depth that is steered for, and the largest path angle.
 DIVE = np.array([DEPTH_REFERENCE, GAMMA_LIMIT])
 # ... in the integer state: sample, segment, waypoint, whether the segment has begun
@@ -49,7 +63,9 @@ DIVE = np.array([DEPTH_REFERENCE, GAMMA_LIMIT])
 DT, TAU_U, TAU_R, TAU_G, TURN_RATE, HEEL, DIVES, CURRENT_N, CURRENT_E, SHEAR, ATTENUATION = range(11)
 #: Natural angular frequency and damping ratio of these oscillators; zero: there are none.
 OSCILLATORS = 11
-PARAMETERS = 19
+#: Whether there is a hull with three degrees of freedom, and its numbers.
+HAS_HULL, HULL_NUMBERS = 19, 20
+PARAMETERS = HULL_NUMBERS + HULL
 #: Columns of a tap: position 0:3, velocity 3:6, roll, pitch, yaw 6:9, angular rate 9:12, current north, east 12:14.
 TAP_COLUMNS = 14
 #: Rows of the phases of waves, and columns of an eddy.
@@ -311,6 +327,27 @@ def _water(x: Array, p: Array, eddies: Array, time: float) -> None:
     x[WATER_NORTH], x[WATER_EAST] = north, east
 
 
+@kernel()
+def _sail(x: Array, p: Array, rate_command: float, time: float, decay: tuple[float, float]) -> None:
+    """Advance speed, sway, yaw rate and heading of a hull with three degrees of freedom by one sample."""
+    dt, h = p[DT], x[HULL_STATE:STATE]
+    h[SPEED], h[SPEED_CHANGE] = _lag(h[SPEED], h[SPEED_CHANGE], x[SPEED_COMMAND], dt, p[TAU_U], decay[0])
+    h[RATE], h[RATE_CHANGE] = _lag(h[RATE], h[RATE_CHANGE], rate_command, dt, p[TAU_R], decay[1])
+    flow = max(0.0, 1.0 - p[SHEAR] * max(0.0, x[DEPTH_CALM]))
+    x[U], x[DU], x[R], x[DR], x[PSI] = sail(
+        p[HULL_NUMBERS:PARAMETERS], h, (x[U], x[R], x[PSI]), (p[TAU_U], p[TAU_R]),
+        (flow * x[WATER_NORTH], flow * x[WATER_EAST]), time, dt,
+    )  # fmt: skip
+
+
+@kernel()
+def _drifted(x: Array, composed: Composed) -> Composed:
+    """The same with the sway velocity."""
+    v, c, roll, pitch = composed
+    sway = x[HULL_STATE + SWAY]
+    return (v[0] - sway * x[SIN_PSI], v[1] + sway * x[COS_PSI], v[2]), c, roll, pitch
+
+
 @kernel("void(f8[::1], f8[::1], f8[:, ::1], f8[:, ::1], f8[:, ::1])")
 def initialise(x: Array, p: Array, phase: Array, table: Array, eddies: Array) -> None:
     """Complete the state at time 0: velocity and attitude with the waves and the current of that time."""
@@ -347,11 +384,14 @@ def _advance_one(
         rate_command = _guide(x, index, p, rows, points, t0)
         step = x[SPEED_SLEW] * dt
         x[SPEED_COMMAND] = min(max(x[SPEED_TARGET], x[SPEED_COMMAND] - step), x[SPEED_COMMAND] + step)
-        x[U], x[DU] = _lag(x[U], x[DU], x[SPEED_COMMAND], dt, p[TAU_U], decay_u)
-        r, dr = x[R], x[DR]
-        x[R], x[DR] = _lag(r, dr, rate_command, dt, p[TAU_R], decay_r)
-        # Hermite's rule: of fourth order, and as smooth as the rate
-        x[PSI] += 0.5 * dt * (r + x[R]) + dt * dt / 12.0 * (dr - x[DR])
+        if p[HAS_HULL] > 0.0:
+            _sail(x, p, rate_command, t0, (decay_u, decay_r))
+        else:
+            x[U], x[DU] = _lag(x[U], x[DU], x[SPEED_COMMAND], dt, p[TAU_U], decay_u)
+            r, dr = x[R], x[DR]
+            x[R], x[DR] = _lag(r, dr, rate_command, dt, p[TAU_R], decay_r)
+            # Hermite's rule: of fourth order, and as smooth as the rate
+            x[PSI] += 0.5 * dt * (r + x[R]) + dt * dt / 12.0 * (dr - x[DR])
         if p[DIVES] > 0.0:
             climb = (x[DEPTH_CALM] - x[DEPTH_REFERENCE]) / (max(x[U], 0.3) * 5.0 * p[TAU_G])
             climb = min(max(climb, -x[GAMMA_LIMIT]), x[GAMMA_LIMIT])
@@ -362,11 +402,17 @@ def _advance_one(
         # Waves, with the encounter frequency of the speed through the water
         x[COS_PSI], x[SIN_PSI] = cos(x[PSI]), sin(x[PSI])
         ahead = x[U] * x[COS_GAMMA]
-        waves = _waves(phase, table, ahead * x[COS_PSI], ahead * x[SIN_PSI], dt)
+        through_north, through_east = ahead * x[COS_PSI], ahead * x[SIN_PSI]
+        if p[HAS_HULL] > 0.0:
+            through_north -= x[HULL_STATE + SWAY] * x[SIN_PSI]
+            through_east += x[HULL_STATE + SWAY] * x[COS_PSI]
+        waves = _waves(phase, table, through_north, through_east, dt)
         if p[OSCILLATORS] > 0.0:
             waves = _answer(x, p, waves, phase, table, dt)
         _water(x, p, eddies, t1)
         composed = _compose(x, p, waves)
+        if p[HAS_HULL] > 0.0:
+            composed = _drifted(x, composed)
         v, c, roll, pitch = composed
         # Ideal instruments
         u = (x[V], x[V + 1], x[V + 2])
@@ -410,10 +456,10 @@ def advance(
     ----------
     active : (w,) bool array
         True for each world that is advanced.
-    state : (w, 71) and (w, 4) int arrays
+    state : (w, 79) and (w, 4) int arrays
         The state vector, and the integer state: sample, segment, waypoint, and 1 if the segment has begun. Both are
         updated.
-    p : (w, 19) array
+    p : (w, 161) array
         Constants of the vessel, the water and the step, at the indices that this module names.
     sizes : (w, 4) int array
         Number of manoeuvres, points, waves and eddies of each world.
@@ -484,7 +530,7 @@ def command(active: Flags, x: Array, wrong: Array, heading: Array, speed: Array)
     ----------
     active : (w,) bool array
         True for each world that gets a command.
-    x : (w, 71) array
+    x : (w, 79) array
         State vectors; updated.
     wrong : (w,) array
         Error of the estimated heading by which the vessel is steered [rad]; NaN: as before.

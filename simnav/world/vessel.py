@@ -15,6 +15,7 @@ from pydantic import Field
 from simnav.plugins import Registry, declared_in, registered_kind, with_named_errors
 from simnav.spec import NonNegative, Positive, Spec, SpecError, quantity
 from simnav.world.manoeuvres import Manoeuvre
+from simnav.world.manoeuvring.hull import Hull
 from simnav.world.start import Start
 from simnav.world.trajectory import Trajectory, Voyage
 
@@ -150,6 +151,11 @@ class KinematicVessel(Vessel):
     climb_time_constant: Positive = quantity("s", 3.0)
     turn_rate: Annotated[float, Field(gt=0.0, lt=_HALF_PI)] = quantity("deg_s", 0.017453292519943295)
     heel: NonNegative = 0.0
+
+    @property
+    def hull(self) -> Hull | None:
+        """Coefficients of a hull with three degrees of freedom; None: the vessel is its lags."""
+        return None
 
     def check(self, start: Start | None, manoeuvres: Sequence[Manoeuvre], parts: Sequence[str]) -> None:
         """See `Vessel.check`."""

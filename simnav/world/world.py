@@ -13,11 +13,14 @@ from simnav.types import Array, ImuSamples, NavigationStates, TapStates
 from simnav.world import motion
 from simnav.world.current import Current, eddies
 from simnav.world.manoeuvres import Manoeuvre, table
+from simnav.world.manoeuvring import dynamics
+from simnav.world.manoeuvring.hull import Hull
 from simnav.world.sea import Sea, components, steady, wave_number
 from simnav.world.start import Start
 from simnav.world.track import PlannedTrack
 from simnav.world.trajectory import WorldBlock
 from simnav.world.vessel import KinematicVessel
+from simnav.world.wind import AirFlow
 
 __all__ = ["World"]
 
@@ -49,6 +52,8 @@ class World:
         Seed of the wave components and of the variable part of the current.
     depth : float, optional
         Depth of the water [m], which a sea with the response ``encounter`` knows.
+    air : AirFlow, optional
+        The wind, which acts on a vessel with a hull.
 
     Attributes
     ----------
@@ -67,12 +72,13 @@ class World:
         rate: float,
         seed: int,
         depth: float | None = None,
+        air: AirFlow | None = None,
     ):
         if not rate > 0.0:
             raise ValueError(f"rate = {rate!r} Hz should be positive")
         self.rate = float(rate)
         self._plan: PlannedTrack | None = None
-        self._voyage = start, vessel, manoeuvres, current
+        self._voyage = start, vessel, manoeuvres, current, air
         p = np.zeros(motion.PARAMETERS)
         p[motion.DT] = 1.0 / rate
         p[motion.TAU_U], p[motion.TAU_R] = vessel.speed_time_constant, vessel.turn_time_constant
@@ -105,7 +111,19 @@ class World:
             north, east = start.speed * np.cos(start.heading), start.speed * np.sin(start.heading)
             at = steady(sea, self._phase, self._waves, north, east, start.heading)
             x[motion.ANSWERS : motion.ANSWERS + 12] = at.ravel()
+        if vessel.hull is not None:
+            self._launch(vessel.hull, start.speed, air)
         motion.initialise(self._x, self._p, self._phase, self._waves, self._eddies)
+
+    def _launch(self, hull: Hull, speed: float, air: AirFlow | None) -> None:
+        """Put the numbers of a hull and of the wind into the constants, and its state on a straight course."""
+        h = hull.vector
+        if air is not None:
+            h[dynamics.WIND : dynamics.WIND + 2] = air.mean
+            h[dynamics.GUST : dynamics.GUST + air.gusts.size] = air.gusts.ravel()
+        self._p[motion.HAS_HULL], self._p[motion.HULL_NUMBERS :] = 1.0, h
+        at = self._x[motion.HULL_STATE :]
+        at[dynamics.PROPELLER], at[dynamics.SPEED] = hull.propeller(speed), speed
 
     @property
     def time(self) -> float:
@@ -149,10 +167,12 @@ class World:
         vessel: KinematicVessel,
         manoeuvres: Sequence[Manoeuvre] = (),
         current: Current | None = None,
+        air: AirFlow | None = None,
     ) -> PlannedTrack:
-        """The planned track: without waves, in the mean current."""
+        """The planned track: without waves, in the mean current and the mean wind."""
         steady = None if current is None else current.model_copy(update={"variation": 0.0})
-        return PlannedTrack(cls(start, vessel, manoeuvres, None, steady, rate=PlannedTrack.RATE, seed=0))
+        calm = None if air is None else air.steady()
+        return PlannedTrack(cls(start, vessel, manoeuvres, None, steady, rate=PlannedTrack.RATE, seed=0, air=calm))
 
     def command(self, heading: float, speed: float) -> None:
         """Command an estimated heading [rad] and a speed through the water [m/s]. It works without manoeuvres only.

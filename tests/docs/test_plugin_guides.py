@@ -13,7 +13,7 @@ GUIDES = Path(__file__).parents[2] / "docs" / "how-to"
 @pytest.mark.parametrize(
     ("guide", "files"),
     [
-        ("add-a-vessel.md", ["poses.py", "poses.toml"]),
+        ("add-a-vessel.md", ["poses.py", "poses.toml", "barge.py"]),
         ("add-surroundings.md", ["soundings.py", "shoal.toml"]),
         ("add-a-format.md", ["fixed_records.py", "tracks.py"]),
     ],

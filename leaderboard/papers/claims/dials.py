@@ -7,12 +7,13 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 from simnav.estimator.looking_back import lag_text
+from simnav.leaderboard.campaign.request import request
 from simnav.leaderboard.results.errors import mistakes
 from simnav.scenario import Scenario
 
 from .claim import Choice, Dial, Setting
 
-__all__ = ["choice_dial", "lag_dial", "lags_given", "parameter_dial", "scenario_dial", "with_keys"]
+__all__ = ["choice_dial", "lag_dial", "lags_given", "of_rows", "parameter_dial", "scenario_dial", "with_keys"]
 
 
 def lag_dial(
@@ -91,6 +92,16 @@ def choice_dial(
 ) -> Dial:  # fmt: skip
     """Settings that have a name and no number."""
     return Dial(name, title, "", tuple(choices), lambda setting, value: choices[str(value)](setting), ours, why)
+
+
+def of_rows(row: str = "", than: str = "") -> Callable[[Setting], Setting]:
+    """A choice of `choice_dial`: other estimators, as they are typed; an empty name leaves the one that is there."""
+
+    def with_them(setting: Setting) -> Setting:
+        chosen = request(row) if row else setting.row
+        return replace(setting, row=chosen, than=request(than) if than else setting.than)
+
+    return with_them
 
 
 def scenario_dial(

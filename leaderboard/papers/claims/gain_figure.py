@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import textwrap
 from typing import TYPE_CHECKING
 
 from simnav.leaderboard.figures.style import GREY, INK, PALETTE, PAPER, SHADE, figure, styled
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
 
 __all__ = ["gain_figure"]
 
+_WIDE = 66  # characters of all ticks of a panel, side by side
 _FLOOR = -1.0  # a gain below -100 % is drawn at the edge
 
 
@@ -41,9 +43,12 @@ def gain_figure(sentence: str, claimed: float, limit: float, ours: Point, dials:
         axes = fig.subplots(1, max(len(dials), 1), sharey=True, squeeze=False)[0]
         for ax, dial in zip(axes, dials, strict=False):
             _panel(ax, ours, dial)
+        low, high = axes[0].get_ylim()
+        low, high = min(low, -2.0), max(high, 110.0 * claimed)
+        axes[0].set_ylim(low, high)  # the axis is shared
         for ax in axes:
             ax.axhline(100.0 * claimed, color=INK, lw=1.0)
-            ax.axhspan(100.0 * (1.0 - limit), ax.get_ylim()[1], color=SHADE, zorder=0.1, lw=0)
+            ax.axhspan(100.0 * (1.0 - limit), high, color=SHADE, zorder=0.1, lw=0)
             ax.axhline(0.0, color=GREY, lw=0.6)
         axes[0].set_ylabel("gain [%]")
         axes[0].annotate("claim", (0.01, 100.0 * claimed), xycoords=("axes fraction", "data"), xytext=(0, 2),
@@ -65,15 +70,10 @@ def _panel(ax: Axes, ours: Point, dial: DialAnswer) -> None:
     if dial.ours in names:
         _bar(ax, names.index(dial.ours), ours, PALETTE[1][0], "s", 0.14)
     texts = [v if isinstance(v, str) else f"{v:g}" for v in names]
-    ax.set_xticks(places, [t.replace(", ", ",\n") for t in texts])
+    ax.set_xticks(places, [textwrap.fill(t, _WIDE // len(names)) for t in texts])
     ax.set_xlim(-0.5, len(names) - 0.5)
     title = f"{dial.title} [{dial.unit}]" if dial.unit else dial.title.rstrip(",")
-    words, lines = title.split(), [""]
-    for word in words:
-        if len(lines[-1]) + len(word) > 44:
-            lines.append("")
-        lines[-1] = f"{lines[-1]} {word}".strip()
-    ax.set_xlabel("\n".join(lines))
+    ax.set_xlabel(textwrap.fill(title, 44))
 
 
 def _bar(ax: Axes, x: float, point: Point, colour: str, marker: str, shift: float) -> None:

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from simnav.leaderboard.campaign.campaign import run_campaign
+from simnav.leaderboard.campaign.suited import require_suited
 from simnav.leaderboard.papers.measures import value_of
 from simnav.leaderboard.results.errors import RequestError
 from simnav.leaderboard.results.store import load
@@ -26,9 +27,9 @@ if TYPE_CHECKING:
 
 __all__ = ["JUDGED_FROM", "MOST", "SEARCHED_FROM", "search"]
 
-#: Seeds of the search and of the judgement begin here. The papers' tables are of seeds from 0 on. Seeds from 2000 on
-#: were looked at while the dials of the papers' claims were chosen, so nothing is judged on them.
-SEARCHED_FROM, JUDGED_FROM = 1000, 3000
+#: Seeds of the search and of the judgement begin here. The papers' tables are of seeds from 0 on. Seeds from 2000 to
+#: 5000 were looked at while claims and dials of the papers were chosen, so nothing is judged on them.
+SEARCHED_FROM, JUDGED_FROM = 1000, 10000
 #: Values of a dial that are judged at most, one after the other, and the distance of their seeds.
 TRIES, APART = 3, 1000
 #: Where a judgement is undecided the number of its seeds is doubled, up to so many times the first number.
@@ -43,8 +44,8 @@ def search(
     runs: int,
     judged: int,
     workers: int = 2,
+    judged_from: int = JUDGED_FROM,
     progress: Callable[[str, Progress], None] | None = None,
-    known: Answer | None = None,
 ) -> Answer:
     """Find out under which conditions a claim holds.
 
@@ -68,16 +69,22 @@ def search(
         Number of seeds of the search, and the first number of seeds of the judgement.
     workers : int
         Number of processes.
+    judged_from : int
+        First seed of the judgement, after those of the search.
     progress : callable, optional
         Called with what is being run and the campaign's progress.
-    known : Answer, optional
-        An earlier answer. Values that its search has, on at least ``runs`` seeds, are not searched again.
 
     Raises
     ------
     RequestError
-        If no method of a comparison can be run on its scenario; one sentence.
+        If seeds of the search would be judged on, or a method of a comparison cannot run on its scenario: one sentence,
+        before anything is run. If it has not the score: after the first seed.
     """
+    if judged_from < SEARCHED_FROM + runs:
+        raise RequestError(
+            f"judged_from = {judged_from}: the seeds of the search are from {SEARCHED_FROM} to "
+            f"{SEARCHED_FROM + runs - 1}, and the judgement needs later ones"
+        )
     base = claim.base()
     # One list, so that one run of an estimator gives all of its lags.
     asked = [(dial, value) for dial in dials for value in dial.values]
@@ -86,11 +93,13 @@ def search(
         (dial.name, value): setting for (dial, value), setting in zip(asked, every[1:], strict=True)
     }
     base = every[0]
+    for scenario, requests in _methods(every):
+        require_suited(scenario, requests)
     run = partial(_run, folder=folder, workers=workers, progress=progress)
-    points = _searched_before(known, runs)
-    wanted = {key: setting for key, setting in settings.items() if key not in points}
-    results = run(wanted.values(), range(SEARCHED_FROM, SEARCHED_FROM + runs), what="search")
-    points.update({key: _point(key[1], setting, results) for key, setting in wanted.items()})
+    points: dict[tuple[str, Choice], Point] = {}
+    for count in sorted({min(runs, 1), runs}):  # what a method lacks shows on the first seed
+        results = run(settings.values(), range(SEARCHED_FROM, SEARCHED_FROM + count), what="search")
+        points = {key: _point(key[1], setting, results) for key, setting in settings.items()}
 
     def judge(value: Choice, setting: Setting, first: int, most: int) -> Point:
         """The gain at a value on seeds from the first on, with more seeds while it is undecided."""
@@ -101,14 +110,14 @@ def search(
                 return point
             count *= 2
 
-    ours = judge("", base, JUDGED_FROM, MOST * judged)
+    ours = judge("", base, judged_from, MOST * judged)
     known_to_hold = ours.standing(claim.limit) == "holds"
     answers = []
     for dial in dials:
         tried: list[Point] = []
         for k, value in enumerate(_to_be_judged(claim, dial, points)):
             most = judged if known_to_hold else MOST * judged
-            tried.append(judge(value, settings[dial.name, value], JUDGED_FROM + APART * k, most))
+            tried.append(judge(value, settings[dial.name, value], judged_from + APART * k, most))
             if known_to_hold or tried[-1].standing(claim.limit) == "holds":
                 break
         answers.append(
@@ -119,13 +128,6 @@ def search(
         claim.name, claim.paper, claim.sentence, claim.gain, claim.derived, base.scenario.id, base.row.label,
         base.than.label, base.score, base.than_score, ours, answers,
     )  # fmt: skip
-
-
-def _searched_before(known: Answer | None, runs: int) -> dict[tuple[str, Choice], Point]:
-    """The points of an earlier search, by dial and value."""
-    if known is None:
-        return {}
-    return {(d.name, p.value): p for d in known.dials for p in d.points if len(p.seeds) + p.failed >= runs}
 
 
 def _to_be_judged(claim: Claim, dial: Dial, points: dict[tuple[str, Choice], Point]) -> list[Choice]:
@@ -152,16 +154,21 @@ def _run(
     progress: Callable[[str, Progress], None] | None,
 ) -> dict[tuple[str, str, int], Result]:
     """Run all methods of some comparisons; results by scenario, estimator and seed."""
+    for scenario, requests in _methods(settings):
+        named = None if progress is None else partial(progress, f"{what}: {scenario.id}")
+        run_campaign([scenario], requests, seeds, folder, workers=workers, progress=named)
+    if not len(seeds):
+        return {}
+    return {(r.scenario, r.estimator, r.seed): r for r in load(folder, series=False) if r.seed in seeds}
+
+
+def _methods(settings: Iterable[Setting]) -> list[tuple[Scenario, list[EstimatorRequest]]]:
+    """The methods of some comparisons, each once on each scenario."""
     wanted: dict[str, tuple[Scenario, dict[str, EstimatorRequest]]] = {}
     for s in settings:
         for scenario, request in ((s.scenario, s.row), (s.than_scenario, s.than)):
             wanted.setdefault(scenario.id, (scenario, {}))[1][request.label] = request
-    for scenario, requests in wanted.values():
-        named = None if progress is None else partial(progress, f"{what}: {scenario.id}")
-        run_campaign([scenario], list(requests.values()), seeds, folder, workers=workers, progress=named)
-    if not len(seeds):
-        return {}
-    return {(r.scenario, r.estimator, r.seed): r for r in load(folder, series=False) if r.seed in seeds}
+    return [(scenario, list(requests.values())) for scenario, requests in wanted.values()]
 
 
 def _point(value: Choice, setting: Setting, results: dict[tuple[str, str, int], Result]) -> Point:

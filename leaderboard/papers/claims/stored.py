@@ -1,13 +1,14 @@
 """The answers that come with simnav: one small JSON file for each claim, with the ratio of every seed.
 
-``python -m simnav.leaderboard.papers.claims.stored [--judgement] [CLAIM...]`` computes them anew, all or those that are
-named, and keeps the runs in ``results/claims``. With ``--judgement`` values that the stored search has are not searched
-again. A page needs these files only.
+They are what ``simnav claim NAME --holds-if all --json`` prints. ``python -m simnav.leaderboard.papers.claims.stored
+FILE...`` takes such outputs over. A page needs these files only.
 """
 
 from __future__ import annotations
 
 import json
+import sys
+from collections.abc import Sequence
 from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
@@ -79,25 +80,12 @@ def _document(name: str, folder: Path) -> dict[str, object] | None:
     return found
 
 
-def main() -> None:
-    """The command of the module."""
-    import argparse
-
-    from .declared import CLAIMS, claim_of
-    from .search import search
-
-    parser = argparse.ArgumentParser(prog="python -m simnav.leaderboard.papers.claims.stored")
-    parser.add_argument("claims", nargs="*", metavar="CLAIM", help="default: all")
-    parser.add_argument("--judgement", action="store_true", help="do not search again what the stored answer has")
-    parser.add_argument("--runs", type=int, default=6, help="seeds of the search")
-    parser.add_argument("--judged", type=int, default=12, help="first number of seeds of the judgement")
-    parser.add_argument("--output", type=Path, default=Path("results") / "claims", help="folder of the runs")
-    given = parser.parse_args()
-    for claim in [claim_of(name) for name in given.claims] or CLAIMS:
-        known = read(claim.name) if given.judgement else None
-        made = search(claim, claim.dials, given.output, runs=given.runs, judged=given.judged, known=known)
-        print(f"{claim.name}: {made.sentence_of_verdict} ({save(made)})", flush=True)
+def main(files: Sequence[str]) -> None:
+    """The command of the module: take over the outputs of ``simnav claim``."""
+    for file in files:
+        made = Answer.from_dict(json.loads(Path(file).read_text(encoding="utf-8")))
+        print(f"{made.claim}: {made.sentence_of_verdict} ({save(made)})")
 
 
 if __name__ == "__main__":
-    main()
+    main(sys.argv[1:])

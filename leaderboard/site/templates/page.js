@@ -65,8 +65,9 @@
   };
 
   const index = () => {
-    const tabs = [...document.querySelectorAll("[role=tab]")];
+    const tabs = [...document.querySelectorAll("[role=tab]")], select = at("tracks"); // the second on a phone
     const show = (tab, focus) => {
+      select.value = tab.dataset.track;
       for (const other of tabs) {
         const chosen = other === tab;
         other.setAttribute("aria-selected", chosen);
@@ -85,6 +86,10 @@
         state.set("track", next.dataset.track);
         show(next, true);
       });
+    });
+    select.addEventListener("change", () => {
+      state.set("track", select.value);
+      show(tabs.find((t) => t.dataset.track === select.value));
     });
     simnav.shown.rows = [];
     return tabs.length ? show(tabs.find((t) => t.dataset.track === state.get("track")) ?? tabs[0]) : null;
@@ -283,6 +288,35 @@
       });
     };
     show();
+    addEventListener("hashchange", () => { // a cell of the matrix of wins
+      const [x, y] = [state.get("a"), state.get("b")];
+      if (!(x in page.rows) || !(y in page.rows) || (x === a && y === b)) return;
+      [a, b] = [x, y];
+      [first.value, second.value] = [a, b];
+      show();
+      host.scrollIntoView();
+    });
+    const tracks = at("tracks");
+    if (tracks) drawWins(tracks, at("wins"));
+  };
+
+  /** The matrix of wins of the track that is chosen. */
+  const drawWins = (host, place) => {
+    const keys = page.wins.map((t) => t.key);
+    let key = keys.includes(state.get("track")) ? state.get("track") : keys[0], chart = null;
+    const select = make("select", { "aria-label": "Track" }, page.wins.map((t) => make("option", { value: t.key, selected: t.key === key }, t.title)));
+    const draw = async () => {
+      const given = await simnav.read(page.wins.find((t) => t.key === key).file);
+      if (chart) chart.show(given);
+      else chart = simnav.chart(place, { ...given });
+    };
+    select.addEventListener("change", () => {
+      key = select.value;
+      state.set("track", key);
+      draw();
+    });
+    host.append(make("label", {}, "Track ", select));
+    draw();
   };
 
   const kinds = { index, scenario, estimator, compare, about: () => {} };

@@ -11,6 +11,7 @@ from typing import Annotated
 
 from simnav.recording import FaultLabel
 from simnav.sensors.faults.additive import AdditiveLayer, BiasStep, GrossError, Multipath, NoiseStep, Ramp
+from simnav.sensors.faults.clock_step import ClockStep
 from simnav.sensors.faults.fault import FAULTS, Effect, FaultError, FaultSpec, Names, effect_of, register_fault
 from simnav.sensors.faults.imu_disturbance import ImuDisturbance
 from simnav.sensors.faults.imu_faults import ImuBiasStep, ImuClipping, ImuDropout
@@ -26,6 +27,7 @@ __all__ = [
     "AdditiveLayer",
     "AnyFault",
     "BiasStep",
+    "ClockStep",
     "Effect",
     "FalseZero",
     "FaultError",
@@ -93,7 +95,7 @@ def build_layers(faults: Sequence[FaultSpec], seed: int) -> tuple[FaultLayer, ..
         layers.append(layer)
         seen[key] += 1
         bit += fault.bits
-    return tuple(layers)
+    return tuple(sorted(layers, key=lambda layer: layer.last))  # stable
 
 
 def labels(faults: Sequence[FaultSpec], duration: float, instruments: Mapping[str, str]) -> tuple[FaultLabel, ...]:

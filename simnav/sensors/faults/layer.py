@@ -125,6 +125,8 @@ class FaultLayer(ABC):  # noqa: B024 (so that those of its subclasses that have 
     #: One of `ADDS`, ..., for runs that go step by step (`simnav.simulation.steps`); None: `apply` alone knows what it
     #: does.
     operation: ClassVar[int | None] = None
+    #: True: it is laid over a stream after all faults of which this is False.
+    last: ClassVar[bool] = False
 
     def __init__(self, spec: FaultSpec, index: int, seed: int, key: str):
         self.spec, self._index, self._seed, self._key = spec, index, seed, key

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import inf
+
 import numpy as np
 import pytest
 
@@ -87,6 +89,13 @@ def test_a_lag_beyond_the_window_is_an_error(recording):
     trial = run_trial(make("sw-fgo", window=5, lags=10), recording)
     assert trial.status == "error"
     assert "a lag of 10 s is longer than the window, which holds the last 4 s" in trial.reason
+
+
+def test_an_epoch_of_a_window_is_a_step_or_the_interval_of_its_fastest_instrument(recording):
+    window = make("sw-fgo", window=5)
+    assert window.longest_lag(recording.instruments) == 4.0
+    assert window.longest_lag(drive(10.0, rate=0.2).instruments) == 20.0
+    assert make("fgo-full").longest_lag(recording.instruments) == make("ekf").longest_lag(recording.instruments) == inf
 
 
 def test_a_step_may_end_after_its_last_node():

@@ -11,6 +11,7 @@ import pytest
 from typer.testing import CliRunner
 
 import simnav
+from simnav.leaderboard.claim_requests import ClaimRequest
 from simnav.leaderboard.cli import app
 from simnav.leaderboard.papers import PAPERS
 from simnav.leaderboard.papers.claims import search as searching
@@ -154,7 +155,7 @@ def test_the_search_finds_the_nearest_value_and_judges_it_on_other_seeds(made_re
     assert along.judged.value == 4.0
     assert along.condition(claim.limit) == "the window is 4 or more"
     assert set(along.points[0].seeds).isdisjoint(along.judged.seeds)
-    assert set(found.ours.seeds) == set(along.judged.seeds) == set(range(3000, 3004))
+    assert set(found.ours.seeds) == set(along.judged.seeds) == set(range(10000, 10004))
     assert made_results["ship-fgo(window=2)"] == set(range(1000, 1003))  # it was not judged
 
 
@@ -179,18 +180,41 @@ def test_where_a_judgement_fails_the_next_value_is_judged_on_other_seeds(made_re
     assert along.condition(claim.limit) == "the window is 6 or more"
 
 
-def test_an_undecided_judgement_gets_more_seeds_and_a_known_search_is_not_repeated(made_results, tmp_path):
-    dial = parameter_dial("window", "the window", "row", "window", (1, 3.51), ours=1.0)  # a ratio of about the limit
+def test_an_undecided_judgement_gets_more_seeds(made_results, tmp_path):
+    dial = parameter_dial("window", "the window", "row", "window", (1, 4), ours=1.0)  # a ratio of 0.8, about the limit
     base = compared(lambda: load("ship-turn"), "ship-fgo", "ship-ekf", "horizontal_rmse")
-    claim = Claim("c", "", "a is 25 % better than b", 0.25, base, (dial,))
+    claim = Claim("c", "", "a is 28 % better than b", 1.0 - 0.8**1.5, base, (dial,))
     found = searching.search(claim, claim.dials, tmp_path, runs=3, judged=4)
     (tried,) = found.dials[0].tried
     assert len(found.ours.seeds) == 4
     assert len(tried.seeds) in (4, 8, 16)
     assert tried.standing(claim.limit) != "undecided" or len(tried.seeds) == 16
-    made_results.clear()
-    searching.search(claim, claim.dials, tmp_path, runs=3, judged=4, known=found)
-    assert min(min(seeds) for seeds in made_results.values()) >= searching.JUDGED_FROM
+
+
+def test_a_score_that_a_method_lacks_is_said_after_the_first_seed(made_results, tmp_path):
+    dial = parameter_dial("window", "the window", "row", "window", (1, 4))
+    base = compared(lambda: load("ship-turn"), "ship-fgo", "ship-ekf", "smoothed_horizontal_rmse")
+    claim = Claim("c", "", "a is 25 % better than b", 0.25, base, (dial,))
+    with pytest.raises(simnav.RequestError, match=r"ship-fgo.* has no smoothed_horizontal_rmse on ship-turn-v1"):
+        searching.search(claim, claim.dials, tmp_path, runs=6, judged=4)
+    assert made_results["ship-ekf"] == {1000}
+
+
+def test_the_judgement_may_begin_elsewhere(made_results, tmp_path):
+    base = compared(lambda: load("ship-turn"), "ship-fgo", "ship-ekf", "horizontal_rmse")
+    claim = Claim("c", "", "a is 3 % better than b", 0.03, base, ())
+    found = searching.search(claim, (), tmp_path, runs=3, judged=4, judged_from=777_000)
+    assert (found.verdict, found.ours.seeds[0]) == ("holds", 777_000)
+    with pytest.raises(simnav.RequestError, match="seeds of the search are from 1000 to 1002"):
+        searching.search(claim, (), tmp_path, runs=3, judged=4, judged_from=1002)
+
+
+def test_a_score_of_late_outputs_runs_with_its_lag(made_results, monkeypatch, tmp_path):
+    from simnav.leaderboard import claiming
+
+    asked = {"than": "ship-ekf", "scenario": "ship-turn", "gain": 5.0, "score": "horizontal_rmse_lag_7"}
+    made = claiming._own(ClaimRequest("ship-fgo", **asked))
+    assert made.base().row.parameters == made.base().than.parameters == {"lags": "7"}
 
 
 def test_an_answer_is_read_as_it_was_saved(tmp_path):
@@ -239,6 +263,9 @@ def test_the_command_shows_and_lists(tmp_path):
     assert (tmp_path / "c.png").exists()
 
 
+MINE = {"claim": "ship-fgo", "than": "ship-ekf", "gain": 9.0, "scenario": "ship-turn"}
+
+
 @pytest.mark.parametrize(
     ("how", "message"),
     [
@@ -261,13 +288,23 @@ def test_the_command_shows_and_lists(tmp_path):
             {"claim": "ekf", "than": "sw-fgo", "gain": 9.0, "scenario": "ship-turn", "holds_if": "than.windo=1,2"},
             "no parameter 'windo'",
         ),
-        (
-            {"claim": "ship-ekf", "than": "ekf", "gain": 9.0, "scenario": "ship-turn", "holds_if": "x=1,2"},
-            "no dial 'x'",
-        ),
+        ({**MINE, "claim": "ship-ekf", "than": "ship-fgo", "holds_if": "x=1,2"}, "no dial 'x'"),
+        ({**MINE, "claim": "ekf"}, "ekf cannot run on ship-turn-v1: it needs an IMU; there is none"),
+        ({**MINE, "than": "ekf"}, "ekf cannot run on ship-turn-v1: it needs an IMU; there is none"),
+        ({**MINE, "holds_if": "row.window=1.5"}, "row.window=1.5: parameter 'window' .* is a whole number, not 1.5"),
+        ({**MINE, "holds_if": "row.window=0,5"}, "row.window=0,5: .* at least 1 epoch"),
+        ({**MINE, "holds_if": "lag=0,20"}, "a lag of 20 s is longer than the window, which holds the last 19 s"),
+        ({**MINE, "holds_if": "lag=0.5"}, "a lag of 0.5 s is no multiple of the step of 1 s"),
+        ({**MINE, "score": "horizontal_rmse_lag_20"}, "a lag of 20 s is longer than the window"),
+        ({**MINE, "score": "horizontal_max", "holds_if": "lag=5"}, "horizontal_max is no score of a late output"),
+        ({**MINE, "score": "horizontal_rmse_lag_7", "holds_if": "lag=5"}, "is no score of a late output"),
+        ({**MINE, "holds_if": "duration_s=-5,9"}, "duration"),
+        ({**MINE, "judged_from": 1003}, "needs later ones"),
+        ({"claim": "mao-sigma-east", "holds_if": "lag=90"}, "a lag of 90 s is longer than the window"),
     ],
 )
-def test_mistakes_are_one_sentence(how, message):
+def test_mistakes_are_one_sentence_before_anything_runs(how, message, monkeypatch):
+    monkeypatch.setattr(searching, "run_campaign", pytest.fail)
     with pytest.raises(simnav.RequestError, match=message) as error:
         simnav.claim(**how)
     assert "\n" not in str(error.value)

@@ -109,6 +109,11 @@ def test_the_overview_opens_quickly_without_the_chart_library(browser, folder):
     assert len(visit.names()) > 2
     loaded = page.evaluate("performance.getEntriesByType('navigation')[0].domContentLoadedEventEnd")
     assert loaded < 1000.0 * 3  # a second on an idle machine; tests share theirs
+    assert not page.is_visible("[role=tablist]")  # tracks are chosen in a list
+    page.select_option("select[data-tracks]", "other")
+    page.wait_for_selector("#track-other tbody tr")
+    assert "track=other" in page.url
+    assert page.is_hidden("[role=tabpanel]:not(#track-other)")
     visit.context.close()
 
 
@@ -278,6 +283,15 @@ def test_two_rows_are_compared_run_by_run(visit, results):
     page.wait_for_function("document.querySelector('[data-verdict]').textContent.includes('of ekf is')")
     assert "larger" in page.inner_text("[data-verdict]")
     assert "a=ekf" in page.url
+    page.select_option("[data-tracks] select", "other")
+    page.wait_for_function("simnav.charts.wins?.given.data.cells.page[0].includes('track=other')")
+    chart(page, "wins")
+    share = page.evaluate("simnav.charts.wins.given.data.cells")
+    cells = list(zip(share["row"], share["other"], strict=True))
+    at = cells.index(("sw-fgo", "ekf"))
+    assert share["share"][at] + share["share"][cells.index(("ekf", "sw-fgo"))] == pytest.approx(100.0)
+    page.locator("#chart-wins .mark-rect path").nth(at).click()
+    page.wait_for_function("document.querySelector('[data-verdict]').textContent.includes('of sw-fgo is')")
 
 
 def test_p_values_in_the_browser_are_those_of_the_board(visit):

@@ -6,10 +6,13 @@ import pytest
 from typer.testing import CliRunner
 
 import simnav
+from simnav.leaderboard.campaign.request import EstimatorRequest
+from simnav.leaderboard.campaign.suited import require_suited, with_long_windows
 from simnav.leaderboard.cli import app
 from simnav.leaderboard.ranking.runs import Runs
 from simnav.leaderboard.results.result import Result
 from simnav.leaderboard.site.latency import latency_chart
+from simnav.scenario import load
 from tests.cases import POND
 
 LATE = ("horizontal_rmse_lag_10", "horizontal_rmse_lag_0p5", "horizontal_rmse_lag_2")
@@ -43,3 +46,18 @@ def test_a_run_draws_it(tmp_path, monkeypatch):
     refused = CliRunner().invoke(app, ["run", "pond.toml", "-e", "gnss-only", "--plot-lags", "x.png"])
     assert refused.exit_code == 2
     assert "give delays" in refused.output
+
+
+def test_rows_that_do_not_look_back_are_named_and_windows_are_long_enough(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "pond.toml").write_text(POND)
+    _, late = simnav.run("pond.toml", ["gnss-only"], lags="1/2").shown()
+    assert late.caption is not None
+    assert "is repeated: gnss-only(lags=1/2)" in late.caption
+    turn, lags = load("ship-turn"), {"lags": "25"}
+    window, plain = EstimatorRequest("ship-fgo", lags), EstimatorRequest("ship-ekf", lags)
+    with pytest.raises(simnav.RequestError, match=r"ship-fgo\(lags=25\) on .*a lag of 25 s is longer than the window"):
+        require_suited(turn, [plain, window])
+    longer, same = with_long_windows(turn, [window, plain])
+    assert (longer.parameters, same) == ({"lags": "25", "window": 26}, plain)
+    require_suited(turn, [longer])

@@ -113,6 +113,7 @@ def test_parameters_are_converted(given: dict[str, Any], index: int, expected: A
         ({"gat": "1"}, "no parameter 'gat'; did you mean 'gate'?"),
         ({"gate": "wide"}, "parameter 'gate' of estimator 'plain' is a number, not 'wide'"),
         ({"window": "2.5"}, "is a whole number, not '2.5'"),
+        ({"window": 2.5}, "is a whole number, not 2.5"),
         ({"smooth": "maybe"}, "is true or false, not 'maybe'"),
         ({"mode": "slow"}, "is one of fast, exact, not 'slow'"),
         ({"gate": "-1"}, "gate = -1 should not be negative"),

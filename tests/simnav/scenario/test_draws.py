@@ -180,6 +180,7 @@ def test_values_can_be_set(scenario: Scenario):
     assert fixed.instruments["gnss"].sigma[0] == 2.5  # type: ignore[attr-defined]
     assert "draw.begin" not in fixed.draws
     assert fixed.start == scenario.drawn(0).start
+    assert with_values({"gnss": {}}, {"gnss.times_datasheet.sigma": 3}) == {"gnss": {"times_datasheet": {"sigma": 3}}}
     with pytest.raises(SpecError, match=r"there is no key 'draw\.x\.y'"):
         scenario.with_values({"draw.x.y": 1.0})
     with pytest.raises(SpecError, match=r"no 'falt' in it; did you mean 'fault'\?"):

@@ -1,0 +1,74 @@
+"""Who wins against whom: the share of the runs in which a row has a smaller error than another one, a cell each."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+from urllib.parse import quote
+
+from simnav.leaderboard.ranking.wins import wins
+
+from .charts import Chart, columns
+from .rounding import short
+
+if TYPE_CHECKING:
+    from simnav.leaderboard.ranking.board import ScenarioRanking, TrackRanking
+
+__all__ = ["win_matrix"]
+
+
+def win_matrix(track: TrackRanking, scenarios: Sequence[ScenarioRanking]) -> Chart | None:
+    """The chart of the ranked rows of a track, the best score first; None with fewer than two rows.
+
+    Parameters
+    ----------
+    track : TrackRanking
+        The ranking of the track.
+    scenarios : sequence of ScenarioRanking
+        The scenarios of the track.
+    """
+    ordered = [r.estimator for r in sorted(track.rows, key=lambda r: r.score) if r.ranked and math.isfinite(r.score)]
+    if len(ordered) < 2:
+        return None
+    share = wins(ordered, scenarios)
+    page = f"compare.html#track={quote(track.track)}"
+    cells = [
+        (row, other, short(100.0 * share[i, k], 3), f"{page}&a={quote(row)}&b={quote(other)}")
+        for i, row in enumerate(ordered)
+        for k, other in enumerate(ordered)
+        if math.isfinite(share[i, k])
+    ]  # fmt: skip
+    spec = {
+        "height": {"step": 14},
+        "data": {"name": "cells"},
+        "mark": {"type": "rect", "cursor": "pointer"},
+        "encoding": {
+            "x": {
+                "field": "other", "type": "nominal", "title": None, "sort": ordered,
+                "axis": {"orient": "top", "labelAngle": -45, "labelLimit": 150, "labelOverlap": False},
+            },
+            "y": {"field": "row", "type": "nominal", "title": None, "sort": ordered, "axis": {"labelOverlap": False}},
+            "color": {
+                "field": "share", "type": "quantitative",
+                "scale": {
+                    "interpolate": "rgb", "domain": [0.0, 50.0, 100.0], "range": ["$second", "$grid", "$strong"],
+                },
+                "legend": {"title": "Runs won [%]", "values": [0, 25, 50, 75, 100]},
+            },
+            "href": {"field": "page", "type": "nominal"},
+            "tooltip": [
+                {"field": "row", "title": "Estimator"},
+                {"field": "other", "title": "Against"},
+                {"field": "share", "title": "Runs won [%]", "format": ".3~g"},
+            ],
+        },
+    }  # fmt: skip
+    caption = (
+        "Share of the runs in which the estimator of the line has a smaller error than that of the column. Each "
+        "scenario counts the same, and equal errors are half a win. Blue: it wins more often than not. A cell compares "
+        "the two. To win more often is not to have the smaller mean error, because a few bad runs can outweigh many "
+        "good ones."
+    )
+    data = {"cells": columns(("row", "other", "share", "page"), cells)}
+    return Chart("wins", "Runs won", caption, spec, data, wide=True)

@@ -1,0 +1,276 @@
+"""The equations of motion in surge, sway and yaw, and the autopilot that steers by them: one step of a hull.
+
+With nu = (u, v, r), the velocities through the water along the bow and to starboard and the yaw rate ::
+
+    M nu' = K phi(nu) + cross-flow drag + propeller + rudder + wind
+
+M is the mass matrix with the added mass. K are hydrodynamic coefficients, and phi the products of velocities that
+`TERMS` names: damping, Coriolis and centripetal forces; U is the speed. In a current that is the same everywhere
+around the hull these are the equations of the velocity through the water (Fossen 2021, section 10.3). The cross-flow
+drag is the strip theory of Fossen 2021, eq. 6.91, integrated over the length by a quadrature. The steps are those of
+the classical Runge-Kutta method of fourth order, at most 0.1 s long.
+
+The propeller gives ``T = t_nn n |n| + t_nu |n| u`` at the share n of its highest rate, which follows its command by a
+first-order lag. Steering is a moment ``N = (n_0 + n_2 (u^2 + v^2) + n_v v^2) s``, with the sway force N / x of an
+actuator at the distance x ahead of the origin and a drag; s is the rudder angle or the share of the largest moment,
+and follows its command by a lag, too.
+
+The autopilot turns by the model: it computes which s gives the wanted yaw acceleration. The engine has the propeller
+rate that gives the wanted speed on a straight course in calm weather, with a slow control of the speed. So turns and
+wind slow the vessel down for a while. What the actuators cannot give, the vessel does not do.
+
+References: T. I. Fossen, *Handbook of Marine Craft Hydrodynamics and Motion Control*, 2nd edition, Wiley 2021. The wind
+forces are those of W. Blendermann, *Parameter identification of wind loads on ships*, J. Wind Engineering and
+Industrial Aerodynamics 51, 1994.
+"""
+
+from __future__ import annotations
+
+from math import atan2, cos, exp, sin, sqrt
+
+from simnav.compiled import Array, kernel
+
+__all__ = ["GUSTS", "HULL", "SAIL", "TERMS", "integrate_hull", "propeller_for", "sail", "trial"]
+
+#: Products of velocities that K multiplies. ``fading`` ones are multiplied by exp(-decay U).
+TERMS = (
+    "u", "u|u|", "uuu", "v", "v|v|", "vvv", "r", "r|r|", "rrr", "v|r|", "r|v|", "uv", "ur", "vr", "rr",
+    "fading u", "fading v", "vv", "vvv/U", "vvr/U",
+)  # fmt: skip
+_N = 20
+#: Most harmonics of a gusty wind.
+GUSTS = 16
+
+# Indices in the vector of a hull: inverse of M by rows, K by rows, then the rest in the order of their use.
+K = 9
+REACH, CROSS, DECAY = K + 3 * _N, K + 3 * _N + 1, K + 3 * _N + 2
+T_NN, T_NU, N_LEAST, N_LAG = range(DECAY + 1, DECAY + 5)
+S_MOMENT, S_SPEED, S_DRIFT, S_SWAY, S_DRAG, S_MOST, S_LAG = range(N_LAG + 1, N_LAG + 8)
+#: Air density / 2 times the frontal and the lateral area, length, and the coefficients of Blendermann.
+A_FRONT, A_SIDE, A_LENGTH, C_SIDE, C_BOW, C_STERN, C_CROSS, A_CENTRE = range(S_LAG + 1, S_LAG + 9)
+#: Mean wind, north and east [m/s]; rows of gusts: angular frequency, phase, amplitude as a share of the mean.
+WIND = A_CENTRE + 1
+GUST = WIND + 2
+HULL = GUST + 3 * GUSTS
+
+# Indices in the state of the hull, which is a part of the state of `simnav.world.motion`.
+SWAY, PROPELLER, STEERING, RATE, RATE_CHANGE, SPEED, SPEED_CHANGE, ENGINE = range(8)
+SAIL = 8
+#: Nodes and weights of the quadrature of Gauss and Legendre with six nodes, on [-1, 1].
+_NODE = (0.932469514203152, 0.6612093864662645, 0.2386191860831969)
+_WEIGHT = (0.17132449237917036, 0.3607615730481386, 0.46791393457269104)
+_LONGEST = 0.1
+
+Three = tuple[float, float, float]
+Six = tuple[float, float, float, float, float, float]
+
+
+@kernel()
+def _wind_force(h: Array, time: float, psi: float, north: float, east: float) -> Three:
+    """Surge and sway force [N] and yaw moment [N m] of the wind on a hull that moves north and east over ground."""
+    gust = 1.0
+    for i in range(GUSTS):
+        gust += h[GUST + 3 * i + 2] * cos(h[GUST + 3 * i] * time + h[GUST + 3 * i + 1])
+    a, b = h[WIND] * gust - north, h[WIND + 1] * gust - east
+    c, s = cos(psi), sin(psi)
+    ahead, aside = c * a + s * b, c * b - s * a
+    square = ahead * ahead + aside * aside
+    if square < 1e-12:
+        return 0.0, 0.0, 0.0
+    # The direction from which the air comes, from the bow to starboard. The coefficients are even or odd in it.
+    angle = atan2(-aside, -ahead)
+    side = 1.0 if angle >= 0.0 else -1.0
+    angle = abs(angle)
+    along = h[C_BOW] if ahead <= 0.0 else h[C_STERN]
+    ratio = along * h[A_FRONT] / (h[A_SIDE] * h[C_SIDE])
+    below = 1.0 - 0.5 * h[C_CROSS] * (1.0 - ratio) * sin(2.0 * angle) ** 2
+    x = -along * cos(angle) / below * square * h[A_FRONT]
+    y = h[C_SIDE] * sin(angle) / below * square * h[A_SIDE]
+    # A wind from starboard pushes to port. Its moment has the lever of the centre of the lateral area, which moves
+    # towards the bow for a wind from ahead.
+    lever = h[A_CENTRE] - 0.18 * (angle - 1.5707963267948966)
+    return x, -side * y, -side * y * lever * h[A_LENGTH]
+
+
+@kernel()
+def _hull_force(h: Array, u: float, v: float, r: float) -> Three:
+    """Hydrodynamic surge and sway force [N] and yaw moment [N m]."""
+    speed = sqrt(u * u + v * v)
+    fading, lean = exp(-h[DECAY] * speed), v * v / (speed + 1e-9)
+    phi = (
+        u, u * abs(u), u * u * u, v, v * abs(v), v * v * v, r, r * abs(r), r * r * r, v * abs(r), r * abs(v), u * v,
+        u * r, v * r, r * r, fading * u, fading * v, v * v, lean * v, lean * r,
+    )  # fmt: skip
+    x = y = n = 0.0
+    for i in range(_N):
+        x += h[K + i] * phi[i]
+        y += h[K + _N + i] * phi[i]
+        n += h[K + 2 * _N + i] * phi[i]
+    if h[CROSS] > 0.0:
+        reach = h[REACH]
+        for i in range(3):
+            place = reach * _NODE[i]
+            fore, aft = v + place * r, v - place * r
+            fore, aft = fore * abs(fore), aft * abs(aft)
+            y -= h[CROSS] * reach * _WEIGHT[i] * (fore + aft)
+            n -= h[CROSS] * reach * _WEIGHT[i] * place * (fore - aft)
+    return x, y, n
+
+
+@kernel()
+def _thrust(h: Array, n: float, u: float) -> float:
+    """Thrust of the propeller [N]."""
+    thrust: float = h[T_NN] * n * abs(n) + h[T_NU] * abs(n) * u
+    return thrust
+
+
+@kernel()
+def _change(h: Array, water: tuple[float, float], time: float, command: tuple[float, float], s: Six) -> Six:
+    """Rates of change of u, v, r, heading, propeller and steering."""
+    u, v, r, psi, n, steer = s
+    c, d = cos(psi), sin(psi)
+    x, y, z = _hull_force(h, u, v, r)
+    if h[A_SIDE] > 0.0 and (h[WIND] != 0.0 or h[WIND + 1] != 0.0):
+        wx, wy, wz = _wind_force(h, time, psi, water[0] + c * u - d * v, water[1] + d * u + c * v)
+        x, y, z = x + wx, y + wy, z + wz
+    square = u * u + v * v
+    moment = (h[S_MOMENT] + h[S_SPEED] * square + h[S_DRIFT] * v * v) * steer
+    x += _thrust(h, n, u) - h[S_DRAG] * square * steer * steer
+    y += moment * h[S_SWAY]
+    z += moment
+    return (
+        h[0] * x + h[1] * y + h[2] * z,
+        h[3] * x + h[4] * y + h[5] * z,
+        h[6] * x + h[7] * y + h[8] * z,
+        r,
+        (command[0] - n) / h[N_LAG],
+        (command[1] - steer) / h[S_LAG],
+    )
+
+
+@kernel()
+def _ahead(s: Six, change: Six, dt: float) -> Six:
+    return (
+        s[0] + dt * change[0], s[1] + dt * change[1], s[2] + dt * change[2],
+        s[3] + dt * change[3], s[4] + dt * change[4], s[5] + dt * change[5],
+    )  # fmt: skip
+
+
+@kernel()
+def propeller_for(h: Array, thrust: float, u: float) -> float:
+    """Propeller rate that gives a thrust [N] at a speed [m/s], within its limits.
+
+    It is a root of t_nn n |n| + t_nu |n| u = T: the larger one ahead, where there is one, and else the one astern.
+    """
+    half, share = 0.5 * h[T_NU] * u / h[T_NN], thrust / h[T_NN]
+    if half * half + share >= 0.0:
+        n = sqrt(half * half + share) - half
+    else:
+        n = -half - sqrt(half * half - share)
+    rate: float = min(max(n, h[N_LEAST]), 1.0)
+    return rate
+
+
+@kernel()
+def integrate_hull(
+    h: Array, s: Six, command: tuple[float, float], water: tuple[float, float], time: float, dt: float
+) -> Six:
+    """Integrate the equations over dt seconds under constant commands.
+
+    Parameters
+    ----------
+    h : (HULL,) array
+        The hull (`simnav.world.manoeuvring.hull.Hull.vector`).
+    s : tuple of 6 floats
+        Surge and sway velocity through the water [m/s], yaw rate [rad/s], heading [rad], propeller, steering.
+    command : (float, float)
+        Commanded propeller and steering.
+    water : (float, float)
+        Velocity of the water, north and east [m/s]; the wind is relative to the ground.
+    time, dt : float
+        Time at the start, for the gusts, and the length of the step [s].
+    """
+    parts = 1 if dt <= _LONGEST else int(dt / _LONGEST + 0.999999)
+    step = dt / parts
+    for k in range(parts):
+        now, total, at, share = s, s, time + k * step, 0.0
+        for stage in range(4):
+            change = _change(h, water, at + share * step, command, now)
+            weight = step / 6.0 if stage == 0 or stage == 3 else step / 3.0
+            share = 1.0 if stage == 2 else 0.5
+            now, total = _ahead(s, change, share * step), _ahead(total, change, weight)
+        s = total
+    return s
+
+
+@kernel()
+def sail(
+    h: Array, x: Array, state: tuple[float, float, float], constants: tuple[float, float],
+    water: tuple[float, float], time: float, dt: float,
+) -> tuple[float, float, float, float, float]:  # fmt: skip
+    """Advance a hull by one step of its autopilot.
+
+    Parameters
+    ----------
+    h : (HULL,) array
+        The hull (`simnav.world.manoeuvring.hull.Hull.vector`).
+    x : (SAIL,) array
+        Sway velocity [m/s], propeller, steering, wanted yaw rate [rad/s] and speed [m/s] with their changes, and the
+        integral of the control of the speed [m/s^2]; all but the wanted ones are updated.
+    state : tuple of 3 floats
+        Surge velocity through the water [m/s], yaw rate [rad/s], heading [rad].
+    constants : (float, float)
+        Time constants of speed and yaw rate [s].
+    water : (float, float)
+        Velocity of the water, north and east [m/s].
+    time, dt : float
+        Time at the start of the step, and its length [s].
+
+    Returns
+    -------
+    tuple of 5 floats
+        Surge velocity, its change [m/s^2], yaw rate, its change [rad/s^2], heading.
+    """
+    u, r, psi = state
+    slow, quick = constants
+    v = x[SWAY]
+    # Engine: proportional and integral control about the thrust of the wanted speed. The integral waits while the
+    # engine is at its limit.
+    off = x[SPEED] - u
+    straight = _hull_force(h, x[SPEED], 0.0, 0.0)
+    n = propeller_for(h, (x[SPEED_CHANGE] + off / slow + x[ENGINE]) / h[0] - straight[0], u)
+    if (n < 1.0 or off < 0.0) and (n > h[N_LEAST] or off > 0.0):
+        x[ENGINE] += 0.25 * dt * off / (slow * slow)
+    # Steering: what the yaw rate would do without it, and what is wanted.
+    idle = _change(h, water, time, (0.0, 0.0), (u, v, r, psi, x[PROPELLER], 0.0))
+    turning = (h[7] * h[S_SWAY] + h[8]) * (h[S_MOMENT] + h[S_SPEED] * (u * u + v * v) + h[S_DRIFT] * v * v)
+    steer = (x[RATE_CHANGE] + (x[RATE] - r) / quick - idle[2]) / max(turning, 1e-9 * h[8])
+    command = (n, min(max(steer, -h[S_MOST]), h[S_MOST]))
+    s = integrate_hull(h, (u, v, r, psi, x[PROPELLER], x[STEERING]), command, water, time, dt)
+    x[SWAY], x[PROPELLER], x[STEERING] = s[1], s[4], s[5]
+    return s[0], (s[0] - u) / dt, s[2], (s[2] - r) / dt, s[3]
+
+
+@kernel("void(f8[::1], f8[:, ::1], f8[:, ::1], f8, f8[::1])")
+def trial(h: Array, states: Array, commands: Array, dt: float, water: Array) -> None:
+    """Integrate a hull under given commands, without an autopilot.
+
+    Parameters
+    ----------
+    h : (HULL,) array
+        The hull.
+    states : (n + 1, 6) array
+        Surge and sway velocity [m/s], yaw rate [rad/s], heading [rad], propeller, steering at n + 1 times. The first
+        row is given; the others are overwritten.
+    commands : (n, 2) array
+        Propeller and steering in each interval.
+    dt : float
+        Length of an interval [s].
+    water : (2,) array
+        Velocity of the water, north and east [m/s].
+    """
+    for k in range(commands.shape[0]):
+        s = (states[k, 0], states[k, 1], states[k, 2], states[k, 3], states[k, 4], states[k, 5])
+        s = integrate_hull(h, s, (commands[k, 0], commands[k, 1]), (water[0], water[1]), k * dt, dt)
+        for i in range(6):
+            states[k + 1, i] = s[i]
