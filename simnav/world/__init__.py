@@ -39,6 +39,7 @@ from simnav.world.surroundings import (
 )
 from simnav.world.trajectory import SampledTrajectory, Steered, Trajectory, Voyage, WorldBlock
 from simnav.world.vessel import VESSELS, KinematicVessel, Vessel, register_vessel
+from simnav.world.water_column import WaterColumn
 from simnav.world.water_level import WaterLevel
 from simnav.world.wind import AirFlow, Wind
 from simnav.world.world import World
@@ -89,6 +90,7 @@ __all__ = [
     "Uuv",
     "Vessel",
     "Voyage",
+    "WaterColumn",
     "WaterLevel",
     "Waypoints",
     "Wind",

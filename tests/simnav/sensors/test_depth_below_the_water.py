@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import sys
+
 import numpy as np
 import pytest
 
 from simnav.scenario import Scenario, parse
 from simnav.simulation.simulator import simulate
 from simnav.spec import SpecError
+from simnav.world.water_column import Column, WaterColumn
 
 HEAD = """
 name = "level"
@@ -78,3 +81,43 @@ def test_waves_above_the_sensor_are_less_at_depth():
 def test_bad_tides_are_refused():
     with pytest.raises(SpecError, match="have 2, 1 and 1 numbers; each constituent has one of each"):
         parse(HEAD + "[surroundings.water_level]\ntide_amplitude_m = [1.0, 2.0]\ntide_period_h = [12.0]\n")
+
+
+def test_pressure_of_the_water_column_is_that_of_teos_10():
+    gsw = pytest.importorskip("gsw")
+    latitude = np.radians(np.full(3, 54.0))
+    depth = np.array([10.0, 300.0, 4000.0])
+    # The standard ocean, of which gsw has a formula of its own (the dynamic height of McDougall and Barker).
+    np.testing.assert_allclose(Column(WaterColumn()).pressure(depth, latitude), gsw.p_from_z(-depth, 54.0), rtol=1.2e-5)
+    fresh = Column(WaterColumn(salinity=0.0, temperature=10.0)).pressure(depth[:1], latitude[:1])
+    assert fresh[0] == pytest.approx(gsw.rho(0.0, 10.0, 5.0) * gsw.grav(54.0, 5.0) * 10.0 / 1e4, rel=1e-6)
+    # In layers: the weights of both add up.
+    layers = WaterColumn(depth=(0.0, 20.0, 20.001), salinity=(7.0, 7.0, 35.0), temperature=(15.0, 15.0, 5.0))
+    both = Column(layers).pressure(np.array([100.0]), latitude[:1])
+    weight = 20.0 * gsw.rho(7.0, 15.0, 10.0) + 80.0 * gsw.rho(35.0, 5.0, 60.0)
+    assert both[0] == pytest.approx(weight * gsw.grav(54.0, 50.0) / 1e4, rel=1e-4)
+    many = Column(layers)
+    np.testing.assert_array_equal(
+        [float(many.pressure(np.array([d]), latitude[:1])[0]) for d in (30.0, 800.0)],
+        Column(layers).pressure(np.array([30.0, 800.0]), latitude[:2]),
+    )
+
+
+def test_a_sensor_in_brackish_water_reads_too_little():
+    pytest.importorskip("gsw")
+    column = "[surroundings.water_column]\nsalinity_g_kg = 7.0\ntemperature_celsius = 10.0\n"
+    _, standard, depth = read(column)
+    np.testing.assert_allclose(standard / depth, 1005.0 / 1028.0, rtol=1e-3)
+    _, told, _ = read("assumed_density_kg_m3 = 1005.25\n" + column)
+    np.testing.assert_allclose(told, depth, atol=0.02)
+
+
+def test_columns_that_make_no_sense_are_refused(monkeypatch):
+    with pytest.raises(SpecError, match="have 2, 1 and 1 numbers; each depth has one of each"):
+        parse(HEAD + "[surroundings.water_column]\ndepth_m = [0.0, 10.0]\n")
+    with pytest.raises(SpecError, match="sea water has 0 to 42"):
+        parse(HEAD + "[surroundings.water_column]\nsalinity_g_kg = 300.0\n")
+    scenario = parse(HEAD + "[surroundings.water_column]\n")
+    monkeypatch.setitem(sys.modules, "gsw", None)
+    with pytest.raises(SpecError, match="needs the library gsw: pip install 'simnav\\[ocean\\]'"):
+        simulate(scenario, 1)
