@@ -35,10 +35,12 @@ from simnav.types import (
     TriadDatasheet,
 )
 
-__all__ = ["AidStream", "Block", "FaultLabel", "ImuLabels", "Recording", "RecordingError", "packets"]
+__all__ = ["REFLECTION", "AidStream", "Block", "FaultLabel", "ImuLabels", "Recording", "RecordingError", "packets"]
 
 #: Version of the files that `Recording.save` writes. It is increased when their format changes.
 FORMAT = 1
+#: Kind of the label of errors by reflections, which the surroundings make and no fault of a scenario.
+REFLECTION = "reflection"
 
 
 class RecordingError(ValueError):
@@ -162,6 +164,13 @@ class AidStream:
         names = (*_AID_ARRAYS[:-1], *(("channel", "side") if self.channels else ()))
         names += tuple(n for n in _CLOCK_ARRAYS if len(getattr(self, n)))
         return replace(self, **{n: getattr(self, n)[keep] for n in names})
+
+    def as_delivered(self) -> AidStream:
+        """The readings in order of their stamps, which take the place of the times of validity; arrivals stay."""
+        if not self.has_clock:
+            return self
+        stream = self.rows(np.argsort(self.stamps, kind="stable"))
+        return replace(stream, time=stream.stamps, stamp=np.empty(0), arrival=stream.arrivals)
 
     def delivered(self, edges: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
         """In which order the readings are delivered, and in which step: the one in which each arrives.
@@ -421,7 +430,7 @@ _STATES_OF: dict[type[NavigationStates], tuple[str, ...]] = {
 }
 
 #: Fields of a datasheet that most have not.
-_OPTIONAL = ("details", "blocks", "channels", "processes", "timing")
+_OPTIONAL = ("details", "blocks", "channels", "processes", "timing", "sources")
 
 
 def _sheet(sheet: Datasheet | ImuDatasheet) -> dict[str, Any]:
@@ -496,6 +505,7 @@ def _instruments(sheets: Mapping[str, Any], step: float) -> Instruments:
         fields["channels"] = tuple(aid.get("channels", ()))
         fields["timing"] = TimingSheet(**aid["timing"]) if "timing" in aid else None
         fields["processes"] = tuple(_process(p) for p in aid.get("processes", ()))
+        fields["sources"] = tuple(aid.get("sources", ()))
         aids.append(Datasheet(**fields))
     return Instruments(aids, imu, step)
 

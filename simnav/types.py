@@ -9,7 +9,7 @@ attitude error [rad], the rotation vector of C_est C_true^T resolved in north-ea
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -145,6 +145,11 @@ class Instruments(Mapping[str, Datasheet]):
 
     def __len__(self) -> int:
         return len(self._aids)
+
+    def without(self, names: Collection[str]) -> Instruments:
+        """The instruments but those of the given names; itself if it has none of them."""
+        kept = [a for name, a in self._aids.items() if name not in names]
+        return self if len(kept) == len(self._aids) else Instruments(kept, self.imu, self.step)
 
     def of_kind(self, *kinds: str) -> list[Datasheet]:
         """The datasheets of the given kinds, in the scenario's order."""

@@ -14,6 +14,10 @@ __all__ = ["AnfisEkf", "AnfisFgo", "AnfisFgoMotion"]
 class AnfisFgo(ShipFgo, adaptation=Anfis):
     """ANFIS-FGO, a reconstruction: ``ship-fgo``, the noise of each fix chosen by a neuro-fuzzy network.
 
+    It does not notice that it is lost on a ship without an IMU whose instruments are wrong: 7 runs of the board
+    (version 1 of the row) have more than ten times the error of the plain row, and nothing warns (``python -m
+    tests.audit silence``).
+
     The section on the network is missing from the text at hand; see ``docs/explanation/anfis.md``. Source: Jiang et
     al., *An improved factor graph optimization algorithm enhanced with ANFIS for ship GNSS/DR integrated navigation*,
     J. Mar. Sci. Eng. 14(5), 472, 2026, doi:10.3390/jmse14050472.
@@ -49,6 +53,10 @@ class AnfisFgoMotion(ShipFgo, adaptation=piece(Anfis, features="motion")):
 @register("anfis-ekf")
 class AnfisEkf(ShipEkf, adaptation=Anfis):
     """The network of ``anfis-fgo`` (a reconstruction) in ``ship-ekf``: what it does without the graph.
+
+    It does not notice that it is lost on a ship without an IMU whose instruments are wrong: 8 runs of the board
+    (version 1 of the row) have more than ten times the error of the plain row, and nothing warns (``python -m
+    tests.audit silence``).
 
     Source: *GNSS/DR integrated navigation for ships*, the paper that proposes ANFIS-FGO.
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from .board import FIRM_REFERENCE
 from .statistics import FEWEST, Separation, smallest_p_value
+from .superseded import in_words
 
 if TYPE_CHECKING:
     from .board import Reference, Row
@@ -117,8 +118,8 @@ def learned_remarks(rows: Sequence[Row]) -> tuple[str, ...]:
 
 def superseded_remarks(rows: Sequence[Row]) -> tuple[str, ...]:
     """Which rows have results of an older version than the one that comes with simnav."""
-    found = [f"{r.estimator} ({r.superseded})" for r in rows if r.superseded]
-    return (f"Results of an older version: {', '.join(found)}.",) if found else ()
+    found = [(r.estimator, r.superseded) for r in rows if r.superseded]
+    return (f"Results of an older version: {in_words(found)}.",) if found else ()
 
 
 def seed_remarks(scenarios: Sequence[Collection[str]]) -> tuple[str, ...]:

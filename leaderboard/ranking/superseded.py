@@ -48,3 +48,16 @@ def only_version(results: Iterable[Result]) -> int | None:
     """The declared version of the estimator in its results; None if there are several, or no result."""
     versions = {r.estimator_version for r in results}
     return versions.pop() if len(versions) == 1 else None
+
+
+def in_words(rows: Iterable[tuple[str, str]]) -> str:
+    """Rows with what `superseded_by` says of them; those of the same versions together.
+
+    >>> of_one = "version 1; simnav has version 3"
+    >>> in_words([("iae", of_one), ("kf", "version 1; simnav has version 2"), ("imm", of_one)])
+    'iae, imm (version 1; simnav has version 3); kf (version 1; simnav has version 2)'
+    """
+    found: dict[str, list[str]] = {}
+    for name, versions in rows:
+        found.setdefault(versions, []).append(name)
+    return "; ".join(f"{', '.join(names)} ({versions})" for versions, names in found.items())

@@ -34,7 +34,7 @@ def without_truth(recording: Recording) -> Recording:
     data = recording.data
     aids = {
         name: replace(
-            s,
+            s.as_delivered(),
             faults=np.zeros_like(s.faults),
             fault_error=np.zeros_like(s.fault_error),
             sigma=np.tile(recording.instruments[name].sigma, (len(s), 1)),

@@ -11,6 +11,7 @@ from __future__ import annotations
 import io
 from collections.abc import Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -68,13 +69,19 @@ def write_csv(recording: Recording, path: Path) -> list[Path]:
     if imu is not None:
         samples = np.hstack([imu.angular_rate, imu.specific_force])
         written.append(_table(path / "imu.csv", imu.time, _IMU, samples))
-    for stream in recording.data.aids.values():
+    for whole in recording.data.aids.values():
+        stream = whole.as_delivered()
         file = path / f"{stream.name}.csv"
         kind = KINDS[stream.kind]
         units = {c.name: c.unit for c in (*kind.components, *(kind.side if stream.channels else ()))}
         values = np.hstack([stream.value, stream.side]) if stream.channels else stream.value
         channels = np.array(stream.channels)[stream.channel] if stream.channels else None
-        written.append(_table(file, stream.time, units, values, stream.faults if told else None, channels))
+        more = {}
+        if whole.has_clock:
+            more["arrival_s"] = stream.arrivals
+            if told:
+                more["time_of_validity_s"] = whole.time[np.argsort(whole.stamps, kind="stable")]
+        written.append(_table(file, stream.time, units, values, stream.faults if told else None, channels, more))
     written.append(write_whole(path / "README.md", readme(recording)))
     written.append(write_whole(path / "start.json", start_text(recording)))
     return written
@@ -87,6 +94,7 @@ def _table(
     values: Array,
     faults: NDArray[np.uint32] | None = None,
     channels: NDArray[np.str_] | None = None,
+    more: Mapping[str, Array] = MappingProxyType({}),
 ) -> Path:
     """Write the columns, of the given names and units."""
     # Degrees as NumPy has them: 180 / pi, where a division by pi / 180 may differ in the last digit.
@@ -98,6 +106,10 @@ def _table(
         header.append("faults")  # bit mask of the faults that touched the measurement
         columns.append(np.asarray(faults, dtype=np.float64)[:, None])
         formats.append("%d")
+    for name, column in more.items():
+        header.append(name)
+        columns.append(column[:, None])
+        formats.append("%.17g")
     rows = np.hstack(columns)
     if channels is not None:
         header.insert(1, "channel")

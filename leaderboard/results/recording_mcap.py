@@ -68,7 +68,8 @@ def _messages(recording: Recording) -> Iterator[tuple[float, str, str, dict[str,
     if imu is not None:
         for t, w, f in zip(imu.time, imu.angular_rate, imu.specific_force, strict=True):
             yield float(t), "/imu", "simnav.Imu", {"angular_velocity": _axes(w), "linear_acceleration": _axes(f)}
-    for s in recording.data.aids.values():
+    for each in recording.data.aids.values():
+        s = each.as_delivered()
         kind = KINDS[s.kind]
         for k in range(len(s)):
             value = dict(zip(kind.values, s.value[k].tolist(), strict=True))

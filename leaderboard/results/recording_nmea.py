@@ -81,7 +81,8 @@ def write_nmea(recording: Recording, path: Path) -> list[Path]:
         If no instrument has a sentence.
     """
     begin, lines, used = datetime(1970, 1, 1, tzinfo=UTC), [], set[tuple[str, str]]()
-    for stream in recording.data.aids.values():
+    for each in recording.data.aids.values():
+        stream = each.as_delivered()
         equation = KINDS[stream.kind].equation
         if not isinstance(equation, str) or equation not in _SENTENCES or stream.channels:
             continue

@@ -48,6 +48,7 @@ def start_of(recording: Recording) -> dict[str, Any]:
                 },
                 "details": dict(s.details),
                 "channels": list(s.channels),
+                **({} if s.timing is None else {"timing": vars(s.timing)}),
             }
             for s in instruments.values()
         },
@@ -96,6 +97,8 @@ def readme(recording: Recording) -> str:
     for name, s in recording.data.aids.items():
         kind = KINDS[s.kind]
         columns = ", ".join(f"{c.name} [{c.unit}]" for c in kind.components)
+        if s.has_clock:
+            columns += "; the time is the stamp, and the reading arrives at `arrival_s`"
         lines.append(f"| `{name}.csv` | {len(s)} | {kind.quantity}: {columns} |")
     if has_truth(recording):
         lines.append(f"| `truth.csv` | {len(recording.data.truth)} | the true states at the ends of the steps |")

@@ -37,7 +37,8 @@ def track_of(recording: Recording) -> tuple[str, Array, Array]:
     if has_truth(recording):
         known = np.isfinite(recording.data.truth.position).all(axis=1)
         return "truth", recording.data.truth.time[known], recording.data.truth.position[known]
-    for stream in recording.data.aids.values():
+    for each in recording.data.aids.values():
+        stream = each.as_delivered()
         if KINDS[stream.kind].geodetic and not stream.channels and len(stream):
             place = stream.value
             height = place[:, 2:3] if place.shape[1] == 3 else np.zeros((len(place), 1))

@@ -14,6 +14,7 @@ from simnav.leaderboard.ranking.board import Ranking, TrackRanking, TrackRow
 from simnav.leaderboard.ranking.ranking_figure import ranking_figure
 from simnav.leaderboard.ranking.ranking_table import gain_cell, ratio
 from simnav.leaderboard.ranking.summary import best_rows, gain_text, limits, sentence, spread
+from simnav.leaderboard.ranking.superseded import in_words
 from simnav.leaderboard.ranking.tables import MISSING
 from simnav.leaderboard.results.errors import RequestError
 from simnav.leaderboard.results.provenance import distinct
@@ -62,9 +63,9 @@ def tables(ranking: Ranking, results: Sequence[Result], of: int | None = None) -
         "fault. Recorded voyages have no oracle: there the plain filter on the same run is the divisor. Smaller is "
         "better."
     )
-    older = sorted({f"`{r.estimator}` ({r.superseded})" for t in tracks for r in t.rows if r.superseded})
+    older = sorted({(f"`{r.estimator}`", r.superseded) for t in tracks for r in t.rows if r.superseded})
     if older:
-        parts.append(f"Results of an older version, until the next edition: {', '.join(older)}.")
+        parts.append(f"Results of an older version, until the next edition: {in_words(older)}.")
     if tracks:
         parts.append("\n".join([
             "| track | scenarios | seeds | complete rows | may be the best (95 %) | error beside the plain row's "

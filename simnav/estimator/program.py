@@ -166,7 +166,8 @@ class ProgramEstimator(Estimator):
             "imu": None if imu is None else {"rate": imu.rate, **{t: vars(getattr(imu, t)) for t in _TRIADS}},
             "instruments": [
                 {"name": s.name, "kind": s.kind, "rate": s.rate, "sigma": s.sigma.tolist(),
-                 "bias": s.bias.tolist(), "lever_arm": s.lever_arm.tolist(), "channels": list(s.channels)}
+                 "bias": s.bias.tolist(), "lever_arm": s.lever_arm.tolist(), "channels": list(s.channels),
+                 **({} if s.timing is None else {"timing": vars(s.timing)})}
                 for s in instruments.values()
             ],
         }  # fmt: skip

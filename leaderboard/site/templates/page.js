@@ -65,8 +65,9 @@
   };
 
   const index = () => {
-    const tabs = [...document.querySelectorAll("[role=tab]")];
+    const tabs = [...document.querySelectorAll("[role=tab]")], select = at("tracks"); // the second on a phone
     const show = (tab, focus) => {
+      select.value = tab.dataset.track;
       for (const other of tabs) {
         const chosen = other === tab;
         other.setAttribute("aria-selected", chosen);
@@ -85,6 +86,10 @@
         state.set("track", next.dataset.track);
         show(next, true);
       });
+    });
+    select.addEventListener("change", () => {
+      state.set("track", select.value);
+      show(tabs.find((t) => t.dataset.track === select.value));
     });
     simnav.shown.rows = [];
     return tabs.length ? show(tabs.find((t) => t.dataset.track === state.get("track")) ?? tabs[0]) : null;

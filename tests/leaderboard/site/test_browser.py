@@ -109,6 +109,11 @@ def test_the_overview_opens_quickly_without_the_chart_library(browser, folder):
     assert len(visit.names()) > 2
     loaded = page.evaluate("performance.getEntriesByType('navigation')[0].domContentLoadedEventEnd")
     assert loaded < 1000.0 * 3  # a second on an idle machine; tests share theirs
+    assert not page.is_visible("[role=tablist]")  # tracks are chosen in a list
+    page.select_option("select[data-tracks]", "other")
+    page.wait_for_selector("#track-other tbody tr")
+    assert "track=other" in page.url
+    assert page.is_hidden("[role=tabpanel]:not(#track-other)")
     visit.context.close()
 
 

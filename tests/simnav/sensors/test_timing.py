@@ -228,3 +228,13 @@ def test_rows_of_a_stream():
     part = stream.rows(slice(3, 7))
     assert isinstance(part, AidStream)
     np.testing.assert_array_equal(part.arrival, stream.arrival[3:7])
+
+
+def test_a_stream_as_delivered_shows_no_true_time():
+    stream = run(LATE).data.aids["gnss"]
+    seen = stream.as_delivered()
+    assert np.all(np.diff(seen.time) >= 0.0)
+    np.testing.assert_array_equal(np.sort(stream.stamp), seen.time)
+    by_stamp = dict(zip(stream.stamp.tolist(), stream.arrival.tolist(), strict=True))
+    assert [by_stamp[t] for t in seen.time.tolist()] == seen.arrival.tolist()
+    assert not len(seen.stamp)
