@@ -139,6 +139,8 @@ class Piece:
         return self.make(**pieces, **{**self.fixed, **self.defaults, **values})
 
 
+#: The kinds of receivers that solve raw observations.
+_RECEIVERS = ("gnss_receiver",)
 _NAMED = (inspect.Parameter.POSITIONAL_OR_KEYWORD, inspect.Parameter.KEYWORD_ONLY)
 
 
@@ -179,6 +181,9 @@ class Row(Estimator):
     ----------
     recipe : mapping of str to Piece
         The pieces: ``solver``, and the pieces of the solver.
+    loose : bool
+        True for a row that takes the solution of a receiver in place of the raw observations which it solves
+        (`simnav.estimators.models.coupling`). Such a row needs a receiver.
     solver : Estimator
         The solver with its pieces. Its attributes are also attributes of the row: ``row.model``, ``row.covariance``.
 
@@ -190,6 +195,7 @@ class Row(Estimator):
     """
 
     recipe: ClassVar[Mapping[str, Piece]] = {}
+    loose: ClassVar[bool] = False
     solver: Estimator
     #: What is done with readings that arrive late: the parameter ``late`` of `simnav.estimator.make`.
     late: Manner = "replay"
@@ -227,11 +233,13 @@ class Row(Estimator):
 
     @property
     def needs(self) -> Needs:
-        """The instruments that its solver needs."""
-        return self.solver.needs
+        """The instruments that its solver needs; and a receiver, if it is loosely coupled."""
+        return (*self.solver.needs, _RECEIVERS) if self.loose else self.solver.needs
 
     def reset(self, start: InitialState, instruments: Instruments) -> None:
         """Begin a run; UnsuitableScenario where the pieces lack an instrument."""
+        if self.loose:
+            instruments = instruments.without({name for sheet in instruments.values() for name in sheet.sources})
         self._instruments = instruments
         self._late = self._late_arrivals() if any(sheet.timing for sheet in instruments.values()) else None
         self.solver.reset(start, instruments)

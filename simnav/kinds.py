@@ -505,6 +505,8 @@ class Datasheet:
         Further coloured processes of the error. White ones are in ``sigma``.
     timing : TimingSheet or None
         What is known of its time stamps, and of how late readings arrive. None: nothing, or that both are perfect.
+    sources : tuple of str
+        Names of the instruments whose readings it solves: its errors are theirs. Whoever uses both counts them twice.
     """
 
     name: str
@@ -523,6 +525,7 @@ class Datasheet:
     channels: tuple[str, ...] = ()
     processes: tuple[DeclaredProcess, ...] = ()
     timing: TimingSheet | None = None
+    sources: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         if self.kind not in KINDS:

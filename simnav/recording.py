@@ -35,10 +35,12 @@ from simnav.types import (
     TriadDatasheet,
 )
 
-__all__ = ["AidStream", "Block", "FaultLabel", "ImuLabels", "Recording", "RecordingError", "packets"]
+__all__ = ["REFLECTION", "AidStream", "Block", "FaultLabel", "ImuLabels", "Recording", "RecordingError", "packets"]
 
 #: Version of the files that `Recording.save` writes. It is increased when their format changes.
 FORMAT = 1
+#: Kind of the label of errors by reflections, which the surroundings make and no fault of a scenario.
+REFLECTION = "reflection"
 
 
 class RecordingError(ValueError):
@@ -428,7 +430,7 @@ _STATES_OF: dict[type[NavigationStates], tuple[str, ...]] = {
 }
 
 #: Fields of a datasheet that most have not.
-_OPTIONAL = ("details", "blocks", "channels", "processes", "timing")
+_OPTIONAL = ("details", "blocks", "channels", "processes", "timing", "sources")
 
 
 def _sheet(sheet: Datasheet | ImuDatasheet) -> dict[str, Any]:
@@ -503,6 +505,7 @@ def _instruments(sheets: Mapping[str, Any], step: float) -> Instruments:
         fields["channels"] = tuple(aid.get("channels", ()))
         fields["timing"] = TimingSheet(**aid["timing"]) if "timing" in aid else None
         fields["processes"] = tuple(_process(p) for p in aid.get("processes", ()))
+        fields["sources"] = tuple(aid.get("sources", ()))
         aids.append(Datasheet(**fields))
     return Instruments(aids, imu, step)
 

@@ -9,7 +9,7 @@ attitude error [rad], the rotation vector of C_est C_true^T resolved in north-ea
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -146,6 +146,11 @@ class Instruments(Mapping[str, Datasheet]):
     def __len__(self) -> int:
         return len(self._aids)
 
+    def without(self, names: Collection[str]) -> Instruments:
+        """The instruments but those of the given names; itself if it has none of them."""
+        kept = [a for name, a in self._aids.items() if name not in names]
+        return self if len(kept) == len(self._aids) else Instruments(kept, self.imu, self.step)
+
     def of_kind(self, *kinds: str) -> list[Datasheet]:
         """The datasheets of the given kinds, in the scenario's order."""
         return [a for a in self._aids.values() if a.kind in kinds]
@@ -192,7 +197,7 @@ class Measurement(NamedTuple):
     Attributes
     ----------
     time : float
-        Time of validity [s].
+        Time stamp [s]. It is the time of validity, but for what ``Datasheet.timing`` says of the clock.
     instrument, kind : str
         Name in the scenario, and key of `KINDS`.
     value : (d,) array
@@ -228,7 +233,8 @@ class Measurements:
     imu : ImuSamples or None
         IMU samples of the step; None for a vessel without an IMU.
     aids : list of Measurement
-        Aiding measurements in order of time. Iteration over the packet gives these.
+        Aiding measurements that arrive in the step, in order of their stamps. One that arrives late may be older than
+        the step. Iteration over the packet gives these.
     """
 
     start: float

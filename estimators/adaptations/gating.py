@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from simnav.estimators.algebra.chi_square import chi_square_limits
+from simnav.estimators.models.channels import ChannelDatasheet
 from simnav.types import Array, Instruments
 
 from .base import Innovation
@@ -17,7 +18,8 @@ class ChiSquareGate(NoiseAdaptation):
     Bar-Shalom, Li and Kirubarajan (2001), section 5.4; Groves (2013), section 17.3.1. With a gate alone a filter with a
     wrong state and a small covariance never recovers, because every good measurement fails the test. So if all
     measurements of an instrument have failed for ``patience`` seconds, the filter is taken as wrong: its measurements
-    are used again until one of them passes.
+    are used again until one of them passes. The channels of an instrument are witnesses against one another: those of a
+    satellite are used again only if more than half of the satellites that are heard fail.
 
     Parameters
     ----------
@@ -39,13 +41,24 @@ class ChiSquareGate(NoiseAdaptation):
         super().reset(instruments)
         self._limits = chi_square_limits(self.probability)
         self._failing: dict[str, float] = {}
+        self._heard: dict[str, float] = {}
+        self._owner = {s.name: s.instrument for s in instruments.values() if isinstance(s, ChannelDatasheet)}
 
     def choose(self, innovation: Innovation) -> Array | None:
         """The nominal noise, or None."""
         nis = normalised_square(innovation.residual, innovation.predicted, innovation.noise)
         name, time = innovation.measurement.instrument, innovation.measurement.time
+        self._heard[name] = time
         if nis <= self._limits[len(innovation.residual)]:
             self._failing.pop(name, None)
             return innovation.noise
         since = self._failing.setdefault(name, time)
-        return innovation.noise if time - since >= self.patience else None
+        return innovation.noise if time - since >= self.patience and self._doubtful(name, time) else None
+
+    def _doubtful(self, name: str, time: float) -> bool:
+        """Whether the filter is doubted, and not a channel: most channels of the instrument fail."""
+        owner = self._owner.get(name)
+        if owner is None:
+            return True
+        heard = [n for n, last in self._heard.items() if self._owner.get(n) == owner and time - last <= self.patience]
+        return 2 * sum(n in self._failing for n in heard) > len(heard)

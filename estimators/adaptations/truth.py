@@ -8,6 +8,8 @@ The oracles know the statistics of a fault, not its values:
 - A gross error is noise with the second moment of its distribution. If that is more than `LIMIT` sigma, the measurement
   is rejected.
 - A frozen or false value contains no information and is rejected.
+- An error by a reflection of obstacles or the sea is subtracted: the oracles know the map. If another fault has touched
+  the measurement, too, its error is not known by itself, and the next rule holds.
 
 If a recording does not hold the size of its faults, or a fault of a third party has another effect, the true added
 error is used.
@@ -25,7 +27,7 @@ import numpy as np
 from simnav.estimators.models.channels import of_channels, whole
 from simnav.estimators.models.declared_errors import error_of_fault
 from simnav.estimators.models.fault_states import FaultState
-from simnav.recording import AidStream, FaultLabel, Recording
+from simnav.recording import REFLECTION, AidStream, FaultLabel, Recording
 from simnav.sensors.faults import FAULTS, effect_of, size_by_component, size_range
 from simnav.types import KINDS, Array, Instruments, Measurement
 
@@ -53,12 +55,14 @@ class TrueNoise(Adaptation):
         self._streams: dict[str, tuple[AidStream, Array]] = {}
         self._states: dict[str, int] = {}
         self._affected: list[list[str]] = []
+        self._reflections = 0
 
     def reveal(self, recording: Recording) -> None:
         """Receive the labels of a recording."""
         parts = [part for stream in recording.data.aids.values() for part in of_channels(stream)]
         self._streams = {part.name: (part, np.asarray(part.time)) for part in parts}
         self.faults = recording.faults
+        self._reflections = sum(1 << j for j, fault in enumerate(self.faults) if fault.kind == REFLECTION)
         self._affected = [_sources(fault, recording) for fault in self.faults]
 
     def reset(self, instruments: Instruments) -> None:
@@ -94,6 +98,18 @@ class TrueNoise(Adaptation):
             return 0.0
         return 1.0 if start is None else max(time - start, 0.0)
 
+    def corrected(self, measurement: Measurement) -> Measurement:
+        """A measurement without the error by a reflection, if that is the only one."""
+        if not self._reflections or measurement.source not in self._streams:
+            return measurement
+        stream, k = self._label(measurement.source, measurement.time)
+        return _without_error(measurement, stream, k) if self._bits(stream, k) != stream.faults[k] else measurement
+
+    def _bits(self, stream: AidStream, k: int) -> int:
+        """The faults of a measurement, without a reflection that is subtracted."""
+        bits = int(stream.faults[k])
+        return bits if bits & ~self._reflections else 0
+
     def _label(self, source: str, time: float) -> tuple[AidStream, int]:
         """The stream of an instrument or a channel, and the index of its measurement at a time."""
         stream, times = self._streams[source]
@@ -107,7 +123,7 @@ class TrueNoise(Adaptation):
         sheet, of_reading = self._sheets[m.source], KINDS[m.kind].reading_sigma
         nominal = sheet.sigma if of_reading is None else np.asarray(of_reading(m.side, whole(sheet)))
         noise = innovation.noise + np.diag(stream.sigma[k, :d] ** 2 - nominal[:d] ** 2)
-        bits = int(stream.faults[k]) & ~self._states.get(m.source, 0)
+        bits = self._bits(stream, k) & ~self._states.get(m.source, 0)
         faults = (
             [j for j, f in enumerate(self.faults) if bits >> j & 1 and effect_of(f.kind) != "noise"] if bits else []
         )
@@ -154,7 +170,7 @@ class FaultTimes(TrueNoise):
         """The true noise of a measurement without a fault; None with one."""
         m = innovation.measurement
         stream, k = self._label(m.source, m.time)
-        return None if stream.faults[k] else self._white(innovation)[0]
+        return None if self._bits(stream, k) else self._white(innovation)[0]
 
 
 class NominalNoise(TrueNoise):
@@ -167,10 +183,7 @@ class NominalNoise(TrueNoise):
     def restore(self, measurement: Measurement) -> Measurement:
         """A measurement without the error that the faults added."""
         stream, k = self._label(measurement.source, measurement.time)
-        if not stream.faults[k]:
-            return measurement
-        value = KINDS[stream.kind].add_error(measurement.value[None], -stream.fault_error[k : k + 1])[0]
-        return measurement._replace(value=value)
+        return _without_error(measurement, stream, k) if stream.faults[k] else measurement
 
     def adapt(self, innovation: Innovation) -> Array | None:
         """The noise without faults."""
@@ -309,6 +322,12 @@ def _sources(fault: FaultLabel, recording: Recording) -> list[str]:
         of_fault = [c for c in stream.channels if not fault.channels or c in fault.channels] if stream else []
         found += [f"{name}:{channel}" for channel in of_fault] if stream and stream.channels else [name]
     return found
+
+
+def _without_error(measurement: Measurement, stream: AidStream, k: int) -> Measurement:
+    """A measurement without all that was added to it."""
+    value = KINDS[stream.kind].add_error(measurement.value[None], -stream.fault_error[k : k + 1])[0]
+    return measurement._replace(value=value)
 
 
 def _size(fault: FaultLabel, stream: AidStream) -> Array | None:

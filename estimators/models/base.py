@@ -121,6 +121,10 @@ class ErrorModel(ABC):
     def observes(self, instrument: Datasheet) -> bool:
         """Whether the model can use the measurements of an instrument."""
 
+    def holds(self, instrument: Datasheet) -> bool:
+        """Whether the model has a state for each block that an instrument brings along."""
+        return True
+
     def load(self, imu: ImuSamples | None) -> None:  # noqa: B027 (most models have no IMU)
         """Receive the IMU samples of the next step."""
 

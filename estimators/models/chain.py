@@ -332,6 +332,10 @@ class Chain(ABC):
         """Whether measurements of an instrument can be factors."""
         return self.front.observes(instrument)
 
+    def holds(self, instrument: Datasheet) -> bool:
+        """Whether the model has a state for each block that an instrument brings along."""
+        return self.front.holds(instrument)
+
     def load(self, imu: ImuSamples | None) -> None:
         """Take the IMU samples of the step that follows."""
         self.front.load(imu)

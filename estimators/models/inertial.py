@@ -282,6 +282,10 @@ class InertialModel(ErrorModel):
         """Every kind of instrument that has a measurement equation."""
         return instrument.equation in EQUATIONS or KINDS[instrument.kind].observation is not None
 
+    def holds(self, instrument: Datasheet) -> bool:
+        """Whether blocks of an instrument are states, and not white noise."""
+        return self.calibrate or not instrument.blocks
+
     def arrays(self, names: Sequence[str]) -> dict[str, NDArray[Any]] | None:
         """The state and the constants, for a kernel that goes through many filters.
 

@@ -51,7 +51,8 @@ from simnav.estimator import UnsuitableScenario
 from simnav.estimators.adaptations.base import Adaptation
 from simnav.estimators.algebra.joseph import joseph_update
 from simnav.estimators.models.base import Observation
-from simnav.estimators.models.channels import by_channel, instrument_of
+from simnav.estimators.models.channels import instrument_of
+from simnav.estimators.models.coupling import by_source
 from simnav.estimators.models.inertial import InertialModel
 from simnav.estimators.models.nine_state import NineStateModel
 from simnav.estimators.models.propagation import propagate_covariance
@@ -137,7 +138,7 @@ class FederatedEstimator(KalmanEstimator):
 
     def reset(self, start: InitialState, instruments: Instruments) -> None:
         """Begin a run."""
-        instruments = by_channel(without_shared_blocks(instruments))
+        instruments = by_source(without_shared_blocks(instruments), self._choice, self.label)
         super().reset(start, instruments)
         self._of = {name: instrument_of(instruments[name]) for name in self._names}
         names = list(dict.fromkeys(self._of.values()))

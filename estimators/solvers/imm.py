@@ -12,7 +12,8 @@ from simnav.compiled import kernel
 from simnav.estimators.adaptations.base import Innovation
 from simnav.estimators.adaptations.prediction import PredictionTest
 from simnav.estimators.algebra.cholesky import factorise, invert_factor
-from simnav.estimators.models.channels import by_channel, summary
+from simnav.estimators.models.channels import summary
+from simnav.estimators.models.coupling import by_source
 from simnav.estimators.models.suitable import ModelChoice
 from simnav.types import KINDS, Array, Estimate, InitialState, Instruments, Measurement, Measurements
 
@@ -198,7 +199,7 @@ class ImmEstimator(KalmanEstimator):
 
     def reset(self, start: InitialState, instruments: Instruments) -> None:
         """Begin a run."""
-        instruments = by_channel(instruments)
+        instruments = by_source(instruments, self._choice, self.label)
         super().reset(start, instruments)
         self._prediction = PredictionTest(instruments)
         # The chain's stationary distribution

@@ -27,7 +27,8 @@ import numpy as np
 from simnav.estimators.adaptations.base import Adaptation, Innovation
 from simnav.estimators.composition import Solver
 from simnav.estimators.models.base import ErrorModel, Linearised, Observation
-from simnav.estimators.models.channels import by_channel, owners, summary
+from simnav.estimators.models.channels import owners, summary
+from simnav.estimators.models.coupling import by_source
 from simnav.estimators.models.suitable import ModelChoice
 from simnav.types import Array, Estimate, InitialState, Instruments, Measurement, Measurements, NavigationStates
 
@@ -92,7 +93,7 @@ class KalmanEstimator(Solver):
 
     def reset(self, start: InitialState, instruments: Instruments) -> None:
         """Begin a run; UnsuitableScenario if the model lacks an instrument."""
-        instruments = by_channel(instruments)
+        instruments = by_source(instruments, self._choice, self.label)
         self.model = self._chosen(instruments)
         self.model.reports_all |= self.reports_all
         self.covariance = self.model.begin(start, instruments)

@@ -100,7 +100,8 @@ class OracleEstimator(KalmanEstimator):
         if self._recording.actual_covariance is not None:
             start = replace(start, covariance=self._recording.actual_covariance)
         if self._recording.actual is not None:
-            instruments = self._recording.actual
+            actual = self._recording.actual
+            instruments = actual.without(actual.keys() - instruments.keys())
         if self._motion is not None:
             start, instruments = levelled(start, self._recording), with_imu(instruments)
         super().reset(start, instruments)
@@ -126,6 +127,8 @@ class OracleEstimator(KalmanEstimator):
             imu = self._motion[first:last]
         if self.restore and isinstance(self.truth, NominalNoise):
             aids = [self.truth.restore(m) for m in aids]
+        else:
+            aids = [self.truth.corrected(m) for m in aids]
         if imu is not None and len(imu) and self._imu_faults is not None:
             times, error = self._imu_faults
             k = int(np.searchsorted(times, imu.time[0] - 1e-9))

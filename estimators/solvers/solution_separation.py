@@ -1,9 +1,8 @@
 """Solution separation: one sub-filter for every instrument that may be wrong, which does not use this instrument.
 
 The main filter uses all instruments, sub-filter i all except instrument i. If instrument i is wrong, sub-filter i is
-right and the main filter is wrong. Then their estimates differ by more than the test of
-`simnav.estimators.solvers.separation` allows. Each channel of an instrument counts as an instrument here: a spoofed
-satellite is excluded by itself.
+right and the main filter is wrong. Then their estimates differ by more than `simnav.estimators.solvers.separation`
+allows. Each channel of an instrument counts as an instrument here: a spoofed satellite is excluded by itself.
 
 **Exclusion.** If a test fails, one instrument is excluded. The suspects are the instruments with a large separation,
 and those whose innovations in the main filter have been improbable for longer than a gross error lasts. The choice is
@@ -100,7 +99,8 @@ from typing import ClassVar
 import numpy as np
 
 from simnav.estimators.composition import Solver
-from simnav.estimators.models.channels import by_channel, owners, reading_of, summary
+from simnav.estimators.models.channels import owners, reading_of, summary
+from simnav.estimators.models.coupling import by_source
 from simnav.estimators.models.roles import fixes_and_logs
 from simnav.estimators.models.suitable import ModelChoice
 from simnav.types import KINDS, Array, Estimate, InitialState, Instruments, Measurements
@@ -209,7 +209,7 @@ class SolutionSeparation(Solver):
         """Begin a run; UnsuitableScenario if the model lacks an instrument."""
         from scipy.stats import norm
 
-        instruments = by_channel(instruments)
+        instruments = by_source(instruments, self._choice, self.label)
         self._begin_with = start, instruments
         self._inertial = instruments.imu is not None
         self._horizon = self.horizon if self._inertial else self.horizon_without_imu

@@ -25,7 +25,7 @@ import numpy as np
 
 from simnav.estimators.algebra.joseph import joseph_update
 from simnav.estimators.algebra.whitening import whitening
-from simnav.estimators.models.channels import by_channel
+from simnav.estimators.models.coupling import by_source
 from simnav.estimators.models.suitable import ModelChoice
 from simnav.estimators.weightings.base import Factors, Weighting
 from simnav.types import Array, Estimate, InitialState, Instruments, Measurement, Measurements
@@ -72,7 +72,7 @@ class WeightedKalmanEstimator(KalmanEstimator):
 
     def reset(self, start: InitialState, instruments: Instruments) -> None:
         """Begin a run; UnsuitableScenario if the model lacks an instrument."""
-        instruments = by_channel(instruments)
+        instruments = by_source(instruments, self._choice, self.label)
         super().reset(start, instruments)
         self.weighting.reset(instruments)
         self._index = {name: k for k, name in enumerate(instruments)}

@@ -55,7 +55,8 @@ from simnav.estimators.algebra.block_tridiagonal import after_step, half_squares
 from simnav.estimators.composition import Solver
 from simnav.estimators.models.base import ErrorModel
 from simnav.estimators.models.chains import Chain, chain_of
-from simnav.estimators.models.channels import by_channel, owners, summary
+from simnav.estimators.models.channels import owners, summary
+from simnav.estimators.models.coupling import by_source
 from simnav.estimators.models.suitable import ModelChoice
 from simnav.estimators.weightings.base import Factors, Isolation, Weighting
 from simnav.types import Array, Estimate, InitialState, Instruments, Measurement, Measurements
@@ -163,7 +164,8 @@ class WindowEstimator(LooksBack, Solver):
 
     def longest_lag(self, instruments: Instruments) -> float:
         """The time that the window holds [s]: an epoch is a step, or the interval of the fastest instrument in use."""
-        model = self._choice.choose(by_channel(instruments), self.label)
+        instruments = by_source(instruments, self._choice, self.label)
+        model = self._choice.choose(instruments, self.label)
         rates = [sheet.rate for sheet in instruments.values() if model.observes(sheet) and sheet.rate > 0.0]
         if self.window is None or not rates:
             return inf
@@ -171,7 +173,7 @@ class WindowEstimator(LooksBack, Solver):
 
     def reset(self, start: InitialState, instruments: Instruments) -> None:
         """Begin a run; UnsuitableScenario if the model lacks an instrument."""
-        instruments = by_channel(instruments)
+        instruments = by_source(instruments, self._choice, self.label)
         self.chain = chain_of(self._choice.choose(instruments, self.label))
         self.chain.front.reports_all |= self.reports_all
         self.covariance = self.chain.begin(start, instruments)

@@ -157,8 +157,8 @@ def _kind(spec: type[Spec], fallback: str) -> KindItem:
 
 #: Tracks and groups as they are listed; those of others follow, by name.
 _TRACKS = (
-    "aided-ins", "no-imu", "underwater", "long", "generalisation", "generalisation-no-imu", "robustness", "recorded",
-    "papers",
+    "aided-ins", "no-imu", "underwater", "long", "generalisation", "generalisation-no-imu", "robustness", "satellites",
+    "recorded", "papers",
 )  # fmt: skip
 _GROUPS = ("clean", "degraded GNSS", "outages", "gross errors", "wrong datasheet", "wrong start", "extremes")
 

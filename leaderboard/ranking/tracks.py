@@ -33,6 +33,7 @@ _TITLES = {
     "generalisation-no-imu": "Generalisation without an IMU",
     "robustness": "Beyond the datasheets",
     "coloured": "Errors as they are at sea",
+    "satellites": "Satellites, tightly and loosely coupled",
     "recorded": "Recorded voyages",
     "papers": "Scenarios of papers",
     "other": "Other scenarios",

@@ -12,7 +12,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from simnav.recording import AidStream
+from simnav.recording import AidStream, FaultLabel
 from simnav.sensors.error_processes import TotalError
 from simnav.sensors.instrument import AidSpec, Instrument, InstrumentError, label_of, raised
 from simnav.sensors.processes import GaussMarkov
@@ -45,7 +45,11 @@ class ChannelInstrument(Instrument):
         Turn-on bias of each channel in this run.
     totals : list of TotalError
         The further processes of each channel; empty without any.
+    bit : int
+        Number of the label of its own (`own_label`) among those of the run.
     """
+
+    bit: int = 0
 
     def __init__(self, spec: AidSpec, name: str, seed: int):
         super().__init__(spec, name, seed)
@@ -106,6 +110,16 @@ class ChannelInstrument(Instrument):
 
     def available(self, tap: TapStates) -> NDArray[np.bool_] | None:
         """An (n, c) mask of the readings that are delivered; None: all."""
+        return None
+
+    def own_label(self, duration: float) -> FaultLabel | None:
+        """The label of errors that the surroundings make and no fault of the scenario; None: there are none.
+
+        Parameters
+        ----------
+        duration : float
+            Length of the run [s].
+        """
         return None
 
     def ahead(self, time: Array) -> tuple[Array, Array]:

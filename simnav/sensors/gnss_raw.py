@@ -14,13 +14,15 @@ error of the satellite's clock, and says where the satellite is. With two freque
 
 If the surroundings have ``obstacles`` (`simnav.world.obstacles`), a signal whose direct way is blocked arrives by a
 reflection or not at all, and a signal with a reflection has the error of `simnav.satellites.multipath`. The vessel's
-own structures block, too (`shadows`), and the sea reflects (`sea_reflection`). Estimators are told of none of them.
+own structures block, too (`shadows`), and the sea reflects (`sea_reflection`). Estimators are told of none of them. An
+error by a reflection has the label of kind ``reflection``.
 """
 
 from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping
+from dataclasses import replace
 from datetime import datetime
 from functools import lru_cache
 from math import radians
@@ -41,6 +43,7 @@ from pydantic import (
 from simnav.blocks import StateBlock
 from simnav.geometry.earth import displace
 from simnav.kinds import Component, Kind
+from simnav.recording import REFLECTION, AidStream, FaultLabel
 from simnav.satellites.ephemeris import Ephemerides
 from simnav.satellites.multipath import multipath_error, sea_reflection, strength_change
 from simnav.satellites.receiver_clock import Grade, clock_block
@@ -62,6 +65,8 @@ SYSTEMS: Mapping[str, str] = {"gps": "G", "galileo": "E", "beidou": "C"}
 #: The ephemerides that come with simnav, and a time at which they are valid.
 SHIPPED = Path(__file__).parent.parent / "satellites" / "data" / "2023-03-12-noon.rnx"
 SHIPPED_EPOCH = "2023-03-12T12:00:00"
+#: Errors by reflections that are larger have a label: of ranges [m], and of rates [m/s].
+_LABELLED = (0.1, 0.01)
 #: How often the sky is looked at when the satellites of a place are chosen [s].
 _GLANCE = 60.0
 
@@ -325,6 +330,25 @@ class RawReceiver(ChannelInstrument):
         both = multipath_error(paths.excess, self.spec.reflection, self.spec.spacing)
         error = np.where(alone, paths.excess, np.where(paths.blocked, 0.0, both + sea))
         return error, np.where(alone, paths.excess_rate, 0.0)
+
+    def own_label(self, duration: float) -> FaultLabel | None:
+        """Of the errors by reflections, where there are obstacles or a sea that reflects."""
+        if self.surroundings.get("obstacles") is None and not self.spec.sea_reflection:
+            return None
+        return FaultLabel(REFLECTION, (self.name,), 0.0, duration)
+
+    def sense(self, tap: TapStates) -> AidStream:
+        """See `ChannelInstrument.sense`. Reflections are labelled, with their errors."""
+        stream = super().sense(tap)
+        if self.own_label(1.0) is None:
+            return stream
+        row = np.searchsorted(tap.time, stream.time)
+        error = np.stack(self.detour(tap), axis=2)[row, stream.channel]
+        touched: NDArray[np.bool_] = np.any(abs(error) > _LABELLED, axis=1)
+        return replace(
+            stream, faults=np.where(touched, np.uint32(1 << self.bit), np.uint32(0)),
+            fault_error=np.where(touched[:, None], error, 0.0),
+        )  # fmt: skip
 
     def from_sea(self, tap: TapStates) -> tuple[Array, Array]:
         """(n, c) excess paths [m] and amplitudes of the signals that the sea reflects."""

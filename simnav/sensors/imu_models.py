@@ -11,7 +11,8 @@ The figures are entered in the units of the datasheets. Three rules lead from a 
 - No datasheet states a correlation time. It is set to 300 s for MEMS and to 3600 s for optical gyroscopes.
 
 What a datasheet does not state is zero (noise, biases) or without limit (ranges). `ImuModel.read_in` says where the
-figures were read, because not every datasheet is public.
+figures were read, because not every datasheet is public. The revision of the datasheet is given where the reading says
+it. A unit whose figures only one project quotes, without a revision, is not listed.
 """
 
 from __future__ import annotations
@@ -107,13 +108,6 @@ _MODELS = (
         read_in="IMU page of the dataset 3D LiDAR SLAM Benchmark at iiLab; ranges in the listing of the datasheet",
         gyroscope={"random_walk_deg_s_sqrt_hz": 0.007, "bias_instability_deg_h": 8.0, "range_deg_s": 2000.0},
         accelerometer={"random_walk_ug_sqrt_hz": 60.0, "bias_instability_ug": 15.0, "range_g": 10.0},
-    ),
-    ImuModel(
-        "Ellipse-N", "SBG Systems", "mems",
-        datasheet="Ellipse-N performance specifications",
-        read_in="a public project that quotes the manufacturer's page",
-        gyroscope={"random_walk_deg_sqrt_h": 0.18, "bias_instability_deg_h": 7.0},
-        accelerometer={"random_walk_ug_sqrt_hz": 57.0, "bias_instability_ug": 14.0},
     ),
     ImuModel(
         "ADIS16488", "Analog Devices", "industrial",

@@ -193,8 +193,7 @@ class AidSpec(Spec):
         return (StateBlock(LEVER_ARM, 3, "m", tuple(sigma)),)
 
     def channels(self) -> tuple[str, ...]:
-        """The identifiers of the channels of this instrument (satellites, beams, beacons); none, unless a subclass says
-        so.
+        """Identifiers of the channels of this instrument (satellites, beams, beacons); none, unless a subclass says so.
 
         With channels `build` returns a `simnav.sensors.ChannelInstrument`, whose `observe` returns readings of the
         shape (n, c, d): for each of n times one of each of the c channels.
@@ -259,6 +258,7 @@ class AidSpec(Spec):
             self.channels(),
             declared_processes(self.processes, definition),
             None if self.timing is None else self.timing.sheet(),
+            tuple(self.sources()),
         )
 
     def build(self, name: str, seed: int) -> Instrument:

@@ -15,10 +15,11 @@ import numpy as np
 from simnav.recording import AidStream, Block, ImuLabels, Recording
 from simnav.scenario import Scenario
 from simnav.sensors import DerivedInstrument
+from simnav.sensors.channels import ChannelInstrument
 from simnav.sensors.faults import build_layers, labels
 from simnav.sensors.timing import Clock
 from simnav.spec import SpecError
-from simnav.types import Array, InitialState, NavigationStates
+from simnav.types import KINDS, Array, InitialState, NavigationStates
 from simnav.world import Steered, Surroundings, Trajectory, WorldBlock
 from simnav.world.initial_state import draw_start
 
@@ -133,6 +134,10 @@ class Simulator:
         self.clocks = {n: Clock(spec.timing, n, root) for n, spec in actual.aids.items() if spec.timing is not None}
         kinds = {name: spec.kind for name, spec in scenario.aids.items()}
         self.faults = labels(scenario.faults, scenario.duration, kinds)
+        for instrument in self.aids.values():
+            if isinstance(instrument, ChannelInstrument) and (own := instrument.own_label(scenario.duration)):
+                instrument.bit = len(self.faults)
+                self.faults = (*self.faults, own)
         self.layers = build_layers(scenario.faults, root)
         self._label_imu = any("imu" in f.instruments for f in scenario.faults)
 
@@ -285,7 +290,9 @@ def ideal(scenario: Scenario, seed: int) -> Recording:
     clean = _recording(Simulator(perfect, seed, truth=truth)).data
     aids = {}
     for name, stream in real.data.aids.items():
-        value = clean.aids[name].value[clean.aids[name].places(stream.time, stream.channel)]
+        perfect_one = clean.aids[name]
+        value = KINDS[stream.kind].add_error(perfect_one.value, -perfect_one.fault_error)  # without reflections
+        value = value[perfect_one.places(stream.time, stream.channel)]
         aids[name] = replace(stream, value=value, fault_error=np.zeros_like(stream.fault_error))
     state, start = real.initial_truth, real.start
     start = InitialState(start.time, state.position[0], state.velocity[0], state.attitude[0], start.covariance)

@@ -16,6 +16,7 @@ House 2013, sections 9.3.4 and 10.4.1; the excess is that of a plane wave on a p
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from math import cos, inf, sin
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self
@@ -26,7 +27,7 @@ from pydantic import Field, SerializerFunctionWrapHandler, ValidationError, mode
 
 from simnav.compiled import Array, Flags, Integers, kernel
 from simnav.geometry.earth import relative_position
-from simnav.spec import Spec, SpecError, quantity
+from simnav.spec import Positive, Spec, SpecError, quantity, without_later
 from simnav.world.geojson import read_buildings
 from simnav.world.surroundings import SurroundingSpec, register_surrounding
 
@@ -40,7 +41,7 @@ _NEAREST = 1e-6
 
 
 class Obstacle(Spec):
-    """A prism.
+    """A prism: over a polygon, or over a rectangle.
 
     Attributes
     ----------
@@ -48,12 +49,23 @@ class Obstacle(Spec):
         Name, for messages.
     corners : tuple of (float, float)
         Corners of the polygon, north and east of the origin of the map [m]; three or more, in order.
+    centre : (float, float) or None
+        Of the rectangle, north and east of the origin [m].
+    size : (float, float) or None
+        Length and width of the rectangle [m].
+    heading : float
+        Direction of its length [rad].
     bottom, top : float
         Heights above the ellipsoid [m].
     """
 
+    later: ClassVar[Mapping[str, Any]] = {"corners": (), "centre": None, "size": None, "heading": 0.0}
+
     name: str = ""
-    corners: Annotated[tuple[_Corner, ...], Field(min_length=3, max_length=1000)] = quantity("m")
+    corners: Annotated[tuple[_Corner, ...], Field(max_length=1000)] = quantity("m", ())
+    centre: _Corner | None = quantity("m", None)
+    size: tuple[Positive, Positive] | None = quantity("m", None)
+    heading: float = quantity("deg", 0.0)
     bottom: float = quantity("m", 0.0)
     top: float = quantity("m")
 
@@ -61,9 +73,25 @@ class Obstacle(Spec):
     def _proper(self) -> Self:
         if not self.bottom < self.top:
             raise ValueError(f"obstacle {self.name!r}: top_m = {self.top:g} should be above bottom_m = {self.bottom:g}")
-        if abs(_area(np.array(self.corners))) < _LEAST_AREA:
+        if (self.centre is None) != (self.size is None) or (self.centre is None) != bool(self.corners):
+            raise ValueError(f"obstacle {self.name!r}: it has either corners_m, or centre_m and size_m")
+        if self.centre is None and len(self.corners) < 3:
+            raise ValueError(f"obstacle {self.name!r}: corners_m are three or more, not {len(self.corners)}")
+        if abs(_area(self.outline())) < _LEAST_AREA:
             raise ValueError(f"obstacle {self.name!r}: its corners_m lie on a line; they should enclose an area")
         return self
+
+    @model_serializer(mode="wrap")
+    def _without_later(self, serialize: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        return without_later(serialize(self), self.later)
+
+    def outline(self) -> Array:
+        """The (k, 2) corners, north and east of the origin [m]."""
+        if self.centre is None or self.size is None:
+            return np.array(self.corners)
+        half, c, s = 0.5 * np.array(self.size), cos(self.heading), sin(self.heading)
+        ends = np.array([[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]]) * half
+        return np.asarray(self.centre + ends @ np.array([[c, s], [-s, c]]))
 
 
 @register_surrounding
@@ -165,7 +193,7 @@ class ObstacleMap:
         origin, obstacles = spec.every()
         self._origin = np.array([*origin, 0.0])
         self._names = [o.name or f"number {k}" for k, o in enumerate(obstacles, 1)]
-        polygons = [np.array(o.corners) for o in obstacles]
+        polygons = [o.outline() for o in obstacles]
         polygons = [p if _area(p) > 0.0 else p[::-1] for p in polygons]
         walls = [np.hstack([p, np.roll(p, -1, axis=0)]) for p in polygons]
         self._walls = np.ascontiguousarray(np.concatenate(walls) if walls else np.empty((0, 4)))

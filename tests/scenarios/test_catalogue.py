@@ -69,6 +69,7 @@ def test_every_scenario_tells_its_reader_what_it_is(header: Header):
         "papers",
         "robustness",
         "coloured",
+        "satellites",
     }
     assert scenario.track in tracks | {"training"}
     assert scenario.training == header.training == (scenario.track == "training")
@@ -238,7 +239,17 @@ def test_the_catalogue_is_packaged():
 
 
 @pytest.mark.parametrize(
-    "track", ["aided-ins", "no-imu", "underwater", "long", "generalisation", "generalisation-no-imu", "robustness"]
+    "track",
+    [
+        "aided-ins",
+        "no-imu",
+        "underwater",
+        "long",
+        "generalisation",
+        "generalisation-no-imu",
+        "robustness",
+        "satellites",
+    ],
 )
 def test_a_track_has_an_estimator_that_suits_all_of_it(track: str):
     """The ranking takes full coverage only."""

@@ -9,7 +9,7 @@ at low speed from time constants. As there, the Munk moment is left out. In dept
 
 from __future__ import annotations
 
-from functools import cached_property
+from functools import cache
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
@@ -23,6 +23,7 @@ from simnav.world.vessel import register_vessel
 __all__ = ["Auv"]
 
 
+@cache
 def _hull() -> Hull:
     length, diameter, water = 1.6, 0.19, 1026.0
     body, added = spheroid(length, diameter, water)
@@ -65,7 +66,7 @@ class Auv(ManoeuvringVessel):
     turn_rate: Annotated[float, Field(gt=0.0, lt=0.6)] = quantity("deg_s", 0.08726646259971647)
     heel: NonNegative = 0.0
 
-    @cached_property
+    @property
     def hull(self) -> Hull:
         """See `ManoeuvringVessel.hull`."""
         return _hull()

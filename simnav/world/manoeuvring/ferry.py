@@ -11,7 +11,7 @@ table 2).
 
 from __future__ import annotations
 
-from functools import cached_property
+from functools import cache
 from typing import Annotated, Literal
 
 import numpy as np
@@ -25,6 +25,7 @@ from simnav.world.vessel import register_vessel
 __all__ = ["Ferry"]
 
 
+@cache
 def _hull() -> Hull:
     mass = np.array([[2389.657, 0.0, 0.0], [0.0, 2533.911, 62.386], [0.0, 28.141, 5068.910]])
     # The work of these forces vanishes, so the moment follows from the two forces, also where the matrix is not
@@ -66,7 +67,7 @@ class Ferry(ManoeuvringVessel):
     turn_rate: Annotated[float, Field(gt=0.0, lt=0.6)] = quantity("deg_s", 0.06981317007977318)
     heel: NonNegative = 0.3
 
-    @cached_property
+    @property
     def hull(self) -> Hull:
         """See `ManoeuvringVessel.hull`."""
         return _hull()

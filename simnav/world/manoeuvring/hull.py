@@ -149,7 +149,7 @@ class Superstructure:
         return [*areas, self.across, self.bow, self.stern, self.cross_force, self.centre]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Hull:
     """Coefficients of a hull (`simnav.world.manoeuvring.dynamics` has the equations).
 

@@ -9,7 +9,7 @@ above the water. The coefficients of the wind are those of a speed boat (Blender
 
 from __future__ import annotations
 
-from functools import cached_property
+from functools import cache
 from typing import Annotated, Literal
 
 import numpy as np
@@ -23,6 +23,7 @@ from simnav.world.vessel import register_vessel
 __all__ = ["SurfaceDrone"]
 
 
+@cache
 def _hull() -> Hull:
     length, pontoon, block, water = 2.0, 0.25, 0.4, 1025.0
     hull, payload = 55.0, 25.0
@@ -67,7 +68,7 @@ class SurfaceDrone(ManoeuvringVessel):
     turn_rate: Annotated[float, Field(gt=0.0, lt=0.6)] = quantity("deg_s", 0.17453292519943295)
     heel: NonNegative = 0.0
 
-    @cached_property
+    @property
     def hull(self) -> Hull:
         """See `ManoeuvringVessel.hull`."""
         return _hull()

@@ -17,7 +17,7 @@ of a research vessel (Blendermann 1994, table 2).
 
 from __future__ import annotations
 
-from functools import cached_property
+from functools import cache
 from typing import Annotated, Literal
 
 import numpy as np
@@ -31,6 +31,7 @@ from simnav.world.vessel import register_vessel
 __all__ = ["SurveyShip"]
 
 
+@cache
 def _hull() -> Hull:
     length, density = 160.93, 1025.0
     unit = 0.5e-5 * density * length**2  # of 1e-5 in the prime system
@@ -80,7 +81,7 @@ class SurveyShip(ManoeuvringVessel):
     turn_rate: Annotated[float, Field(gt=0.0, lt=0.1)] = quantity("deg_s", 0.0069813170079773184)
     heel: NonNegative = 0.5
 
-    @cached_property
+    @property
     def hull(self) -> Hull:
         """See `ManoeuvringVessel.hull`."""
         return _hull()

@@ -11,7 +11,7 @@ not distinguished there. Assumed: the time constants of engine and rudder, and t
 
 from __future__ import annotations
 
-from functools import cached_property
+from functools import cache
 from typing import Annotated, Literal
 
 import numpy as np
@@ -25,6 +25,7 @@ from simnav.world.vessel import register_vessel
 __all__ = ["Workboat"]
 
 
+@cache
 def _hull() -> Hull:
     mass = np.diag([3980.0, 3980.0, 19703.0])
     damping = {
@@ -60,7 +61,7 @@ class Workboat(ManoeuvringVessel):
     turn_rate: Annotated[float, Field(gt=0.0, lt=0.6)] = quantity("deg_s", 0.10471975511965977)
     heel: NonNegative = 0.0
 
-    @cached_property
+    @property
     def hull(self) -> Hull:
         """See `ManoeuvringVessel.hull`."""
         return _hull()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.linalg import expm
 
 from simnav.estimator import make
 from simnav.estimators.models.base import ErrorModel, Linearised
@@ -180,6 +181,29 @@ def test_gains_where_a_state_is_known_without_error_or_follows_from_another():
     twin = np.ones((1, 2, 2))  # perfectly correlated: no inverse
     G = smoother_gains(twin, np.eye(2)[None], twin)
     np.testing.assert_allclose(G @ twin, twin, atol=1e-9)
+
+
+def test_gains_of_an_error_that_only_fades():
+    """A damped oscillation of unknown size: value and rate follow from each other, and each passes through zero.
+
+    The matrix has an inverse in floating point, which means nothing. ``G M G'`` is at most P.
+    """
+    F = np.eye(3)
+    F[:2, :2] = expm(0.1 * np.array([[0.0, 1.0], [-0.09, -0.18]]))
+    size, seen = np.array([1.0, -0.4, 0.3]), np.array([1.0, 0.2, 1.0])
+    P = np.outer(size, size) + np.diag([0.0, 0.0, 1.0])
+    before, predicted = [], []
+    for _ in range(400):
+        before.append(P)
+        M = F @ P @ F.T + np.diag([0.0, 0.0, 1e-4])
+        predicted.append(M)
+        gain = M @ seen / (seen @ M @ seen + 4.0)
+        rest = np.eye(3) - np.outer(gain, seen)
+        P = rest @ M @ rest.T + 4.0 * np.outer(gain, gain)
+    P, M = np.array(before), np.array(predicted)
+    G = smoother_gains(P, np.tile(F, (400, 1, 1)), M)
+    explained = np.diagonal(G @ M @ G.swapaxes(1, 2), axis1=1, axis2=2) / np.diagonal(P, axis1=1, axis2=2)
+    assert explained.max() < 1.001
 
 
 @pytest.fixture(scope="module")

@@ -111,3 +111,17 @@ def test_an_obstacle_over_all_of_the_sky():
     stream = receiver(roof).sense(tap())
     assert len(stream) == 0
     assert len(stream.dropped) == 12
+
+
+def test_errors_by_reflections_are_labelled():
+    """Each with its size; what is left of a reading of an ideal receiver is that of one without the wall."""
+    beside, at = receiver(wall(20.0, 60.0)), tap()
+    assert beside.own_label(60.0).kind == "reflection"
+    assert receiver().own_label(60.0) is None or not receiver().sense(at).faults.any()
+    beside.bit = 3
+    stream, free = beside.sense(at), receiver().sense(at)
+    assert set(stream.faults) == {0, 1 << 3}
+    assert {TABLE["satellites"][c] for c in stream.channel[stream.faults != 0]} == {"G28", "E27"}
+    same = free.places(stream.time, stream.channel)
+    np.testing.assert_allclose(stream.value - stream.fault_error, free.value[same], rtol=0, atol=2e-3)
+    assert (abs(stream.fault_error[stream.faults != 0, 0]) > 0.1).all()

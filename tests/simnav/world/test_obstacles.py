@@ -7,7 +7,7 @@ import pytest
 
 from simnav.geometry.earth import displace
 from simnav.spec import SpecError
-from simnav.world.obstacles import Obstacles
+from simnav.world.obstacles import Obstacle, Obstacles
 
 LATITUDE, LONGITUDE = 53.54, 9.98
 ORIGIN = np.array([np.radians(LATITUDE), np.radians(LONGITUDE), 0.0])
@@ -118,3 +118,19 @@ def test_an_obstacle_that_is_none(obstacle, message):
 def test_an_antenna_within_an_obstacle():
     with pytest.raises(SpecError, match=r"the antenna is within the obstacle 'quay', 40\.5 m north and 0\.0 m east"):
         paths(scene(QUAY), (40.5, 0.0, 5.0), [10.0], [0.0])
+
+
+def test_a_rectangle_is_a_polygon():
+    """Centre, length, width and heading, turned by 30 degrees."""
+    box = Obstacle.from_toml({"centre_m": [10.0, 20.0], "size_m": [8.0, 4.0], "heading_deg": 30.0, "top_m": 5.0})
+    c, s = np.cos(np.pi / 6.0), np.sin(np.pi / 6.0)
+    ahead, right = np.array([c, s]), np.array([-s, c])
+    signs = ((1, 1), (-1, 1), (-1, -1), (1, -1))
+    wanted = [4.0 * a * ahead + 2.0 * b * right for a, b in signs]
+    np.testing.assert_allclose(box.outline() - [10.0, 20.0], wanted)
+
+
+@pytest.mark.parametrize("given", [{"centre_m": [0.0, 0.0]}, {"size_m": [1.0, 1.0]}, {}])
+def test_an_obstacle_has_one_form(given):
+    with pytest.raises(SpecError, match="it has either corners_m, or centre_m and size_m"):
+        scene({"name": "shed", "top_m": 5.0} | given)

@@ -1,0 +1,53 @@
+"""Raw observations and the receiver that solves them: an estimator with both uses one of them.
+
+A receiver (`simnav.kinds.Datasheet.sources`) gives a position, or a velocity, that was computed from the readings of
+another instrument. Its errors are theirs, so an estimator that used both would count the same readings twice. The
+rule of all solvers is:
+
+- **tight coupling**: where the model has an equation for the raw observations, and states for what they bring along
+  (`ErrorModel.holds`), the receivers that solve them are not used;
+- otherwise the receivers are used, and the raw observations are not.
+
+A row is **loosely coupled** if its class says so (``loose``, `simnav.estimators.composition.Row`): it takes away the
+raw observations that a receiver solves.
+
+Source of the terms: P. D. Groves, *Principles of GNSS, Inertial, and Multisensor Integrated Navigation Systems*, 2nd
+ed., Artech House 2013, section 14.1.
+"""
+
+from __future__ import annotations
+
+from simnav.types import Instruments
+
+from .chain import Chain
+from .channels import by_channel, instrument_of
+from .suitable import ModelChoice
+
+__all__ = ["by_source"]
+
+
+def by_source(instruments: Instruments, choice: ModelChoice | Chain, name: str) -> Instruments:
+    """The instruments that a solver uses, with each channel as an instrument of its own.
+
+    Parameters
+    ----------
+    instruments : Instruments
+        Datasheets of a run; channels may be apart already.
+    choice : ModelChoice or Chain
+        The model of the solver, or what chooses it.
+    name : str
+        Name of the estimator, for messages.
+
+    Raises
+    ------
+    UnsuitableScenario
+        If the model lacks an instrument.
+    """
+    receivers = {n: set(sheet.sources) for n, sheet in instruments.items() if sheet.sources}
+    if receivers:
+        model = choice.choose(instruments, name)
+        used = {instrument_of(s) for s in instruments.values() if model.observes(s) and model.holds(s)}
+        solved = {name for name, sources in receivers.items() if sources <= used}
+        raw = {source for name in receivers.keys() - solved for source in receivers[name]}
+        instruments = instruments.without(solved | {n for n, s in instruments.items() if instrument_of(s) in raw})
+    return by_channel(instruments)

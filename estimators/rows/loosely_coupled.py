@@ -1,0 +1,57 @@
+"""Loosely coupled rows: they take the solution of a receiver in place of the raw observations which it solves.
+
+Where a voyage has both, the other rows are tightly coupled (`simnav.estimators.models.coupling`). These are for the
+comparison: the same solver and pieces, with what the receiver leaves them. They need a receiver.
+"""
+
+from simnav.estimator import register
+from simnav.estimators.adaptations.gating import ChiSquareGate
+from simnav.estimators.composition import Row, piece
+from simnav.estimators.models.inertial import InertialModel
+from simnav.estimators.models.suitable import Suitable
+from simnav.estimators.solvers.iterated import poor_heading
+from simnav.estimators.solvers.kalman import KalmanEstimator
+from simnav.estimators.solvers.window import WindowEstimator
+from simnav.estimators.weightings.fault_isolation import FaultIsolation
+from simnav.estimators.weightings.graduated_non_convexity import GraduatedNonConvexity
+
+__all__ = ["EkfLoose", "GatedEkfLoose", "GncFgoLoose"]
+
+
+@register("ekf-loose")
+class EkfLoose(Row, solver=KalmanEstimator, model=InertialModel, iteration=poor_heading):
+    """``ekf``, loosely coupled: with the position and velocity of a receiver instead of its raw observations.
+
+    Source: P. D. Groves, *Principles of GNSS, Inertial, and Multisensor Integrated Navigation Systems*, 2nd ed., 2013,
+    section 14.1.2.
+    """
+
+    loose = True
+
+
+@register("gated-ekf-loose")
+class GatedEkfLoose(Row, solver=KalmanEstimator, model=Suitable, adaptation=ChiSquareGate, iteration=poor_heading):
+    """``gated-ekf``, loosely coupled: with the position and velocity of a receiver instead of its raw observations.
+
+    Source: P. D. Groves, *Principles of GNSS, Inertial, and Multisensor Integrated Navigation Systems*, 2nd ed., 2013,
+    sections 14.1.2 and 17.3.1.
+    """
+
+    loose = True
+
+
+@register("gnc-fgo-loose")
+class GncFgoLoose(
+    Row,
+    solver=piece(WindowEstimator, defaults={"tolerance": 0.05, "iterations": 15}, every_sample=False),
+    model=Suitable,
+    weighting=GraduatedNonConvexity,
+    isolation=FaultIsolation,
+):
+    """``gnc-fgo``, loosely coupled: with the position and velocity of a receiver instead of its raw observations.
+
+    Source: H. Yang, P. Antonante, V. Tzoumas and L. Carlone, *Graduated non-convexity for robust spatial perception*,
+    IEEE Robotics and Automation Letters 5(2), 2020.
+    """
+
+    loose = True
