@@ -13,6 +13,7 @@ import math
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -49,7 +50,7 @@ class Building:
 
 
 def read_buildings(path: Path) -> list[Building]:
-    """All polygons of a file.
+    """All polygons of a file, which is read again only if it was changed.
 
     Raises
     ------
@@ -57,11 +58,20 @@ def read_buildings(path: Path) -> list[Building]:
         If the file cannot be read or is not valid: one sentence with the file and the number of the feature.
     """
     try:
-        size = path.stat().st_size
-        if size > MOST_BYTES:
-            raise SpecError(
-                f"{path}: {size / 1e6:.0f} MB are too much for a map of obstacles; {MOST_BYTES / 1e6:.0f} go"
-            )
+        state = path.stat()
+    except OSError as error:
+        raise SpecError(f"{path}: cannot be read: {error.strerror}") from None
+    if state.st_size > MOST_BYTES:
+        raise SpecError(
+            f"{path}: {state.st_size / 1e6:.0f} MB are too much for a map of obstacles; {MOST_BYTES / 1e6:.0f} go"
+        )
+    return list(_read(path, state.st_mtime_ns, state.st_size))
+
+
+@lru_cache(maxsize=8)
+def _read(path: Path, modified: int, size: int) -> tuple[Building, ...]:
+    """The polygons of a file, by the time of its last change and its size."""
+    try:
         table = json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise SpecError(f"{path}: cannot be read: {error.strerror}") from None
@@ -70,7 +80,7 @@ def read_buildings(path: Path) -> list[Building]:
     found = [building for k, feature in enumerate(_features(table, path), 1) for building in _of(feature, k, path)]
     if not found:
         raise SpecError(f"{path}: there is no polygon; obstacles are features with a Polygon or a MultiPolygon")
-    return found
+    return tuple(found)
 
 
 def _features(table: Any, path: Path) -> list[Any]:

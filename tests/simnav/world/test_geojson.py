@@ -134,3 +134,10 @@ def test_heights_in_the_wrong_order(tmp_path: Path):
         Obstacles.from_toml({"file": str(path)})
     with pytest.raises(SpecError, match="latitude_deg and longitude_deg of the origin are missing"):
         Obstacles.from_toml({})
+
+
+def test_a_file_is_read_once_and_again_after_a_change(tmp_path: Path):
+    path = written(tmp_path, feature(name="warehouse", height="20 m"))
+    assert read_buildings(path)[0] is read_buildings(path)[0]
+    written(tmp_path, feature(name="warehouse", height="21 m"), feature(name="shed", height=3.0))
+    assert [b.top for b in read_buildings(path)] == [21.0, 3.0]
