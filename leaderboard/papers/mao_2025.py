@@ -272,6 +272,7 @@ def _road_claim(name: str, axis: str, gain: float) -> Claim:
 CLAIMS = (
     _sigma_claim("mao-sigma-east", "east", 0.3118),
     _sigma_claim("mao-sigma-north", "north", 0.1697),
+    _window_claim("mao-window-east", "east", 0.0625),
     _road_claim("mao-road-north", "north", 0.1764),
     _road_claim("mao-road-east", "east", 0.1273),
 )

@@ -131,7 +131,8 @@ def _claims_23() -> tuple[Row, ...]:
     return (
         *(Gain(_LAKE, whitened, "KF, printed noise", score, gain, lower=_PRINTED_23, higher=_PRINTED_23)
           for score, gain in gains.items()),
-        *(Gain(_LAKE, as_printed, "KF, printed noise", score) for score in gains),
+        *(Gain(_LAKE, as_printed, "KF, printed noise", score, gain, lower=_PRINTED, higher=_PRINTED)
+          for score, gain in gains.items()),
     )  # fmt: skip
 
 
