@@ -27,7 +27,7 @@ from dataclasses import dataclass, field
 from functools import cache
 from typing import Any, ClassVar
 
-from simnav.estimator import Estimator, Needs
+from simnav.estimator import Estimator, Needs, UnsuitableScenario, lacking
 from simnav.estimator.late_arrivals import LateArrivals, Manner, TrueTimes, is_untimely, parts_of, true_times
 from simnav.estimator.parameters import former_names, under_present_names
 from simnav.types import Array, Estimate, InitialState, Instruments, Measurements, NavigationStates
@@ -239,6 +239,8 @@ class Row(Estimator):
     def reset(self, start: InitialState, instruments: Instruments) -> None:
         """Begin a run; UnsuitableScenario where the pieces lack an instrument."""
         if self.loose:
+            if lack := lacking((_RECEIVERS,), instruments):
+                raise UnsuitableScenario(f"{self.name}: {lack}")
             instruments = instruments.without({name for sheet in instruments.values() for name in sheet.sources})
         self._instruments = instruments
         self._late = self._late_arrivals() if any(sheet.timing for sheet in instruments.values()) else None
