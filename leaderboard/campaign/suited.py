@@ -9,12 +9,14 @@ from typing import TYPE_CHECKING
 
 from simnav.estimator import UnsuitableScenario, find, lacking
 from simnav.estimator.looking_back import LookingBack
-from simnav.leaderboard.campaign.request import comes_with_simnav, file_of
 from simnav.leaderboard.results.errors import RequestError, mistakes
 
+from .request import comes_with_simnav, file_of
+
 if TYPE_CHECKING:
-    from simnav.leaderboard.campaign.request import EstimatorRequest
     from simnav.scenario import Scenario
+
+    from .request import EstimatorRequest
 
 __all__ = ["require_suited", "with_long_windows"]
 
