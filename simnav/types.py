@@ -197,7 +197,7 @@ class Measurement(NamedTuple):
     Attributes
     ----------
     time : float
-        Time of validity [s].
+        Time stamp [s]. It is the time of validity, but for what ``Datasheet.timing`` says of the clock.
     instrument, kind : str
         Name in the scenario, and key of `KINDS`.
     value : (d,) array
@@ -233,7 +233,8 @@ class Measurements:
     imu : ImuSamples or None
         IMU samples of the step; None for a vessel without an IMU.
     aids : list of Measurement
-        Aiding measurements in order of time. Iteration over the packet gives these.
+        Aiding measurements that arrive in the step, in order of their stamps. One that arrives late may be older than
+        the step. Iteration over the packet gives these.
     """
 
     start: float

@@ -39,18 +39,25 @@ def is_delayed(sheet: Datasheet) -> bool:
     return any(block.name == DELAY for block in sheet.blocks) and sheet.timing is not None
 
 
-def with_delay(sheet: Datasheet) -> Datasheet:
+def with_delay(sheet: Datasheet, drifting: bool = True) -> Datasheet:
     """The datasheet, with the block of the delay if its stamps have an offset that is not known well.
 
     Channels have one clock, and many readings at a time: they have no delay here. Nor has a log through the water,
     whose current is a state of its own.
+
+    Parameters
+    ----------
+    sheet : Datasheet
+        The datasheet.
+    drifting : bool
+        Whether a drift is a state, too. A model without blocks of the process ``clock`` takes the delay for a constant.
     """
     timing, equation = sheet.timing, KINDS[sheet.kind].equation
-    if timing is None or not (timing.offset or timing.drift) or sheet.channels:
+    if timing is None or not (timing.offset or (timing.drift and drifting)) or sheet.channels:
         return sheet
     if equation is None or equation == WATER_SPEED or any(block.name == DELAY for block in sheet.blocks):
         return sheet
-    if timing.drift:
+    if timing.drift and drifting:
         block = StateBlock(DELAY, 2, ("s", ""), (timing.offset, timing.drift), "clock")
     else:
         block = StateBlock(DELAY, 1, "s", timing.offset)

@@ -45,9 +45,17 @@ def _has_states(sheet: Datasheet) -> bool:
     return KINDS[sheet.kind].observation is None and own
 
 
-def with_lever_arms(instruments: Instruments) -> Instruments:
-    """The datasheets, with unknown delays as blocks, and scale factor and misalignment where lever arm or delay is."""
-    sheets = [with_delay(sheet) for sheet in instruments.values()]
+def with_lever_arms(instruments: Instruments, drifting: bool = True) -> Instruments:
+    """The datasheets, with unknown delays as blocks, and scale factor and misalignment where lever arm or delay is.
+
+    Parameters
+    ----------
+    instruments : Instruments
+        The datasheets.
+    drifting : bool
+        Whether the drift of a delay is a state (`with_delay`).
+    """
+    sheets = [with_delay(sheet, drifting) for sheet in instruments.values()]
     if not any(_has_states(sheet) or is_delayed(sheet) for sheet in sheets):
         return instruments
     sheets = [_with_blocks(sheet) if _has_states(sheet) else sheet for sheet in sheets]

@@ -141,7 +141,7 @@ class ShipModel(MovingModel):
 
     def begin(self, start: InitialState, instruments: Instruments) -> Array:
         """Set the state; UnsuitableScenario if there is nothing that gives a speed and a heading."""
-        self.instruments = instruments = with_lever_arms(instruments)
+        self.instruments = instruments = with_lever_arms(instruments, drifting=False)
         if not any(self.observes(s) for s in instruments.values()):
             raise UnsuitableScenario("the ship model needs GNSS, a compass or a log; there is none of them")
         self.time = start.time

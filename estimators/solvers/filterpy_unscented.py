@@ -16,6 +16,7 @@ Of filterpy 2.0 as it is, and worked around here or in the adapter:
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from math import cos
 from typing import Any, ClassVar
 
@@ -69,7 +70,9 @@ class FilterpyUnscentedEstimator(Solver, FilterpyEstimator):
     def reset(self, start: InitialState, instruments: Instruments) -> None:
         """Begin a run; UnsuitableScenario if the model lacks an instrument."""
         self.model.choose(instruments, self.label)
-        super().reset(start, instruments)
+        # It reads compiled equations only: what is not known of lever arms and stamps has no states here.
+        sheets = [replace(s, blocks=(), timing=None) if s.equation else s for s in instruments.values()]
+        super().reset(start, Instruments(sheets, instruments.imu, instruments.step))
 
     def build(self, start: InitialState, instruments: Instruments) -> Any:
         """The filter at the model's initial state."""

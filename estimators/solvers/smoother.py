@@ -38,9 +38,9 @@ __all__ = ["Smoother", "Stretches", "scale_of", "smoother_gains"]
 
 #: Stretches are stored, and gains are solved for, this many at a time.
 _BATCH = 512
-#: Gains in units of sigmas that are looked at; the limit of what a row of them explains, which is at most 1; and the
-#: smallest eigenvalue of correlations that is not rounding.
-_LARGE, _MOST, _RANK = 1e3, 1.01, 1e-11
+#: Gains in units of sigmas from which on the correlations are looked at, and the smallest eigenvalue of these that is
+#: not rounding.
+_LARGE, _RANK = 1e3, 1e-11
 
 
 def scale_of(covariance: Array) -> Array:
@@ -83,15 +83,14 @@ def smoother_gains(covariance: Array, transition: Array, predicted: Array) -> Ar
 def _repair(solved: Array, correlation: Array, right: Array, sigma: Array) -> None:
     """Solve again, in place, where the correlations are singular up to rounding and the solution is none.
 
-    ``G M G'`` is at most P, so that a row g of the gain in units of sigmas has ``g C g' <= 1`` with the correlations C.
-    A state that follows from others, such as an error that only fades, makes C singular; then `numpy.linalg.solve` may
-    give numbers of any size.
+    ``G M G'`` is at most P, so that a row g of the gain in units of sigmas has ``g C g' <= 1`` with the correlations C,
+    and is large only where C is nearly singular. A state that follows from others, such as an error that only fades,
+    makes C singular; then `numpy.linalg.solve` may give numbers of any size.
     """
     rows = solved / sigma[:, None, :]
     suspect = np.flatnonzero(np.abs(rows).max(axis=(1, 2), initial=0.0) > _LARGE)
     if len(suspect):
-        g = rows[suspect]
-        wrong = suspect[np.einsum("kji,kjl,kli->ki", g, correlation[suspect], g).max(axis=1) > _MOST]
+        wrong = suspect[np.linalg.eigvalsh(correlation[suspect])[:, 0] < _RANK]
         solved[wrong] = np.linalg.pinv(correlation[wrong], rcond=_RANK, hermitian=True) @ right[wrong]
 
 

@@ -40,7 +40,10 @@ def show(out: Output, request: ClaimCommand) -> None:
         if dial.why:
             out.print(f"{dial.name}: {dial.why}")
     out.print(
-        f"with our settings: {gain_text(answer.ours)}: {answer.standing}", f"verdict: {answer.sentence_of_verdict}"
+        f"it holds if the whole interval is a gain of {100.0 * (1.0 - answer.limit):.1f} % or more (the claimed one, "
+        "within the tolerance of all gains)",
+        f"with our settings: {gain_text(answer.ours)}: {answer.standing}",
+        f"verdict: {answer.sentence_of_verdict}",
     )
     if answer.paper and answer.conditions:
         out.print("a condition is sufficient; it does not say what the authors did")

@@ -6,11 +6,11 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from simnav.leaderboard.results.errors import RequestError
-from simnav.scenario import Scenario
+from simnav.scenario import Scenario, load
 from simnav.sensors.faults import NoiseStep
 
 from .claims.claim import Choice, Claim, Dial, Setting, compared
-from .claims.dials import scenario_dial, with_keys
+from .claims.dials import choice_dial, of_rows, scenario_dial, with_keys
 from .declarations import drawings, error_figures, measured
 from .paper import (
     HORIZONTAL,
@@ -364,7 +364,23 @@ def _claim(name: str, run: str, scenario: str, gain: float, words: str) -> Claim
     )  # fmt: skip
 
 
+_OUTAGE = Claim(
+    "jiang-outage", PAPER.key, "at the end of outages of 60 s (field) the error of FGO is 90 % below that of the EKF",
+    0.90, compared(lambda: load(_FIELD_OUTAGES), "ship-fgo", "ship-ekf", "outage_end_error_max"),
+    (
+        choice_dial(
+            "prediction", "the position of the EKF in an outage",
+            {"dead reckoning": of_rows(than="ship-ekf"), "stands still": of_rows(than="ship-ekf-standing")},
+            ours="dead reckoning",
+            why="in the paper EKF and UKF are off by 200 to 400 m, and FGO by at most 20 m; how its filters predict is "
+            "not printed",
+        ),
+    ),
+    derived=True,
+)  # fmt: skip
+
 CLAIMS = (
     _claim("jiang-turn", "a steady turn (CTM)", "ship-turn", 0.35, "30 to 40"),
     _claim("jiang-straight", "a straight course (CALM)", "ship-straight", 0.35, "30 to 40"),
+    _OUTAGE,
 )

@@ -7,7 +7,7 @@ from functools import partial
 
 from simnav.scenario import Scenario, load
 
-from .claims.claim import Claim, Dial, compared
+from .claims.claim import Choice, Claim, Dial, Setting, compared
 from .claims.dials import lag_dial, with_keys
 from .declarations import PHOTOGRAPH, drawings, measured
 from .paper import POSITION, Figure, Gain, Method, NotShown, Paper, Row, Table, Value
@@ -234,6 +234,22 @@ def _sigma_claim(name: str, axis: str, gain: float) -> Claim:
     sentence = f"IAE in a graph estimates the sigma {axis} {100.0 * gain:.1f} % better than IAE in a filter"
     setting = compared(lambda: load(_SCENARIO), "iae-fgo-fixed", "iae-fixed", f"sigma_{axis}_rmse")
     return Claim(name, PAPER.key, sentence, gain, setting, (late, both), derived=True)
+
+
+def _with_limits(setting: Setting, value: Choice) -> Setting:
+    return setting.with_parameters("row", low=float(value), high=2.5 * float(value))
+
+
+def _window_claim(name: str, axis: str, gain: float) -> Claim:
+    limits = Dial(
+        "limits", "the lower limit of the variance for the length of the window, as a multiple of the expected one,",
+        "", (2.0, 5.0, 10.0, 20.0, 50.0), _with_limits, 2.0,
+        "the paper prints neither v_min nor v_max of its eq. 20; here the upper limit is 2.5 times the lower one",
+    )  # fmt: skip
+    both = lag_dial((0.0, 5.0, 10.0), both=True, name="both-late", why=_FOR_WHICH_TIME)
+    sentence = f"the adaptive window estimates the sigma {axis} {100.0 * gain:.1f} % better than the fixed one"
+    setting = compared(lambda: load(_SCENARIO), "iae-fgo", "iae-fgo-fixed", f"sigma_{axis}_rmse")
+    return Claim(name, PAPER.key, sentence, gain, setting, (limits, both))
 
 
 def _road_claim(name: str, axis: str, gain: float) -> Claim:

@@ -11,6 +11,10 @@ Roll, pitch and heading are cubic splines of the given angles. Without a given h
 made good. Where the vessel is too slow to have a course, the heading goes over smoothly from the course before to the
 course after.
 
+In closed loop the vessel follows the poses by its estimated position, so the true track is aside of them by the error
+of the estimate. This offset follows the error through a critically damped lag of second order; where the error jumps,
+the lag is as long as the vessel needs at a third of its speed.
+
 Poses that ask for an impossible motion are refused: a jump is a speed, an acceleration or a turn beyond `Limits`.
 """
 
@@ -31,6 +35,8 @@ __all__ = ["GivenTrack", "Limits", "Poses", "metres_per_unit", "smooth_track"]
 
 #: How far the truth may be from a given pose [m]; it decides which IMU rates are refused.
 _EXACT = 5e-4
+#: Shortest time constant with which the vessel follows an error of its estimate [s], and the least speed for it [m/s].
+_FOLLOWING, _CREEP = 15.0, 0.2
 #: Number of courses between two poses from which the heading is made.
 _COURSES = 16
 #: Highest pitch of a given attitude [rad], and highest latitude [rad].
@@ -188,13 +194,37 @@ class GivenTrack(SampledTrajectory):
         self._check_motion(voyage.rate)
         self._angles = self._attitude_curve()
         self._check_turns()
+        #: Offset from the poses, north and east: wanted; its value, its rate and the time of the last wish; the lag.
+        self._offset: tuple[Array, Array, Array, float, float] | None = None
         start = np.array([self._first])
         super().__init__(self._curve(start, 0)[0], voyage)
 
     def motion(self, time: Array) -> tuple[Array, Array]:
         """See `SampledTrajectory.motion`."""
         moment = np.minimum(self._first + time, self._last)
-        return self._velocity_at(moment), self._angles(moment, 0)
+        velocity = self._velocity_at(moment)
+        if self._offset is not None:
+            velocity[:, :2] += self._aside(time)[1]
+        return velocity, self._angles(moment, 0)
+
+    def steer_by(self, north: float, east: float, heading: float = 0.0) -> None:
+        """See `simnav.world.trajectory.Steered.steer_by`. The heading is that of the poses, whatever the estimate."""
+        wanted, now = -np.array([north, east]), np.array([self.time])
+        here, rate = (a[0] for a in self._aside(now))
+        speed = float(np.linalg.norm(self._velocity_at(np.minimum(self._first + now, self._last))[0, :2]))
+        # The lag closes a distance d at d / (e tau) at most.
+        lag = float(np.linalg.norm(wanted - here)) / (np.e * max(speed / 3.0, _CREEP))
+        self._offset = wanted, here, rate, self.time, max(lag, _FOLLOWING)
+
+    def _aside(self, time: Array) -> tuple[Array, Array]:
+        """(n, 2) offsets from the poses, north and east [m], and their rates [m/s], at n times from now on."""
+        if self._offset is None:
+            return np.zeros((len(time), 2)), np.zeros((len(time), 2))
+        wanted, here, rate, since, lag = self._offset
+        t = (time - since)[:, None]
+        off, slope = here - wanted, rate + (here - wanted) / lag
+        decay = np.exp(-t / lag)
+        return wanted + (off + slope * t) * decay, (rate - slope * t / lag) * decay
 
     def _velocity_at(self, moment: Array) -> Array:
         velocity = self._curve(moment, 1) * metres_per_unit(self._curve(moment, 0))

@@ -41,6 +41,7 @@ class GivenVessel(Vessel):
 
     starts: ClassVar[bool] = False
     obeys: ClassVar[bool] = False
+    steered: ClassVar[bool] = True
 
     max_speed: Positive = quantity("m_s", 40.0, description="a faster motion is refused as a jump")
     max_acceleration: Positive = quantity("m_s2", 6.0, description="a larger acceleration is refused as a jump")

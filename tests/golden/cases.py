@@ -1,4 +1,4 @@
-"""Thirteen short scenarios with faults of every kind, on which the golden test runs every row.
+"""Short scenarios with faults of every kind, on which the golden test runs every row.
 
 Each is a scenario of the catalogue, cut after less than a minute, with faults of its own.
 """
@@ -124,6 +124,12 @@ CASES = {
         _fault("bias_step", "terrain_fix", 15.0, 30.0, offset_m=[25.0, -15.0]),
         _fault("noise_step", "depth", 10.0, 25.0, sigma_m=2.0),
     )),
+    "dvl late and out of order, its clock steps": Case("auv-survey", 12.0, (
+        _fault("clock_step", "dvl", 6.0, 9.0, step_s=0.4),
+    ), instruments={"dvl": {
+        "rate_hz": 2.0, "sigma_m_s": 0.01, "scale_percent": 0.2,
+        "timing": {"latency_s": 0.2, "latency_random_s": 0.3, "offset_s": 0.05, "drift_ppm": 20.0, "jitter_s": 0.002},
+    }}),
     "under water without imu": Case("glider-dive", 60.0, (
         _fault("gross_error", "speed_log", 10.0, 40.0, probability=0.3, size_m_s=[0.5, 1.5]),
         _fault("outage", "gnss", 20.0, 60.0),

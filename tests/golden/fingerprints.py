@@ -111,6 +111,9 @@ def of_recording(recording: Recording) -> dict[str, Numbers]:
         difference = KINDS[stream.kind].difference(stream.value, np.round(stream.value[:1], 2))
         touched = int(np.count_nonzero(stream.faults))
         found[name] = [len(stream), len(stream.dropped), touched, *_spread(difference), *_spread(stream.sigma)]
+        if stream.has_clock:
+            late = np.stack([stream.stamps - stream.time, stream.arrivals - stream.time], axis=1)
+            found[name] += _spread(late)
     return found
 
 

@@ -48,6 +48,15 @@ def test_a_page_does_not_replace_a_covariance_that_admits_the_error():
 
 
 @pytest.mark.usefixtures("pages")
+def test_voyages_on_which_the_plain_row_is_lost_are_also_left_out():
+    found = {f"filters-{poor_imu.FIRST}": {"ekf": [(1.0, 90.0)] * 9 + [GOOD], "unsaid": [GOOD] * 9 + [(2.0, 1.0)]}}
+    everywhere, sound = list(poor_imu.rows(found))
+    assert everywhere[1].startswith("10.0 %; 2.0")
+    assert "where that is not lost, of 1;" in sound[0]
+    assert sound[1].startswith(f"100.0 %; 2.0 ({poor_imu.FIRST + 9}); 2.00")
+
+
+@pytest.mark.usefixtures("pages")
 def test_a_row_that_fails_is_ruined():
     found = {f"filters-{poor_imu.FIRST}": {"ekf": [GOOD, GOOD, None], "unsaid": [GOOD, None, GOOD]}}
     (line, *_) = list(poor_imu.rows(found))

@@ -69,6 +69,9 @@ def test_only_offsets_that_are_stated_are_states():
     assert (block.name, block.size, block.sigma) == (DELAY, 1, (0.05,))
     (block,) = with_delay(replace(plain, timing=TimingSheet(offset=0.05, drift=1e-5))).blocks
     assert (block.process, block.sigma) == ("clock", (0.05, 1e-5))
+    (block,) = with_delay(replace(plain, timing=TimingSheet(offset=0.05, drift=1e-5)), drifting=False).blocks
+    assert (block.process, block.sigma) == ("constant", (0.05,))
+    assert with_delay(replace(plain, timing=TimingSheet(drift=1e-5)), drifting=False).blocks == ()
     log = replace(SHEETS[0], kind="speed_log", sigma=np.ones(1), bias=np.zeros(1), bias_instability=np.zeros(1))
     assert not is_delayed(with_delay(log))
 

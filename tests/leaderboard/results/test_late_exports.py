@@ -16,7 +16,7 @@ def columns(path):
 
 
 def test_a_blind_export_has_stamps_and_arrivals_only(tmp_path):
-    recording = simulate(load("dvl-clock").model_copy(update={"duration": 10.0}), 3)
+    recording = simulate(load("unsynchronised-clocks").model_copy(update={"duration": 10.0}), 3)
     stream = recording.data.aids["dvl"]
     write_csv(recording, tmp_path / "told")
     blind = without_truth(recording)
@@ -26,7 +26,7 @@ def test_a_blind_export_has_stamps_and_arrivals_only(tmp_path):
     np.testing.assert_array_equal(np.sort(seen["arrival_s"]), np.sort(stream.arrival))
     np.testing.assert_array_equal(np.sort(told["time_of_validity_s"]), stream.time)
     assert "time_of_validity_s" not in seen
-    assert "arrival_s" not in columns(tmp_path / "told/gnss.csv")
+    assert "arrival_s" not in columns(tmp_path / "told/gyrocompass.csv")
     sheet = json.loads((tmp_path / "blind/start.json").read_text(encoding="utf-8"))["instruments"]["dvl"]
     assert sheet["timing"]["offset"] == recording.instruments["dvl"].timing.offset
     assert not np.array_equal(blind.data.aids["dvl"].time, stream.time)

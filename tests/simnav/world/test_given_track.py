@@ -9,7 +9,8 @@ import pandas as pd
 import pyins.strapdown
 import pytest
 
-from simnav.geometry.earth import relative_position
+from simnav.environment import NavigationEnv
+from simnav.geometry.earth import displace, relative_position
 from simnav.geometry.rotation import wrap_angle
 from simnav.scenario import parse
 from simnav.simulation.simulator import Simulator, ideal
@@ -17,6 +18,8 @@ from simnav.source import record
 from simnav.spec import SpecError
 from simnav.strapdown import integrate
 from simnav.world.given_track import GivenTrack, Limits, Poses
+from simnav.world.surroundings import Surroundings
+from simnav.world.trajectory import Voyage
 
 LIMITS = Limits(speed=40.0, acceleration=6.0, turn_rate=1.0)
 SCENARIO = """
@@ -262,3 +265,43 @@ def test_waypoints_at_one_place_are_refused():
     )
     with pytest.raises(SpecError, match="waypoint 2 is where waypoint 1 is; give times"):
         record(scenario, 1)
+
+
+def test_in_closed_loop_the_vessel_is_aside_by_the_error_of_its_estimate():
+    """Believed to be 20 m too far north, it goes 20 m to the south, by a lag of at least 15 s, and without a step."""
+    given = poses(np.arange(0.0, 400.0, 2.0))
+    ends = []
+    for error in (0.0, 20.0):
+        track = GivenTrack(given, Voyage(None, (), Surroundings(), 50.0, 300.0, 1), LIMITS)
+        velocity = []
+        for k in range(300):
+            track.steer_by(error if k >= 50 else 0.0, -0.5 * error if k >= 50 else 0.0)
+            block = track.advance(k + 1.0, {"all": np.arange(50 * k + 1, 50 * k + 51) / 50.0})
+            velocity.append(block.taps["all"].velocity)
+        ends.append((track.state().position[0], np.concatenate(velocity)))
+    aside = relative_position(ends[1][0][None], ends[0][0])[0]
+    np.testing.assert_allclose(aside, [-20.0, 10.0, 0.0], atol=1e-2)
+    added = ends[1][1] - ends[0][1]
+    assert np.abs(np.diff(added, axis=0)).max() < 0.02 * 20.0 / 15.0**2 * 2.0  # the acceleration of the lag
+    assert not added[: 50 * 50].any()
+    lag = 15.0
+    t = np.arange(1, 101) / 50.0
+    np.testing.assert_allclose(added[2500:2600, 0], -20.0 * t / lag**2 * np.exp(-t / lag), atol=2e-3)
+
+
+def test_the_environment_steers_it():
+    table = 'kind = "given_waypoints"\nlatitude_deg = [54.0, 54.01, 54.02]\nlongitude_deg = [7.9, 7.91, 7.9]\n'
+    table += "speed_m_s = 5.0\n"
+    gnss = '[instruments.gnss]\nkind = "gnss_position"\nrate_hz = 1.0\nsigma_m = 1.0\n'
+    scenario = parse(SCENARIO.format(duration=60.0, rate=20.0, vessel=table) + gnss)
+    ends = []
+    for north in (0.0, 30.0):
+        env = NavigationEnv(scenario, closed_loop=True, reveal_truth=True)
+        _, info = env.reset(seed=1)
+        over = False
+        while not over:
+            action = info["truth"].copy()
+            action[0] = displace(action[0], np.array([north, 0.0, 0.0]))
+            _, _, _, over, info = env.step(action)
+        ends.append(info["truth"][0])
+    assert relative_position(ends[1][None], ends[0])[0, 0] < -20.0
