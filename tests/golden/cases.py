@@ -63,6 +63,11 @@ def _fault(kind: str, instrument: str, start: float, end: float, **more: Any) ->
     return {"kind": kind, "instruments": [instrument], "start_s": start, "end_s": end, **more}
 
 
+_RAW = {
+    "kind": "gnss_raw", "satellites": ["G12", "G29", "E27", "E30", "E34"], "sigma_pseudorange_m": 0.3,
+    "sigma_range_rate_m_s": 0.05, "lever_arm_m": [1.0, 0.0, -3.0],
+}  # fmt: skip
+
 CASES = {
     "gnss away, then noisy": Case("coastal-voyage", 32.0, (
         _fault("outage", "gnss", 8.0, 16.0),
@@ -94,9 +99,13 @@ CASES = {
     "satellites jammed and spoofed": Case("open-sea", 24.0, (
         _fault("jamming", "gnss", 5.0, 15.0, loss=18.0, rise_s=8.0),
         _fault("spoofing", "gnss", 12.0, 22.0, drift_m_s=[2.0, -1.0, 0.0], clock_drift_m_s=0.5),
-    ), instruments={"gnss": {
-        "kind": "gnss_raw", "satellites": ["G12", "G29", "E27", "E30", "E34"], "sigma_pseudorange_m": 0.3,
-        "sigma_range_rate_m_s": 0.05, "lever_arm_m": [1.0, 0.0, -3.0],
+    ), instruments={"gnss": _RAW}),
+    "satellites and the receiver that solves them": Case("open-sea", 12.0, (
+        _fault("bias_step", "gnss", 4.0, 9.0, channels=["E30"], offset_m=30.0, offset_m_s=0.0),
+    ), instruments={"gnss": _RAW, "fix": {
+        "kind": "gnss_receiver", "observations": "gnss", "sigma_m": [0.4, 0.4, 1.0],
+    }, "doppler": {
+        "kind": "gnss_receiver_velocity", "observations": "gnss", "sigma_m_s": 0.05,
     }}),
     "gnss velocity with gross errors": Case("open-sea", 24.0, (
         _fault("gross_error", "gnss_velocity", 6.0, 20.0, probability=0.4, size_m_s=[1.0, 3.0]),
