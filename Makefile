@@ -6,9 +6,6 @@ SITE ?= site
 DOCS ?= site-docs
 BIN := $(VENV)/bin
 
-# Many tests start processes, and each would compile simnav's files again where Python may not keep them.
-unexport PYTHONDONTWRITEBYTECODE
-
 .PHONY: help leaderboard test bench audit docs clean
 
 help:

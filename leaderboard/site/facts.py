@@ -43,6 +43,7 @@ _FAMILIES = {
     "windows": "Factor graph",
     "robust_windows": "Robust factor graph",
     "gtsam": "GTSAM",
+    "loosely_coupled": "Loosely coupled",
     "smoothers": "Smoother",
     "anfis": "Learned",
     "policy": "Learned",

@@ -19,7 +19,10 @@ ROWS = [name for name in names() if name not in GTSAM]
 
 @pytest.fixture(scope="module")
 def recordings():
-    return [record(load(name).model_copy(update={"duration": 20.0}), 3) for name in ("auv-survey", "ship-field")]
+    return [
+        record(load(name).model_copy(update={"duration": 20.0}), 3)
+        for name in ("auv-survey", "ship-field", "satellites-open-sea")
+    ]
 
 
 def numbers(estimator, packets):

@@ -31,6 +31,7 @@ SCORES = ("horizontal_rmse", "vertical_rmse", "velocity_horizontal_rmse", "headi
 def only(stream: AidStream, keep: np.ndarray) -> AidStream:
     """Some of the measurements of a stream."""
     left_out = ("name", "kind", "dropped", "channels", "channel", "side", "dropped_channel")  # it has no channels
+    left_out += ("stamp", "arrival")  # and a perfect clock
     arrays = {f.name: getattr(stream, f.name) for f in fields(stream) if f.name not in left_out}
     return replace(stream, **{name: array[keep] for name, array in arrays.items()})
 

@@ -18,6 +18,7 @@ from matplotlib.figure import Figure
 import simnav  # noqa: F401 (it registers)
 from simnav.environment import charted
 from simnav.environment.rendering import Chart
+from simnav.estimator import UnsuitableScenario
 from simnav.estimators.learning.environment import FilterTaskEnv
 from simnav.log import LogError
 from simnav.scenario.catalogue import headers
@@ -80,6 +81,11 @@ def test_ids_of_every_task_and_scenario(name, tmp_path, small_pictures):
         check_env(env.unwrapped, skip_render_check=True, skip_close_check=True)  # these: below, once a task
     except LogError as error:
         pytest.skip(str(error))
+    except UnsuitableScenario as error:
+        of_satellites = name.startswith(("simnav/Satellites", "simnav/RandomHarbours"))
+        if not of_satellites or "a learning task takes instruments without channels" not in str(error):
+            raise
+        return
     assert env.spec.id == name
     assert pickle.loads(pickle.dumps(EnvSpec.from_json(env.spec.to_json()))).kwargs == env.spec.kwargs
     scenario = env.unwrapped.options.scenario  # to read it again takes as long as all the rest

@@ -30,7 +30,7 @@ def inertial_windows(slow: bool) -> list[str]:
     """All windows over the inertial model of 15 states that are registered."""
     found = []
     for name in names():
-        if not issubclass(find(name), Row):
+        if not issubclass(find(name), Row) or find(name).loose:  # no receiver here
             continue
         recipe = find(name).recipe
         window = issubclass(recipe["solver"].make, WindowEstimator) and find(name).slow is slow

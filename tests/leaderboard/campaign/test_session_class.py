@@ -224,7 +224,7 @@ def test_what_cannot_be_sent_is_told(session: Any) -> None:
 
 def test_a_class_of_a_module_beside_the_script_takes_part(tmp_path: Path):
     """Its folder is on the path as an empty entry, and the estimator runs in another folder."""
-    text = NOTEBOOK.replace("@GAIN@", "1.0").replace("@WORKERS@", "1")
+    text = NOTEBOOK.replace("{gain}", "1.0").replace("@WORKERS@", "1")
     parts = [part.strip() for part in text.split('"""')[1::2]]
     (tmp_path / "beside.py").write_text(f"{parts[0]}\n{parts[1]}\n")
     (tmp_path / "pond.toml").write_text(POND)

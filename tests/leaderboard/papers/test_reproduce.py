@@ -665,7 +665,7 @@ def test_the_site_shows_what_was_reproduced(tiny):
     assert site.exit_code == 0, site.output
     page = Path("site/paper-mao-2025.html").read_text(encoding="utf-8")
     shown = re.findall(r'<img src="([^"]+)"', page)
-    assert len(shown) == 14  # two of them are of its tables, four of its claims
+    assert len(shown) == 15  # two of them are of its tables, five of its claims
     assert all((Path("site") / name).is_file() for name in shown)
     assert 'href="paper-mao-2025.html"' in Path("site/index.html").read_text(encoding="utf-8")
     assert 'href="index.html"' in page

@@ -208,8 +208,8 @@ def test_a_recorded_scenario_has_no_world():
         ('kind = "turn"', 'kind = "tern"', "manoeuvre[0].kind = 'tern' is unknown; did you mean 'turn'?"),
         (
             'kind = "uuv"',
-            'kind = "auv"',
-            "vessel.kind = 'auv' is unknown; did you mean 'uuv'?",
+            'kind = "uuvs"',
+            "vessel.kind = 'uuvs' is unknown; did you mean 'uuv'?",
         ),
         ('kind = "outage"', 'kind = "outages"', "fault[0].kind = 'outages' is unknown; did you mean 'outage'?"),
         (
