@@ -41,9 +41,7 @@ def wins(rows: Sequence[str], scenarios: Sequence[ScenarioRanking]) -> Array:
     for scenario in scenarios:
         ratios = {row.estimator: row.ratios for row in scenario.rows}
         runs = sorted({run for name in rows for run in ratios.get(name, ())})
-        error = np.array([[ratios.get(name, {}).get(run, np.nan) for run in runs] for name in rows]).reshape(
-            n, len(runs)
-        )
+        error = np.array([[ratios.get(name, {}).get(run, np.nan) for run in runs] for name in rows])
         first, second = error[:, None], error[None]
         equal = np.abs(first - second) <= _EQUAL * np.minimum(np.abs(first), np.abs(second))
         equal |= np.isinf(first) & np.isinf(second)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from simnav.leaderboard.figures.ratio_map import ENDS
 from simnav.leaderboard.ranking.beside_plain import beside_plain
 
-from .charts import Chart, columns
+from .charts import Chart, Spec, columns
 from .rounding import short
 
 if TYPE_CHECKING:
@@ -16,7 +16,16 @@ if TYPE_CHECKING:
 
     from .content import ScenarioEntry
 
-__all__ = ["heatmap"]
+__all__ = ["axes", "heatmap"]
+
+
+def axes(x: str, order: Sequence[str], y: str, lines: Sequence[str]) -> Spec:
+    """The encoding of the places of cells: names above the columns and before the lines, in the given order."""
+    above = {"orient": "top", "labelAngle": -45, "labelLimit": 150, "labelOverlap": False}
+    return {
+        "x": {"field": x, "type": "nominal", "title": None, "sort": list(order), "axis": above},
+        "y": {"field": y, "type": "nominal", "title": None, "sort": list(lines), "axis": {"labelOverlap": False}},
+    }
 
 
 def heatmap(track: TrackRanking, rows: Sequence[TrackRow], scenarios: Mapping[str, ScenarioEntry]) -> Chart | None:
@@ -56,20 +65,7 @@ def heatmap(track: TrackRanking, rows: Sequence[TrackRow], scenarios: Mapping[st
         ],
         "mark": {"type": "rect", "cursor": "pointer"},
         "encoding": {
-            "x": {
-                "field": "scenario",
-                "type": "nominal",
-                "title": None,
-                "sort": names,
-                "axis": {"orient": "top", "labelAngle": -45, "labelLimit": 150, "labelOverlap": False},
-            },
-            "y": {
-                "field": "row",
-                "type": "nominal",
-                "title": None,
-                "sort": [r.estimator for r in ordered],
-                "axis": {"labelOverlap": False},
-            },
+            **axes("scenario", names, "row", [r.estimator for r in ordered]),
             "color": {
                 "field": "shown",
                 "type": "quantitative",

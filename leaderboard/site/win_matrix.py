@@ -10,6 +10,7 @@ from urllib.parse import quote
 from simnav.leaderboard.ranking.wins import wins
 
 from .charts import Chart, columns
+from .heatmap import axes
 from .rounding import short
 
 if TYPE_CHECKING:
@@ -44,11 +45,7 @@ def win_matrix(track: TrackRanking, scenarios: Sequence[ScenarioRanking]) -> Cha
         "data": {"name": "cells"},
         "mark": {"type": "rect", "cursor": "pointer"},
         "encoding": {
-            "x": {
-                "field": "other", "type": "nominal", "title": None, "sort": ordered,
-                "axis": {"orient": "top", "labelAngle": -45, "labelLimit": 150, "labelOverlap": False},
-            },
-            "y": {"field": "row", "type": "nominal", "title": None, "sort": ordered, "axis": {"labelOverlap": False}},
+            **axes("other", ordered, "row", ordered),
             "color": {
                 "field": "share", "type": "quantitative",
                 "scale": {
