@@ -9,8 +9,7 @@ import pandas as pd
 import pyins.strapdown
 import pytest
 
-from simnav.environment import NavigationEnv
-from simnav.geometry.earth import displace, relative_position
+from simnav.geometry.earth import relative_position
 from simnav.geometry.rotation import wrap_angle
 from simnav.scenario import parse
 from simnav.simulation.simulator import Simulator, ideal
@@ -20,6 +19,7 @@ from simnav.strapdown import integrate
 from simnav.world.given_track import GivenTrack, Limits, Poses
 from simnav.world.surroundings import Surroundings
 from simnav.world.trajectory import Voyage
+from tests.cases.steered import ends_of
 
 LIMITS = Limits(speed=40.0, acceleration=6.0, turn_rate=1.0)
 SCENARIO = """
@@ -294,14 +294,5 @@ def test_the_environment_steers_it():
     table += "speed_m_s = 5.0\n"
     gnss = '[instruments.gnss]\nkind = "gnss_position"\nrate_hz = 1.0\nsigma_m = 1.0\n'
     scenario = parse(SCENARIO.format(duration=60.0, rate=20.0, vessel=table) + gnss)
-    ends = []
-    for north in (0.0, 30.0):
-        env = NavigationEnv(scenario, closed_loop=True, reveal_truth=True)
-        _, info = env.reset(seed=1)
-        over = False
-        while not over:
-            action = info["truth"].copy()
-            action[0] = displace(action[0], np.array([north, 0.0, 0.0]))
-            _, _, _, over, info = env.step(action)
-        ends.append(info["truth"][0])
+    ends = ends_of(scenario, (0.0, 30.0))
     assert relative_position(ends[1][None], ends[0])[0, 0] < -20.0

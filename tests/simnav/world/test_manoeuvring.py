@@ -13,8 +13,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad, solve_ivp
 
-from simnav.environment import NavigationEnv
-from simnav.geometry.earth import displace, relative_position
+from simnav.geometry.earth import relative_position
 from simnav.scenario import load, parse
 from simnav.simulation.simulator import Simulator, simulate
 from simnav.simulation.steps import SteppedRuns
@@ -41,6 +40,7 @@ from simnav.world.manoeuvring import dynamics
 from simnav.world.manoeuvring.hull import coriolis, spheroid
 from simnav.world.manoeuvring.sea_trials import turning_circle, zigzag
 from simnav.world.wind import gust_spectrum
+from tests.cases.steered import ends_of
 
 VESSELS = {v.kind: v for v in (SurveyShip(), Ferry(), Workboat(), SurfaceDrone(), Auv())}
 #: A speed of each, and a yaw rate that it can keep [rad/s].
@@ -295,16 +295,7 @@ def test_closed_loop_and_guidance_steer_it():
     from simnav.estimators.learning.guidance import GuidanceEnv, LineOfSight
 
     scenario = parse(HEAD)
-    ends = []
-    for north in (0.0, 40.0):
-        env = NavigationEnv(scenario, closed_loop=True, reveal_truth=True)
-        _, info = env.reset(seed=1)
-        over = False
-        while not over:
-            action = info["truth"].copy()
-            action[0] = displace(action[0], np.array([north, 0.0, 0.0]))
-            _, _, _, over, info = env.step(action)
-        ends.append(info["truth"][0])
+    ends = ends_of(scenario, (0.0, 40.0))
     assert np.hypot(*relative_position(ends[1][None], ends[0])[0, :2]) > 1.0
     guided = GuidanceEnv(scenario, reveal_truth=True)
     seen, _ = guided.reset(seed=1)
