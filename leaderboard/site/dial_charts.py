@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from .charts import COLOUR, ZOOM_HELP, Chart, Spec, bands_of, lines_of, quantity, tips
@@ -56,12 +56,15 @@ def dial(name: str, across: str, up: str, data: Mapping[str, Any], caption: str,
     return Chart(name, title, f"{caption}{crosses} {ZOOM_HELP}", spec, data, byrow=True)
 
 
-def at_value(name: str, across: str, up: str, caption: str) -> Chart:
+def at_value(name: str, across: str, up: str, ends: Sequence[float], caption: str) -> Chart:
     """Errors of all estimators at one value of a dial, which the reader chooses.
 
-    The page puts in the data: ``steps`` with ``row``, ``middle``, ``low``, ``high``, ``failed``.
+    The page puts in the data: ``steps`` with ``row``, ``middle``, ``low``, ``high``, ``failed``. The axis goes over
+    ``ends``, whatever value is chosen.
     """
     x = quantity("middle", up, log=True)
+    if ends:
+        x["scale"] |= {"domain": list(ends)}
     y = {
         "field": "row",
         "type": "nominal",
@@ -94,7 +97,7 @@ def at_value(name: str, across: str, up: str, caption: str) -> Chart:
         },
     ]
     return Chart(
-        name, f"Errors at one value of {across}", caption, {"height": {"step": 26}, "layer": layers}, byrow=True
+        name, f"Errors at one value of the {across}", caption, {"height": {"step": 26}, "layer": layers}, byrow=True
     )
 
 
@@ -121,26 +124,22 @@ def dial_map(name: str, across: str, up: str, label: str, data: Mapping[str, Any
         }
         for axis, title, order in (("x", across, "ascending"), ("y", up, "descending"))
     }
-    fail: Spec = {"test": "!isValid(datum.error)", "value": "$shade"}
     colour = {
-        "condition": fail,
         "field": "error",
         "type": "quantitative",
         "scale": {"type": "log", "scheme": "$scheme"},
         "legend": {"title": label, "orient": "bottom"},
     }
+    known, failed = ([{"filter": f"{sign}isValid(datum.error)"}] for sign in ("", "!"))
     tooltip = tips(row="Estimator", x=across, y=up, error=label)
+    text = {**sides, "text": {"field": "text"}, "tooltip": tooltip}
+    ink = {"condition": {"test": "datum.dark", "value": "#ffffff"}, "value": "#1b2430"}
+    mark = {"type": "text", "fontSize": 11}
     inner: list[Spec] = [
-        {"mark": "rect", "encoding": {**sides, "color": colour, "tooltip": tooltip}},
-        {
-            "mark": {"type": "text", "fontSize": 11},
-            "encoding": {
-                **sides,
-                "text": {"field": "text"},
-                "color": {"condition": {"test": "datum.dark", "value": "#ffffff"}, "value": "#1b2430"},
-                "tooltip": tooltip,
-            },
-        },
+        {"transform": known, "mark": "rect", "encoding": {**sides, "color": colour, "tooltip": tooltip}},
+        {"transform": known, "mark": mark, "encoding": {**text, "color": ink}},
+        {"transform": failed, "mark": {"type": "rect", "color": "$shade", "opacity": 0.4}, "encoding": sides},
+        {"transform": failed, "mark": {**mark, "color": "$ink"}, "encoding": text},
     ]
     spec = {
         "data": {"name": "curves"},

@@ -18,6 +18,7 @@ WIDE = 400.0
 _WIDTHS = {"shift": 500.0, "shift_narrow": 280.0}
 
 _LINE = 13.0  # height of a name [pixels]
+_POINT = 4.0  # half the size of a point [pixels]
 _ABOVE = -4.0  # where the foot of a name is, below its point [pixels]
 _PADDING = (14.0, 26.0)  # of the two axes [pixels]
 _TRIES = [_ABOVE + side * step * _LINE for step in range(9) for side in ((-1.0, 1.0) if step else (1.0,))]
@@ -67,9 +68,10 @@ def _places(
 ) -> list[float]:
     right = _pixels(x, width, _PADDING[0])
     down = [height - v for v in _pixels(y, height, _PADDING[1])]
-    taken: list[tuple[float, float, float, float]] = []
     found = [_ABOVE] * len(names)
-    for k in sorted((k for k, named in enumerate(shown) if named), key=lambda k: (down[k], right[k])):
+    named = sorted((k for k, is_named in enumerate(shown) if is_named), key=lambda k: (down[k], right[k]))
+    taken = [(right[k] - _POINT, right[k] + _POINT, down[k] - _POINT, down[k] + _POINT) for k in named]
+    for k in named:
         long = GAP + LETTER * len(names[k])
         to_left = right[k] > width / 2 and right[k] + long > width
         sides = (right[k] - long, right[k] - GAP) if to_left else (right[k] + GAP, right[k] + long)

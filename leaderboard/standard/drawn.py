@@ -153,7 +153,7 @@ def _quantiles(series: Mapping[str, Series]) -> dict[str, Series]:
 def _rounded(values: Series) -> Series:
     """Figures with `_BITS` binary digits: zeros at the end take no space in a file."""
     mantissa, exponent = np.frexp(values)
-    return np.ldexp(np.round(mantissa * 2**_BITS) / 2**_BITS, exponent).astype(np.float32)
+    return np.asarray(np.ldexp(np.round(mantissa * 2**_BITS) / 2**_BITS, exponent), dtype=np.float32)
 
 
 def attached(results: Iterable[Result], folder: Path = DRAWN) -> tuple[list[Result], dict[str, list[int]]]:
