@@ -15,6 +15,7 @@ from simnav.leaderboard.log_requests import (
     AlignRequest,
     ExportRequest,
     InspectRequest,
+    RecordingsRequest,
     ScoreRequest,
     TuneNoiseRequest,
 )
@@ -292,6 +293,7 @@ COMMANDS: Mapping[str, tuple[type[Any], str]] = {
     "inspect": (InspectRequest, "inspect"),
     "align": (AlignRequest, "align"),
     "tune-noise": (TuneNoiseRequest, "tune_noise"),
+    "recordings": (RecordingsRequest, "recordings"),
     "check": (CheckCommand, "check"),
     "bench": (BenchCommand, "bench"),
     "new-estimator": (NewEstimatorCommand, "new_estimator"),
@@ -320,7 +322,7 @@ COMMANDS: Mapping[str, tuple[type[Any], str]] = {
 HEADINGS: Mapping[str, Sequence[str]] = {
     "Every day": ("list", "show", "run", "evaluate", "check", "new-estimator", "simulate", "sweep", "campaign",
                   "leaderboard"),
-    "Logs and programs of others": ("inspect", "align", "tune-noise", "export", "score"),
+    "Logs and programs of others": ("inspect", "align", "tune-noise", "recordings", "export", "score"),
     "Study and publish": ("tune", "train", "bench", "robustness", "bound", "allan", "realism", "reproduce", "claim",
                           "rescore", "merge", "submit", "verify", "seal", "cite"),
     "Maintain": ("standard", "reference", "warmup"),

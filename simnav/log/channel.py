@@ -250,9 +250,9 @@ def read_channel(spec: RecordedSpec, channel: ChannelSpec, what: str, recording:
     names = kind.values
     table, time, rows = open_file(spec, channel.file, recording, channel.sentence, channel.talker, channel.where)
     time = time + channel.offset
-    rows = rows[:: channel.every]
+    rows = rows[channel.first :: channel.every] if channel.hold_out is None else rows[:: channel.every]
     if channel.hold_out is not None:
-        rows = np.delete(rows, np.s_[:: channel.hold_out])
+        rows = np.delete(rows, np.s_[channel.first :: channel.hold_out])
     columns = _columns(channel, kind, table)
     if len(columns) != len(names):
         raise LogError(

@@ -22,6 +22,7 @@ from simnav.log.reference import Reference
 from simnav.log.table import LogError, LogWarning
 from simnav.recording import AidStream, Block, ImuLabels
 from simnav.sensors import build_layers, labels
+from simnav.streams import stream
 from simnav.types import KINDS, Array, ImuSamples, NavigationStates, TapStates
 from simnav.world.initial_state import draw_start
 
@@ -152,6 +153,8 @@ class LogSource:
         log = scenario.log
         if log is None:
             raise LogError(f"the scenario {scenario.id!r} has no [log]; it is simulated")
+        if log.rows_by_seed:
+            log = log.with_rows(int(stream(root, "rows of a log").integers(1 << 30)))
         names = list_recordings(log)
         self.recording = names[seed % len(names)]
         self.instruments = scenario.instruments_sheet()
@@ -348,9 +351,9 @@ def _regrid(imu: ImuSeries, begin: float, rate: float, duration: float) -> tuple
 
 def _measured_heading(aids: Mapping[str, AidStream]) -> tuple[float, str] | None:
     """The first heading that an instrument measured in the first minute, and its name."""
-    for name, stream in aids.items():
-        if KINDS[stream.kind].equation == HEADING and len(stream) and stream.time[0] <= _EARLY:
-            return float(stream.value[0, 0]), name
+    for name, aid in aids.items():
+        if KINDS[aid.kind].equation == HEADING and len(aid) and aid.time[0] <= _EARLY:
+            return float(aid.value[0, 0]), name
     return None
 
 

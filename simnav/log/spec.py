@@ -49,6 +49,7 @@ _OF_CHANNELS: Mapping[str, Any] = {
     "drop_repeated": False,
     "variation": None,
     "variation_model": None,
+    "first": 0,
 }
 
 
@@ -86,6 +87,8 @@ class ChannelSpec(_Grown):
         Magnetic variation that is added to a magnetic heading [rad], positive east. None: that of the sentences.
     variation_model : str or None
         ``wmm``: the variation is that of the World Magnetic Model at the place and time of the reference.
+    first : int
+        With ``every`` and ``hold_out``: the first of the rows that are taken, or left out.
     """
 
     later: ClassVar[Mapping[str, Any]] = _OF_CHANNELS
@@ -104,6 +107,7 @@ class ChannelSpec(_Grown):
     drop_repeated: bool = False
     variation: float | None = quantity("deg", None)
     variation_model: Literal["wmm"] | None = None
+    first: Annotated[int, Field(ge=0)] = 0
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -127,7 +131,7 @@ class LogInstrumentSpec(_Grown):
     source : {"file", "reference"}
         ``reference``: simulated from the reference with the instrument's own error model.
     file, sentence, talker, columns, units, frame, every, hold_out, offset, where, mounting, drop_repeated, variation,
-    variation_model
+    variation_model, first
         As in `ChannelSpec`, for ``source = "file"``.
     """
 
@@ -148,6 +152,7 @@ class LogInstrumentSpec(_Grown):
     drop_repeated: bool = False
     variation: float | None = quantity("deg", None)
     variation_model: Literal["wmm"] | None = None
+    first: Annotated[int, Field(ge=0)] = 0
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -281,9 +286,12 @@ class RecordedSpec(_Grown):
     begin : {"first", "moving"}
         The run begins at the first epoch of the reference, or at the first one at which the vessel moves by at least
         1 m/s: then its course gives the heading of a reference without attitude.
+    rows_by_seed : bool
+        The seed draws with which row ``every`` and ``hold_out`` begin, so that each run of a recording gets other fixes
+        and is scored against others.
     """
 
-    later: ClassVar[Mapping[str, Any]] = {"begin": "first"}
+    later: ClassVar[Mapping[str, Any]] = {"begin": "first", "rows_by_seed": False}
 
     folder: str = ""
     recordings: str | tuple[str, ...] = "*"
@@ -294,6 +302,7 @@ class RecordedSpec(_Grown):
     origin: OriginSpec | None = None
     skip: NonNegative | tuple[NonNegative, ...] = quantity("s", 0.0)
     begin: Literal["first", "moving"] = "first"
+    rows_by_seed: bool = False
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -339,6 +348,31 @@ class RecordedSpec(_Grown):
         if not isinstance(self.recordings, str) and not self.recordings:
             raise ValueError("recordings = [] is empty; name at least one, or leave it out")
         return self
+
+    def with_rows(self, number: int) -> Self:
+        """The same log, whose channels begin at another row if ``rows_by_seed``.
+
+        Parameters
+        ----------
+        number : int
+            A drawn number; a channel begins at row ``number`` modulo its ``every`` or ``hold_out``.
+        """
+        if not self.rows_by_seed:
+            return self
+
+        def moved(channel: Any) -> Any:
+            period = channel.hold_out or channel.every
+            return channel.model_copy(update={"first": (channel.first + number) % period})
+
+        reference = {
+            n: moved(c) for n in ("position", "velocity", "attitude") if (c := getattr(self.reference, n)) is not None
+        }
+        return self.model_copy(
+            update={
+                "instruments": {n: moved(i) for n, i in self.instruments.items()},
+                "reference": self.reference.model_copy(update=reference),
+            }
+        )
 
 
 def _near(name: str, spec: RecordedSpec) -> str:

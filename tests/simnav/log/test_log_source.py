@@ -246,3 +246,40 @@ def test_an_instrument_outside_the_run(tiny):
     tiny.replace("offset_s = 0.25", "offset_s = 500.0")
     with pytest.raises(LogError, match=r"none of the 39 measurements of 'dvl' lies within the run; .* offset_s"):
         LogSource(tiny.scenario(), 0)
+
+
+HOLD_OUT = """
+[log.instruments.gnss]
+file = "truth"
+columns = ["lat", "lon", "h"]
+units = ["deg", "deg", "m"]
+every = 5
+
+[instruments.gnss]
+kind = "gnss_position"
+rate_hz = 0.2
+sigma_m = [1.0, 1.0, 1.0]
+"""
+
+
+def test_the_seed_chooses_which_fixes_are_held_out(tiny):
+    tiny.replace('folder = "tiny"', 'folder = "tiny"\nrows_by_seed = true')
+    tiny.replace('units = ["deg", "deg", "m"]\n', 'units = ["deg", "deg", "m"]\nhold_out = 5\n')
+    tiny.replace("[log.reference.velocity]", "[log.reference]\nmax_gap_s = 2.5\n\n[log.reference.velocity]").add(
+        HOLD_OUT
+    )
+    firsts = set()
+    for seed in range(8):
+        source = LogSource(tiny.scenario(), seed)
+        log = source.scenario.log
+        gnss = source.advance(source.duration).aids["gnss"]
+        # What an estimator gets is not in the reference that it is scored against.
+        own = set(np.round(source._begin + gnss.time - CLOCK).astype(int))
+        scored = set(np.round(source._reference.time - CLOCK).astype(int))
+        assert own
+        assert not own & scored
+        firsts.add(min(own) % 5)
+        assert log.rows_by_seed
+    assert len(firsts) > 2
+    again = [LogSource(tiny.scenario(), 3).advance(20.0).aids["gnss"].time for _ in range(2)]
+    np.testing.assert_array_equal(*again)
