@@ -50,6 +50,9 @@ _OF_CHANNELS: Mapping[str, Any] = {
     "variation": None,
     "variation_model": None,
     "first": 0,
+    "sigma": (),
+    "sigma_units": (),
+    "sigma_times": 1.0,
 }
 
 
@@ -89,6 +92,13 @@ class ChannelSpec(_Grown):
         ``wmm``: the variation is that of the World Magnetic Model at the place and time of the reference.
     first : int
         With ``every`` and ``hold_out``: the first of the rows that are taken, or left out.
+    sigma : tuple
+        Columns with the standard deviation of each reading (``sdn``, ``fom``, ``hdop``): one for all components, or one
+        each. A row that has none, or none above 0, has that of the datasheet.
+    sigma_units : str or tuple of str
+        Their units, like ``units``; of a figure without a unit, such as HDOP, leave it out.
+    sigma_times : float or tuple of float
+        Multiplies them: of HDOP the sigma at HDOP 1 [SI units].
     """
 
     later: ClassVar[Mapping[str, Any]] = _OF_CHANNELS
@@ -108,6 +118,9 @@ class ChannelSpec(_Grown):
     variation: float | None = quantity("deg", None)
     variation_model: Literal["wmm"] | None = None
     first: Annotated[int, Field(ge=0)] = 0
+    sigma: tuple[Column, ...] = ()
+    sigma_units: str | tuple[str, ...] = ()
+    sigma_times: Positive | tuple[Positive, ...] = 1.0
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -116,6 +129,14 @@ class ChannelSpec(_Grown):
         if self.variation is not None and self.variation_model is not None:
             raise ValueError("variation_deg and variation_model exclude each other; give one")
         check_units((self.units,) if isinstance(self.units, str) else self.units)
+        check_units((self.sigma_units,) if isinstance(self.sigma_units, str) else self.sigma_units)
+        for key, given in (("sigma_units", self.sigma_units), ("sigma_times", self.sigma_times)):
+            if given not in ((), 1.0) and not self.sigma:
+                raise ValueError(f"{key} needs 'sigma', the columns of the standard deviations")
+            if isinstance(given, tuple) and len(given) not in (0, len(self.sigma)):
+                raise ValueError(
+                    f"{key} has {len(given)} values for {len(self.sigma)} columns of sigma; give one or each"
+                )
         if isinstance(self.units, tuple) and len(self.units) not in (0, len(self.columns)):
             raise ValueError(
                 f"{len(self.units)} units for {len(self.columns)} columns; give one unit, or one for each column"
@@ -131,7 +152,7 @@ class LogInstrumentSpec(_Grown):
     source : {"file", "reference"}
         ``reference``: simulated from the reference with the instrument's own error model.
     file, sentence, talker, columns, units, frame, every, hold_out, offset, where, mounting, drop_repeated, variation,
-    variation_model, first
+    variation_model, first, sigma, sigma_units, sigma_times
         As in `ChannelSpec`, for ``source = "file"``.
     """
 
@@ -153,6 +174,9 @@ class LogInstrumentSpec(_Grown):
     variation: float | None = quantity("deg", None)
     variation_model: Literal["wmm"] | None = None
     first: Annotated[int, Field(ge=0)] = 0
+    sigma: tuple[Column, ...] = ()
+    sigma_units: str | tuple[str, ...] = ()
+    sigma_times: Positive | tuple[Positive, ...] = 1.0
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -236,7 +260,7 @@ class OriginSpec(Spec):
     height: float = quantity("m", 0.0)
 
 
-class ReferenceSpec(Spec):
+class ReferenceSpec(_Grown):
     """The reference trajectory that estimates are scored against, for want of the truth.
 
     Attributes
@@ -251,13 +275,42 @@ class ReferenceSpec(Spec):
         position and velocity are brought back to the IMU with it.
     max_gap : float or None
         The reference is interpolated across holes up to this long [s]; default one and a half times its usual spacing.
+    quality : int, str or None
+        Column of the file of the position that says how good each fix is.
+    fixed, floating : tuple of float
+        Its values for fixed and for float solutions; epochs between rows with other values are not scored. By default
+        those of RTKLIB.
+    fixed_sigma, floating_sigma : (float, float, float) or None
+        Standard deviation of such a position, north-east-down [m], where the position has no ``sigma`` of its own.
     """
+
+    later: ClassVar[Mapping[str, Any]] = {
+        "quality": None,
+        "fixed": (1.0,),
+        "floating": (2.0,),
+        "fixed_sigma": None,
+        "floating_sigma": None,
+    }
 
     position: ChannelSpec
     velocity: ChannelSpec | None = None
     attitude: ChannelSpec | None = None
     lever_arm: Vector = quantity("m", (0.0, 0.0, 0.0))
     max_gap: Positive | None = quantity("s", None)
+    quality: Column | None = None
+    fixed: tuple[float, ...] = (1.0,)
+    floating: tuple[float, ...] = (2.0,)
+    fixed_sigma: Vector | None = quantity("m", None)
+    floating_sigma: Vector | None = quantity("m", None)
+
+    @model_validator(mode="after")
+    def _check_quality(self) -> Self:
+        if self.quality is None and (self.fixed_sigma is not None or self.floating_sigma is not None):
+            raise ValueError("fixed_sigma_m and floating_sigma_m need 'quality', the column that tells such fixes")
+        both = set(self.fixed) & set(self.floating)
+        if both:
+            raise ValueError(f"fixed and floating have {sorted(both)} in common")
+        return self
 
 
 class RecordedSpec(_Grown):
@@ -348,6 +401,11 @@ class RecordedSpec(_Grown):
         if not isinstance(self.recordings, str) and not self.recordings:
             raise ValueError("recordings = [] is empty; name at least one, or leave it out")
         return self
+
+    @property
+    def stated(self) -> tuple[str, ...]:
+        """The instruments whose readings state their standard deviations."""
+        return tuple(n for n, i in self.instruments.items() if i.sigma)
 
     def with_rows(self, number: int) -> Self:
         """The same log, whose channels begin at another row if ``rows_by_seed``.

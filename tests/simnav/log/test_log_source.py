@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
 import pytest
 
 from simnav.geometry.earth import displace, relative_position
 from simnav.geometry.rotation import dcm_from_rpy
 from simnav.log import LogError, LogSource, LogWarning
-from simnav.recording import Block
+from simnav.recording import Block, Recording
+from simnav.scoring.beyond_reference import rms_beyond
+from simnav.source import record
 from simnav.strapdown import integrate
 from tests.cases.tiny_log import CLOCK, RATE, write_csv
 
@@ -245,6 +249,39 @@ def test_clocks_that_do_not_meet(tiny):
 def test_an_instrument_outside_the_run(tiny):
     tiny.replace("offset_s = 0.25", "offset_s = 500.0")
     with pytest.raises(LogError, match=r"none of the 39 measurements of 'dvl' lies within the run; .* offset_s"):
+        LogSource(tiny.scenario(), 0)
+
+
+def test_a_reference_knows_how_good_it_is(tiny):
+    path = tiny.folder / "truth1.csv"
+    lines = path.read_text().splitlines()
+    solution = [5 if k in (8, 20) else 2 if k in (9, 10) else 1 for k in range(len(lines) - 1)]
+    more = ["Q,sdn", *(f"{q},{0.3 if q == 1 else 'nan'}" for q in solution)]
+    path.write_text("\n".join(f"{a},{b}" for a, b in zip(lines, more, strict=True)) + "\n")
+    tiny.replace('units = ["deg", "deg", "m"]\n', 'units = ["deg", "deg", "m"]\nsigma = ["sdn"]\n')
+    tiny.add('[log.reference]\nquality = "Q"\nfloating_sigma_m = [4.0, 4.0, 8.0]\n')
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", LogWarning)
+        recording = record(tiny.scenario(), 0)
+    assert "reference: 90.2% fixed, 4.9% float, 4.9% neither and not scored" in recording.note
+    assert "its own horizontal sigma of 0.424 m is subtracted" in recording.note
+    truth = recording.data.truth
+    begin = round(LogSource(tiny.scenario(), 0)._begin - CLOCK)
+    epoch = {k: k - begin - 1 for k in range(len(solution))}
+    assert np.isnan(truth.position[epoch[20]]).all()  # neither
+    assert truth.quality[[epoch[9], epoch[30]]].tolist() == [2.0, 1.0]
+    np.testing.assert_allclose(truth.sigma[[epoch[10], epoch[30]]], [[4.0, 4.0, 8.0], [0.3, 0.3, 0.3]])
+    # An estimate that is off by 2 m north, where the reference is known to 0.3 m in each direction.
+    known = np.isfinite(truth.position).all(axis=1) & (truth.quality == 1.0)
+    error = np.tile([2.0, 0.0], (int(known.sum()), 1))
+    assert rms_beyond(error, truth.sigma[known][:, :2]) == pytest.approx(np.sqrt(4.0 - 2 * 0.09), rel=0.02)
+    path = tiny.folder.parent / "kept.npz"
+    recording.save(path)
+    np.testing.assert_array_equal(Recording.load(path).data.truth.quality, truth.quality)
+    tiny.replace('quality = "Q"', 'quality = "Q"\nfixed = [7]\nfloating = [8]')
+    with pytest.raises(
+        LogError, match=r"no row has a value of fixed = \[7.0\] or floating = \[8.0\] in the column 'Q'"
+    ):
         LogSource(tiny.scenario(), 0)
 
 
