@@ -121,7 +121,8 @@ def test_the_first_estimator_as_a_notebook(tmp_path, monkeypatch):
     monkeypatch.setenv("COLUMNS", "200")
     found = notebook("first-estimator")
     for cell in found.cells:
-        cell.source = cell.source.replace("--runs 20", "--runs 2 --against gnss-only").replace("runs=3", "runs=2")
+        cell.source = cell.source.replace("--runs 20", "--runs 2 --against gnss-only --workers 1")
+        cell.source = cell.source.replace("runs=3", "runs=2, workers=1")
     client = nbclient.NotebookClient(found, timeout=300, resources={"metadata": {"path": str(tmp_path)}})
     client.execute()
     _, checked, ran, evaluated, called = [

@@ -15,6 +15,7 @@ from simnav.scenario import Scenario, load
 from simnav.scenario.catalogue import Header, headers
 from simnav.source import record
 from simnav.types import InitialState
+from tests.cases.sorts_of_scenarios import OF_EVERY_SORT, used
 
 FOLDER = Path(__file__).resolve().parents[2] / "scenarios"
 CATALOGUE = [h for h in headers() if h.path.is_relative_to(FOLDER)]
@@ -289,3 +290,11 @@ def test_one_datasheet_is_wrong_and_the_others_are_true():
         assert differ == [run.draws["draw.wrong"]]
         wrong |= set(differ)
     assert wrong == {"gnss", "dvl", "gyrocompass", "gyroscope", "accelerometer"}
+
+
+def test_what_any_simulated_scenario_uses_one_of_the_sorts_uses():
+    """Tests that take these for all others would miss what a new scenario brings."""
+    tested = set().union(*(used(load(name)) for name in OF_EVERY_SORT))
+    missed = {h.name: used(load(h.name)) - tested for h in CATALOGUE if not h.recorded}
+    assert {name: what for name, what in missed.items() if what} == {}
+    assert tested - used(load("open-sea"))

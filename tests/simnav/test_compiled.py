@@ -54,11 +54,16 @@ def write(folder: Path, package: str = "pack", factor: float = 2.0, offset: floa
     (here / "outer.py").write_text(CALLER.format(package=package, table=table))
 
 
+def surroundings(cache: Path, **more: str) -> dict[str, str]:
+    """Variables of a process that compiles source anew: files that change within a second have one time stamp."""
+    return os.environ | {"SIMNAV_CACHE_DIR": str(cache), "PYTHONDONTWRITEBYTECODE": "1"} | more
+
+
 def run(folder: Path, cache: Path, package: str = "pack", **env: str) -> tuple[float, bool]:
     """Value of the kernel at 1, and whether it came from the cache, in a process of its own."""
     code = RUN.format(folder=str(folder), package=package)
-    environment = os.environ | {"SIMNAV_CACHE_DIR": str(cache), "PYTHONDONTWRITEBYTECODE": "1"} | env
-    done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=False)
+    command = [sys.executable, "-c", code]
+    done = subprocess.run(command, env=surroundings(cache, **env), capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     value, hit = done.stdout.split()
     return float(value), hit == "True"
@@ -101,7 +106,7 @@ def test_an_edit_between_import_and_compilation_does_not_poison_the_cache(tmp_pa
     code = RUN.format(folder=str(source), package="pack").replace("hit =", "input(); hit =")
     process = subprocess.Popen(
         [sys.executable, "-c", code.replace("assert", "print('imported', flush=True); assert")],
-        env=os.environ | {"SIMNAV_CACHE_DIR": str(cache)},
+        env=surroundings(cache),
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         text=True,

@@ -22,6 +22,7 @@ from simnav.estimator import UnsuitableScenario
 from simnav.estimators.learning.environment import FilterTaskEnv
 from simnav.log import LogError
 from simnav.scenario.catalogue import headers
+from tests.cases.sorts_of_scenarios import OF_EVERY_SORT
 
 TASKS = ("Tuning", "Detection", "Correction", "Guidance")
 IDS = [name for name in gymnasium.registry if name.startswith("simnav/") and name.split("-")[1] in TASKS]
@@ -59,16 +60,19 @@ def small_pictures(monkeypatch, chart):
         monkeypatch.setattr(artist, "draw", lambda self, renderer: None)
 
 
-#: Scenarios of different sorts, which have every task here; of each other scenario one task is here, in turn.
+#: Scenarios of different sorts, which have every task here.
 WHOLE = ("OpenSea", "CoastalVoyage", "RandomVoyages", "TrainingShips", "ShipNbp1406", "CarKitti", "TwelveHours")
 
 
 def some_ids():
+    """All tasks of some scenarios, and one task, in turn, of each that stands for a sort."""
     of = {}
     for name in IDS:
         of.setdefault(name.split("/")[1].split("-")[0], []).append(name)
-    for k, (scenario, ids) in enumerate(sorted(of.items())):
-        yield from ids if scenario in WHOLE else [ids[k % len(ids)]]
+    others = ("".join(map(str.capitalize, name.split("-"))) for name in OF_EVERY_SORT)
+    chosen = {scenario: of[scenario] for scenario in WHOLE}
+    yield from (name for ids in chosen.values() for name in ids)
+    yield from (of[scenario][k % len(of[scenario])] for k, scenario in enumerate(others) if scenario not in chosen)
 
 
 @pytest.mark.filterwarnings("ignore::simnav.log.LogWarning")

@@ -227,7 +227,7 @@ def test_killed_at_any_moment_it_ends_with_the_same_table(tmp_path: Path) -> Non
         if process.poll() is None:
             os.killpg(process.pid, signal.SIGKILL)
         process.wait(60)
-    assert start(tmp_path, disturbed, 8).wait(200) == 0
+    run_campaign([scenario()], requests, range(8), disturbed, workers=1)
     assert len(rows(undisturbed)) == 16
     assert rows(disturbed) == rows(undisturbed)
     assert not list((disturbed / "results").glob("*.parquet"))
@@ -289,7 +289,8 @@ def test_an_interrupt_of_the_user_ends_it_at_once_and_keeps_all(tmp_path: Path) 
     kept = rows(out)
     assert 2 <= len(kept) < 12
     assert {status for _, _, _, status, *_ in kept} == {"ok"}  # nobody ran into the limit of time
-    assert start(tmp_path, out, 6).wait(200) == 0
+    requests = [EstimatorRequest(str(tmp_path / f"{n}.py"), label=n) for n in ("last_fix", "raises")]
+    run_campaign([scenario()], requests, range(6), out, workers=1)
     assert len(rows(out)) == 12
 
 
@@ -501,15 +502,11 @@ def test_a_worker_that_dies_is_replaced_but_not_for_ever(tmp_path: Path, monkeyp
     killer = "import os, signal; os.kill(os.getppid(), signal.SIGKILL)"
     note = f"import pathlib; p = pathlib.Path({str(tmp_path / 'was-here')!r})"
     once = f"{note}\n        if not p.exists(): p.touch(); {killer}"
-    requests = [estimator(tmp_path), estimator(tmp_path, "once", once)]
+    requests = [estimator(tmp_path), estimator(tmp_path, "once", once), estimator(tmp_path, "always", killer)]
     out = tmp_path / "out"
-    summary = run_campaign([scenario()], requests, [0, 1], out, workers=2)
-    assert (summary.total, summary.computed, summary.failed) == (4, 4, 0)
-    assert [r.status for r in store.load(out)] == ["ok"] * 4
-    requests.append(estimator(tmp_path, "always", killer))
     with pytest.raises(CampaignError, match="worker processes died 2 times"):
-        run_campaign([scenario()], requests, [0, 1], out, workers=2)
-    assert [r.status for r in store.load(out)] == ["ok"] * 4
+        run_campaign([scenario()], requests, [0], out, workers=2)
+    assert [(r.estimator, r.status) for r in store.load(out)] == [("last-fix", "ok"), ("once", "ok")]
 
 
 def test_requests_that_make_no_sense(tmp_path: Path) -> None:
