@@ -203,6 +203,24 @@ class BoundCommand(BoundRequest):
 
 
 @request
+class AlignCommand(AlignRequest):
+    """Compare every instrument of a log with the reference: delay, lever arm, mounting, offset, scale, with sigmas."""
+
+    _: KW_ONLY
+    plot: Path | None = option(default=None, help=_FIGURE)
+
+
+@request
+class InspectCommand(InspectRequest):
+    """Show what the files of a log hold, and write a scenario to begin with."""
+
+    _: KW_ONLY
+    plot: Path | None = option(
+        default=None, help="Write a map of the tracks, and when there are data: .png, .svg or .pdf."
+    )
+
+
+@request
 class AllanCommand(AllanRequest):
     """Show the Allan deviation of an IMU and its noise coefficients, beside its datasheet."""
 
@@ -290,8 +308,8 @@ COMMANDS: Mapping[str, tuple[type[Any], str]] = {
     "simulate": (SimulateCommand, "simulate"),
     "score": (ScoreCommand, "score"),
     "export": (ExportRequest, "export"),
-    "inspect": (InspectRequest, "inspect"),
-    "align": (AlignRequest, "align"),
+    "inspect": (InspectCommand, "inspect"),
+    "align": (AlignCommand, "align"),
     "tune-noise": (TuneNoiseRequest, "tune_noise"),
     "recordings": (RecordingsRequest, "recordings"),
     "check": (CheckCommand, "check"),

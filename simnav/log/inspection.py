@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from simnav.geometry.earth import relative_position
 from simnav.log.binary import signature
 from simnav.log.check import described
 from simnav.log.delimited import read_csv
@@ -24,7 +25,7 @@ from simnav.log.reader import READERS
 from simnav.log.table import LogError, Table, utc_seconds
 from simnav.types import Array
 
-__all__ = ["Stream", "inspect_log", "streams_of"]
+__all__ = ["Stream", "inspect_log", "streams_of", "track_of"]
 
 #: Ending of a file -> its format, where its content says nothing.
 _ENDINGS = {
@@ -209,6 +210,24 @@ def _streams(path: Path, form: str) -> Iterator[Stream]:
     assert reader is not None
     rows = reader.read(path, FileSpec(path=path.name, format=form, **keys))
     yield Stream(path, form, None, None, rows.table, _known(rows.time), keys)
+
+
+def track_of(stream: Stream) -> Array | None:
+    """(n, 2) east and north of the first position [m] of a stream that has latitudes and longitudes; None without."""
+    found = []
+    for names in (("latitude", "lat"), ("longitude", "lon", "lng", "long")):
+        name = next((n for n in stream.table.names if re.split(r"[./]", n.lower())[-1] in names), None)
+        if name is None or stream.table.columns[name].dtype == object:
+            return None
+        found.append(stream.table.columns[name].astype(np.float64))
+    place = np.stack([*found, np.zeros(len(stream.table))], axis=-1)
+    place = place[np.isfinite(place).all(axis=1)]
+    if not len(place):
+        return None
+    if stream.form not in ("nmea", "n2k", "ubx", "sbet"):  # those are in radians already
+        place[:, :2] = np.radians(place[:, :2])
+    place = place[(np.abs(place[:, 0]) <= 0.5 * np.pi) & (np.abs(place[:, 1]) <= 2.0 * np.pi)]
+    return relative_position(place, place[0])[:, [1, 0]] if len(place) else None
 
 
 def _known(time: Array) -> Array:
