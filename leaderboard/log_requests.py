@@ -76,8 +76,9 @@ class RecordingsRequest:
     )
     _: KW_ONLY
     scenarios: Iterable[str] | str | None = option(
-        "--scenario", "-s", default=None, metavar="NAMES", help="Only these, separated by commas. Default: all."
-    )
+        "--scenario", "-s", default=None, metavar="NAMES", help="Only these, separated by commas. Default: all.",
+        cli=str | None,
+    )  # fmt: skip
     output: PathLike | None = option(
         "--output", "-o", default=None, metavar="FOLDER", help="Data folder. Default: SIMNAV_DATA, or ./data."
     )
