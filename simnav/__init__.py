@@ -39,7 +39,7 @@ if TYPE_CHECKING:
         seal,
         verify,
     )
-    from simnav.leaderboard.logs import align, export, inspect_log, score_files, tune_noise
+    from simnav.leaderboard.logs import align, export, inspect_log, recordings, score_files, tune_noise
     from simnav.leaderboard.publishing import (
         audit_standard,
         check_standard,
@@ -125,6 +125,7 @@ __all__ = [
     "rank",
     "realism",
     "record",
+    "recordings",
     "register",
     "register_fault",
     "register_instrument",
@@ -190,7 +191,7 @@ _HOMES = {
         "seal",
         "verify",
     ),
-    "leaderboard.logs": ("align", "export", "inspect_log", "score_files", "tune_noise"),
+    "leaderboard.logs": ("align", "export", "inspect_log", "recordings", "score_files", "tune_noise"),
     "leaderboard.results.errors": ("RequestError",),
     "leaderboard.running": ("campaign", "check", "evaluate", "make", "record", "robustness", "run", "sweep", "tune"),
     "leaderboard.publishing": (

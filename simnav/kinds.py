@@ -548,6 +548,9 @@ class Datasheet:
         What is known of its time stamps, and of how late readings arrive. None: nothing, or that both are perfect.
     sources : tuple of str
         Names of the instruments whose readings it solves: its errors are theirs. Whoever uses both counts them twice.
+    stated : bool
+        Whether it has no channels and states with a reading the standard deviation of its white noise, as the (d,) side
+        information. ``sigma`` is then that of readings that state none.
     """
 
     name: str
@@ -567,6 +570,7 @@ class Datasheet:
     processes: tuple[DeclaredProcess, ...] = ()
     timing: TimingSheet | None = None
     sources: tuple[str, ...] = ()
+    stated: bool = False
 
     def __post_init__(self) -> None:
         if self.kind not in KINDS:

@@ -31,6 +31,7 @@ from simnav.leaderboard.ranking.ranking_figure import ranking_figure
 from simnav.leaderboard.ranking.runs import group
 from simnav.leaderboard.ranking.statistics import FAILURE
 from simnav.leaderboard.ranking.summary import spread
+from simnav.leaderboard.ranking.voyages import side_by_side
 from simnav.leaderboard.results.citation import citation
 from simnav.leaderboard.results.errors import RequestError
 from simnav.leaderboard.results.export import Document
@@ -317,7 +318,9 @@ class _Site:
         for later in tracks[1:]:  # read when its tab is opened
             self._data(f"track-{later['key']}", later)
         index = {"kind": "index", "tracks": headers}
-        self._page("index.html", "index.html", index, tracks=tracks, facts=self._counts())
+        self._page(
+            "index.html", "index.html", index, tracks=tracks, facts=self._counts(), voyages=side_by_side(self.ranking)
+        )
         rows = {label: {"data": e.data, "page": e.page} for label, e in self.estimators.items()}
         compared: dict[str, Any] = {"kind": "compare", "rows": rows, "wins": self._wins()}
         self._page("compare.html", "compare.html", compared)

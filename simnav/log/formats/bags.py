@@ -16,6 +16,8 @@ from typing import Any
 import numpy as np
 
 from simnav.log.files import FileSpec
+from simnav.log.growing import GrowingTable
+from simnav.log.progress import tell
 from simnav.log.reader import Rows, register_reader
 from simnav.log.table import LogError, Table
 from simnav.spec import closest
@@ -25,6 +27,8 @@ __all__ = ["topics_of"]
 #: Longer arrays in a message (images, point clouds) are left out.
 _LONGEST = 64
 _DEEPEST = 8
+#: After so many messages it is told how far the file has been read.
+_TOLD = 2000
 
 
 @register_reader("rosbag", title="a bag")
@@ -54,15 +58,15 @@ def _rows(path: Path, file: FileSpec, sentence: str | None, form: str) -> Rows:
 @lru_cache(maxsize=16)
 def _table(path: Path, form: str, topic: str | None, _mtime: int, _size: int) -> Table:
     messages = _mcap(path, topic) if form == "mcap" else _bag(path, topic)
-    rows: list[dict[str, float]] = []
+    rows = GrowingTable()
     try:
         for stamp, message in messages:
-            row = {"recorded": 1e-9 * stamp, **dict(_numbers("", message, 0))}
+            row: dict[str, float] = {"recorded": 1e-9 * stamp, **dict(_numbers("", message, 0))}
             if "header.stamp.sec" in row:
                 row["header"] = row["header.stamp.sec"] + 1e-9 * row.get("header.stamp.nanosec", 0.0)
             elif "timestamp.sec" in row:
                 row["header"] = row["timestamp.sec"] + 1e-9 * row.get("timestamp.nsec", 0.0)
-            rows.append(row)
+            rows.add(row, len(rows) + 1)
     except (LogError, FileNotFoundError):
         raise
     except (MemoryError, Exception) as error:
@@ -73,9 +77,7 @@ def _table(path: Path, form: str, topic: str | None, _mtime: int, _size: int) ->
         ) from None
     if not rows:
         raise LogError(f"{path}: the topic {topic!r} has no messages")
-    names = list(dict.fromkeys(name for row in rows for name in row))
-    columns = {name: np.array([row.get(name, np.nan) for row in rows]) for name in names}
-    return Table(f"{path} ({topic})", dict(columns), np.arange(1, len(rows) + 1), numbered=False)
+    return rows.table(f"{path} ({topic})")
 
 
 def topics_of(path: Path, form: str) -> list[str]:
@@ -121,7 +123,10 @@ def _bag(path: Path, topic: str | None) -> Iterator[tuple[int, Any]]:
     with AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader:
         chosen = _choose(path, topic, sorted({c.topic for c in reader.connections}))
         connections = [c for c in reader.connections if c.topic == chosen]
-        for connection, stamp, raw in reader.messages(connections=connections):
+        total = sum(c.msgcount for c in connections)
+        for number, (connection, stamp, raw) in enumerate(reader.messages(connections=connections), 1):
+            if number % _TOLD == 0:
+                tell(path, number, total)
             yield stamp, reader.deserialize(raw, connection.msgtype)
 
 
@@ -136,7 +141,12 @@ def _mcap(path: Path, topic: str | None) -> Iterator[tuple[int, Any]]:
         summary = reader.get_summary()
         topics = sorted({c.topic for c in summary.channels.values()}) if summary else []
         chosen = _choose(path, topic, topics) if topics else topic
-        for schema, channel, message in reader.iter_messages(topics=None if chosen is None else [chosen]):
+        counts = summary.statistics.channel_message_counts if summary and summary.statistics else {}
+        total = sum(counts.get(c.id, 0) for c in summary.channels.values() if c.topic == chosen) if summary else 0
+        messages = reader.iter_messages(topics=None if chosen is None else [chosen])
+        for number, (schema, channel, message) in enumerate(messages, 1):
+            if number % _TOLD == 0:
+                tell(path, number, total)
             if channel.id not in decode:
                 decode[channel.id] = _decoder(path, channel, schema)
             yield message.log_time, decode[channel.id](message.data)

@@ -70,7 +70,7 @@ def beside(seconds: float, runs: int) -> Callable[[str], np.ndarray]:
 
 @pytest.fixture(scope="module")
 def of_filter() -> Callable[[str], np.ndarray]:
-    return beside(450.0, 6)
+    return beside(450.0, 4)
 
 
 @pytest.fixture(scope="module")

@@ -14,6 +14,7 @@ from simnav.log.files import FileSpec
 from simnav.log.nmea import read_nmea
 from simnav.log.reader import READERS
 from simnav.scenario import parse
+from simnav.scoring import score
 from simnav.source import record
 from simnav.trial.estimate_file import trial_of_file
 
@@ -67,6 +68,27 @@ def test_tum_is_the_truth_for_the_scores(tmp_path, recording):
     np.testing.assert_allclose(np.sin(trial.attitude), np.sin(recording.data.truth.attitude), atol=1e-9)
     with pytest.raises(ValueError, match="write it with --truth"):
         write("recording", "tum", without_truth(recording), tmp_path / "x.tum")
+
+
+def test_absolute_pose_error_of_evo_is_our_rmse(tmp_path, recording):
+    """Positional APE without alignment (M. Grupp, evo: Python package for the evaluation of odometry and SLAM)."""
+    file_interface = pytest.importorskip("evo.tools.file_interface")
+    from evo.core import metrics, sync
+
+    truth, estimate = tmp_path / "truth.tum", tmp_path / "estimate.tum"
+    write("recording", "tum", recording, truth)
+    rows = np.loadtxt(truth)
+    rng = np.random.default_rng(5)
+    rows[:, 1:4] += np.array([3.0, -2.0, 1.0]) + rng.normal(0.0, 2.0, (len(rows), 3))
+    np.savetxt(estimate, rows, fmt="%.17g")
+    trial = trial_of_file(estimate, recording)
+    ours = score(trial, recording)
+    pair = sync.associate_trajectories(*(file_interface.read_tum_trajectory_file(str(p)) for p in (truth, estimate)))
+    ape = metrics.APE(metrics.PoseRelation.translation_part)
+    ape.process_data(pair)
+    theirs = ape.get_statistic(metrics.StatisticsType.rmse)
+    assert theirs == pytest.approx(np.hypot(ours["horizontal_rmse"], ours["vertical_rmse"]), rel=1e-5)
+    assert theirs > 3.0
 
 
 def test_nmea_makes_the_round_trip(tmp_path, recording):
