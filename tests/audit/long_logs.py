@@ -1,4 +1,4 @@
-"""Long logs: ten million rows of a table in ten seconds of processor time; a bag and four hours of NMEA in little memory.
+"""Long logs: ten million rows of a table in ten seconds of processor time; a long bag and NMEA log in little memory.
 
 Each file is read in a process of its own, which says its processor time and by how much its memory has grown. A table
 is held as a whole, with its text; of bags and sentences only the numbers are kept.
