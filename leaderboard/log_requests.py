@@ -75,7 +75,7 @@ class RecordingsRequest:
         cli=list[Path],
     )
     _: KW_ONLY
-    scenarios: Iterable[str] | str | None = option(
+    scenarios: str | None = option(
         "--scenario", "-s", default=None, metavar="NAMES", help="Only these, separated by commas. Default: all."
     )
     output: PathLike | None = option(
