@@ -75,9 +75,10 @@ class RecordingsRequest:
         cli=list[Path],
     )
     _: KW_ONLY
-    scenarios: str | None = option(
-        "--scenario", "-s", default=None, metavar="NAMES", help="Only these, separated by commas. Default: all."
-    )
+    scenarios: Iterable[str] | str | None = option(
+        "--scenario", "-s", default=None, metavar="NAMES", help="Only these, separated by commas. Default: all.",
+        cli=str | None,
+    )  # fmt: skip
     output: PathLike | None = option(
         "--output", "-o", default=None, metavar="FOLDER", help="Data folder. Default: SIMNAV_DATA, or ./data."
     )
@@ -89,9 +90,6 @@ class TuneNoiseRequest:
 
     scenario: ScenarioLike = option(help=_SCENARIO, more=_SCENARIO_MORE, argument=True, metavar="SCENARIO")
     seed: int = option(default=0, help="Number of the recording.", least=0)
-    innovations: bool = option(
-        "--innovations", default=False, help="Also those with which the innovations of a filter are as it expects."
-    )
 
 
 @request

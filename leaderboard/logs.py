@@ -168,7 +168,8 @@ def recordings(request: RecordingsRequest) -> list[PublicRecordings]:
     from .recordings import public_recordings, take
 
     given = [request.files] if isinstance(request.files, (str, os.PathLike)) else list(request.files or ())
-    names = [n.strip() for n in (request.scenarios or "").split(",") if n.strip()]
+    asked = request.scenarios or ()
+    names = [n.strip() for n in asked.split(",")] if isinstance(asked, str) else list(asked)
     output = None if request.output is None else absolute(request.output)
     if not given:
         return public_recordings(names, output)
