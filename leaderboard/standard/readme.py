@@ -123,7 +123,7 @@ def findings(track: TrackRanking) -> list[str]:
     covered = [100.0 * r.faulty.coverage for r in best if math.isfinite(r.faulty.coverage)]
     if covered:
         said.append(
-            "**Do they know it?** Once something is wrong, the truth lies inside the 95 % region that they state in "
+            "**Do they know it?** Once something is wrong, the truth lies inside the 95 % region that they state "
             f"{spread(covered)} % of the time."
         )
     return said
