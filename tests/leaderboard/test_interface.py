@@ -194,6 +194,7 @@ def test_every_command_is_compared() -> None:
 OTHER_NAMES: dict[str, Callable[..., Any] | None] = {
     "list": simnav.names, "simulate": simnav.record, "leaderboard": simnav.site, "new-estimator": write_estimator,
     "warmup": warmup, "reference": None, "show": None, "train anfis": None, "standard run": simnav.run_standard,
+    "standard draw": simnav.draw_standard,
     "standard check": simnav.check_standard, "standard audit": simnav.audit_standard,
     "standard publish": simnav.publish_standard, "inspect": simnav.inspect_log, "score": simnav.score_files,
     "tune-noise": simnav.tune_noise,
