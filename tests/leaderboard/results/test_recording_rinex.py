@@ -77,7 +77,7 @@ def names(stream) -> list[str]:
 
 
 def test_the_reader_gives_the_same_numbers(recording, file):
-    """Epochs are those of the receiver's clock, up to a millisecond off; ranges lack only the clock of the satellite."""
+    """Epochs are those of the receiver's clock, a millisecond off at most; ranges lack the clock of the satellite."""
     stream, tables = recording.data.aids["gnss"], read_rinex(file)
     bias = []
     for number, name in enumerate(stream.channels):
@@ -85,7 +85,7 @@ def test_the_reader_gives_the_same_numbers(recording, file):
         raw, at = table.column("C1C")[1], table.column("time")[1] % 86400.0 - 43200.0 + 18.0
         np.testing.assert_allclose(table.column("S1C")[1], stream.side[rows, STRENGTH], atol=6e-4)
         less = (raw - stream.value[rows, 0]) / SPEED_OF_LIGHT  # the clock of the satellite
-        assert 1e-8 < abs(less[0]) < 1e-3
+        assert 1e-8 < abs(less[0]) < 2e-3
         np.testing.assert_allclose(less, less[0], atol=1e-9)
         shift = -table.column("D1C")[1] * SPEED_OF_LIGHT / 1575.42e6
         np.testing.assert_allclose(shift, stream.value[rows, 1], atol=0.01)
