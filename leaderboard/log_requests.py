@@ -90,6 +90,9 @@ class TuneNoiseRequest:
 
     scenario: ScenarioLike = option(help=_SCENARIO, more=_SCENARIO_MORE, argument=True, metavar="SCENARIO")
     seed: int = option(default=0, help="Number of the recording.", least=0)
+    innovations: bool = option(
+        "--innovations", default=False, help="Also those with which the innovations of a filter are as it expects."
+    )
 
 
 @request

@@ -194,9 +194,12 @@ def tune_noise(request: TuneNoiseRequest) -> list[Figure]:
     from simnav.log.alignment import align
     from simnav.log.noise_figures import noise_figures
 
+    from .white_innovations import innovation_figures
+
     scenario, seed = _recorded(request.scenario), whole_number("seed", request.seed, 0)
     with mistakes(ValueError, OSError):
-        return noise_figures(scenario, align(scenario, seed), seed)
+        found = noise_figures(scenario, align(scenario, seed), seed)
+        return found + innovation_figures(scenario, seed) if request.innovations else found
 
 
 def _recorded(given: str | Path | Scenario) -> Scenario:

@@ -251,7 +251,7 @@ def _copy_text(path: Path, target: Path) -> Path:
 
 def state_table(found: Sequence[PublicRecordings]) -> Table:
     """What is known, and what of it is there."""
-    from simnav.leaderboard.ranking import tables
+    from .ranking import tables
 
     rows = []
     for one in found:

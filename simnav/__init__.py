@@ -43,6 +43,7 @@ if TYPE_CHECKING:
     from simnav.leaderboard.publishing import (
         audit_standard,
         check_standard,
+        draw_standard,
         publish_standard,
         run_standard,
         site,
@@ -110,6 +111,7 @@ __all__ = [
     "cite",
     "claim",
     "costs",
+    "draw_standard",
     "evaluate",
     "export",
     "inspect_log",
@@ -195,6 +197,7 @@ _HOMES = {
     "leaderboard.publishing": (
         "audit_standard",
         "check_standard",
+        "draw_standard",
         "publish_standard",
         "run_standard",
         "site",

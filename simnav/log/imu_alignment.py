@@ -12,6 +12,7 @@ from __future__ import annotations
 from typing import TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from simnav.geometry.earth import earth_rate, gravity
 from simnav.geometry.rotation import dcm_from_rpy, rpy_from_dcm
@@ -140,7 +141,7 @@ def mounting_of(turns: Array, forces: Array, turned: Array, pull: Array) -> tupl
     return total, np.asarray(rotation), np.asarray(np.linalg.pinv(information))
 
 
-def _of_reference(source: LogSource, starts: Array) -> tuple[Array, Array, Array]:
+def _of_reference(source: LogSource, starts: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
     """Rotation vectors and specific forces of the intervals from the reference, and where it knows them."""
     a, b = source.reference_states(starts), source.reference_states(starts + _INTERVAL)
     known = np.isfinite(a.attitude).all(axis=1) & np.isfinite(b.attitude).all(axis=1)
@@ -153,7 +154,7 @@ def _of_reference(source: LogSource, starts: Array) -> tuple[Array, Array, Array
     turned = _rotation_vector(relative) + _INTERVAL * np.einsum("nji,j->ni", middle, earth_rate(latitude))
     up = np.array([0.0, 0.0, -gravity(latitude, height)])
     change = np.nan_to_num((b.velocity - a.velocity) / _INTERVAL)
-    return turned, np.einsum("nji,nj->ni", middle, up + change), known
+    return turned, np.einsum("nji,nj->ni", middle, up + change), np.asarray(known, dtype=np.bool_)
 
 
 def _rotation_vector(dcm: Array) -> Array:

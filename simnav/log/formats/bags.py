@@ -8,7 +8,7 @@ recorded (``clock = "logger"``) or those in their header (``clock = "sentence"``
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -66,6 +66,8 @@ def _table(path: Path, form: str, topic: str | None, _mtime: int, _size: int) ->
                 row["header"] = row["header.stamp.sec"] + 1e-9 * row.get("header.stamp.nanosec", 0.0)
             elif "timestamp.sec" in row:
                 row["header"] = row["timestamp.sec"] + 1e-9 * row.get("timestamp.nsec", 0.0)
+            elif "timestamp.seconds" in row:
+                row["header"] = row["timestamp.seconds"] + 1e-9 * row.get("timestamp.nanos", 0.0)
             rows.add(row, len(rows) + 1)
     except (LogError, FileNotFoundError):
         raise
@@ -167,10 +169,40 @@ def _decoder(path: Path, channel: Any, schema: Any) -> Any:
             text = schema.data.decode().split("=" * 80)[0]
             store.register(get_types_from_msg(text, name))
         return lambda raw: store.deserialize_cdr(raw, name)
+    if channel.message_encoding == "protobuf" and schema is not None and schema.encoding == "protobuf":
+        return _of_protobuf(path, schema)
     raise LogError(
-        f"{path}: messages of the topic {channel.topic!r} are encoded as {channel.message_encoding!r}; read are 'json' "
-        "and 'cdr' (ROS 2)"
+        f"{path}: messages of the topic {channel.topic!r} are encoded as {channel.message_encoding!r}; read are "
+        "'json', 'cdr' (ROS 2) and 'protobuf'"
     )
+
+
+def _of_protobuf(path: Path, schema: Any) -> Callable[[bytes], dict[str, Any]]:
+    """A function from the bytes of a message to its fields; the schema is a set of file descriptors."""
+    try:
+        from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
+    except ImportError:
+        raise LogError(f"{path}: messages of protobuf need the library protobuf: pip install 'simnav[logs]'") from None
+    pool = descriptor_pool.DescriptorPool()
+    for file in descriptor_pb2.FileDescriptorSet.FromString(schema.data).file:
+        pool.Add(file)
+    made = message_factory.GetMessageClass(pool.FindMessageTypeByName(schema.name))
+    return lambda raw: _fields(made.FromString(raw))
+
+
+def _fields(message: Any) -> dict[str, Any]:
+    """The fields of a message of protobuf, those with default values too; text and bytes stay as they are."""
+    found: dict[str, Any] = {}
+    for field in message.DESCRIPTOR.fields:
+        value = getattr(message, field.name)
+        repeated = isinstance(value, Sequence) and not isinstance(value, (str, bytes))
+        if field.message_type is None:
+            found[field.name] = list(value) if repeated else value
+        elif hasattr(value, "DESCRIPTOR"):
+            found[field.name] = _fields(value) if message.HasField(field.name) else {}
+        elif hasattr(value, "__len__") and len(value) <= _LONGEST:
+            found[field.name] = [_fields(one) if hasattr(one, "DESCRIPTOR") else one for one in value]
+    return found
 
 
 def _numbers(name: str, value: Any, depth: int) -> Iterator[tuple[str, float]]:

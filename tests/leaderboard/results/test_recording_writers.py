@@ -70,6 +70,22 @@ def test_tum_is_the_truth_for_the_scores(tmp_path, recording):
         write("recording", "tum", without_truth(recording), tmp_path / "x.tum")
 
 
+def test_parquet_makes_the_round_trip_and_names_units(tmp_path, recording):
+    from pyarrow import parquet
+
+    files = {p.name: p for p in write("recording", "parquet", recording, tmp_path / "run")}
+    assert {"truth.parquet", "imu.parquet", "gnss.parquet", "README.md", "start.json"} <= set(files)
+    schema = parquet.read_schema(files["gnss.parquet"])
+    assert schema.field("latitude_deg").metadata == {b"unit": b"deg"}
+    reader = READERS.get("parquet")
+    rows = reader.read(files["gnss.parquet"], FileSpec(path="x", format="parquet", time="time_s"))
+    gnss = recording.data.aids["gnss"]
+    np.testing.assert_array_equal(rows.time, gnss.time)
+    np.testing.assert_array_equal(rows.table.column("latitude_deg")[1], np.degrees(gnss.value[:, 0]))
+    csv = {p.name: p for p in write("recording", "csv", recording, tmp_path / "csv")}
+    assert read_csv(csv["gnss.csv"]).names == rows.table.names
+
+
 def test_absolute_pose_error_of_evo_is_our_rmse(tmp_path, recording):
     """Positional APE without alignment (M. Grupp, evo: Python package for the evaluation of odometry and SLAM)."""
     file_interface = pytest.importorskip("evo.tools.file_interface")

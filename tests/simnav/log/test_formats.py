@@ -255,6 +255,45 @@ def test_bags(good, form):
         READERS.get(form).read(path, FileSpec(path="x"))
 
 
+def test_mcap_with_protobuf(tmp_path):
+    """A message with a stamp, a number that keeps its default, and a repeated field."""
+    writer_of = pytest.importorskip("mcap.writer").Writer
+    descriptor = pytest.importorskip("google.protobuf.descriptor_pb2")
+    from google.protobuf import descriptor_pool, message_factory, timestamp_pb2
+
+    file = descriptor.FileDescriptorProto(
+        name="fix.proto", package="test", syntax="proto3", dependency=["google/protobuf/timestamp.proto"]
+    )
+    message = file.message_type.add(name="Fix")
+    kinds, repeated = descriptor.FieldDescriptorProto, descriptor.FieldDescriptorProto.LABEL_REPEATED
+    message.field.add(name="timestamp", number=1, type=kinds.TYPE_MESSAGE, type_name=".google.protobuf.Timestamp")
+    message.field.add(name="latitude", number=2, type=kinds.TYPE_DOUBLE)
+    message.field.add(name="height", number=3, type=kinds.TYPE_DOUBLE)
+    message.field.add(name="covariance", number=4, type=kinds.TYPE_DOUBLE, label=repeated)
+    stamp = descriptor.FileDescriptorProto()
+    timestamp_pb2.DESCRIPTOR.CopyToProto(stamp)
+    pool = descriptor_pool.DescriptorPool()
+    for each in (stamp, file):
+        pool.Add(each)
+    fix = message_factory.GetMessageClass(pool.FindMessageTypeByName("test.Fix"))
+    path = tmp_path / "a.mcap"
+    with open(path, "wb") as stream:
+        writer = writer_of(stream)
+        writer.start()
+        data = descriptor.FileDescriptorSet(file=[stamp, file]).SerializeToString()
+        channel = writer.register_channel("/fix", "protobuf", writer.register_schema("test.Fix", "protobuf", data))
+        for k in range(N):
+            one = fix(latitude=LATITUDE[k], covariance=[1.0, 2.0])
+            one.timestamp.seconds, one.timestamp.nanos = k, 500_000_000
+            writer.add_message(channel, 10**9 * k, one.SerializeToString(), 10**9 * k)
+        writer.finish()
+    rows = read("mcap", path)
+    assert rows.time == pytest.approx(T + 0.5)
+    assert rows.table.column("latitude")[1] == pytest.approx(LATITUDE)
+    assert rows.table.column("height")[1].tolist() == [0.0] * N
+    assert rows.table.column("covariance_2")[1].tolist() == [2.0] * N
+
+
 @pytest.mark.parametrize("form", ["mat", "hdf5", "mcap", "rosbag"])
 def test_a_binary_file_given_as_a_table_is_named(good, form):
     if form in _NEEDS:
