@@ -25,6 +25,7 @@ from .files import write_whole
 from .formats import writes
 
 if TYPE_CHECKING:
+    from simnav.compiled import Integers
     from simnav.recording import AidStream, Recording
     from simnav.satellites.ephemeris import Ephemerides
     from simnav.types import Datasheet
@@ -84,7 +85,7 @@ def _text(recording: Recording, stream: AidStream) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _clock(stream: AidStream, first: Array, sheet: Datasheet) -> tuple[Array, Array]:
+def _clock(stream: AidStream, first: Integers, sheet: Datasheet) -> tuple[Array, Array]:
     """The error of the receiver's clock at each epoch [s], and the first position, Earth-fixed [m]."""
     from simnav.geometry.ecef import ecef_from_geodetic
     from simnav.satellites.orbit import SPEED_OF_LIGHT
