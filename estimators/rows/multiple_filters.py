@@ -71,4 +71,13 @@ class MidValue(
     Source: S. Osder, *Practical view of redundancy management application and theory*, J. Guidance, Control, and
     Dynamics 22(1), 1999; H. W. Sorenson and D. L. Alspach, *Recursive Bayesian estimation using Gaussian sums*,
     Automatica 7(4), 1971.
+
+    Versions
+    --------
+    2
+        A satellite that the others contradict is left out by the window without a schedule
+        (`simnav.estimators.weightings.sibling_vote`). Where no instrument has channels, the numbers are those of
+        version 1.
     """
+
+    version = 2
