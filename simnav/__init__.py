@@ -234,17 +234,17 @@ def _register_scenarios() -> None:
                 vector_entry_point="simnav.environment:NavigationVectorEnv",
                 kwargs={"scenario": header.id},
             )
-        _register_tasks(header.gym_id, header.id, recorded=header.recorded)
+        _register_tasks(header.gym_id, header.id, recorded=header.recorded, channels=header.channels)
 
 
 # The library must not import the learning tasks (they belong to simnav.estimators): their entry points are strings.
 _LEARNING = "simnav.estimators.learning"
 
 
-def _register_tasks(gym_id: str, scenario: str, *, recorded: bool) -> None:
-    """Register the learning tasks over a scenario with Gymnasium."""
+def _register_tasks(gym_id: str, scenario: str, *, recorded: bool, channels: bool) -> None:
+    """Register the learning tasks over a scenario with Gymnasium: those around a filter take no channels."""
     name, _, version = gym_id.rpartition("-v")
-    for task in ("Tuning", "Detection", "Correction"):
+    for task in () if channels else ("Tuning", "Detection", "Correction"):
         task_id = f"{name}-{task}-v{version}"
         if task_id not in _registry:
             _register_env(
