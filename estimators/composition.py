@@ -183,7 +183,8 @@ class Row(Estimator):
         The pieces: ``solver``, and the pieces of the solver.
     loose : bool
         True for a row that takes the solution of a receiver in place of the raw observations which it solves
-        (`simnav.estimators.models.coupling`). Such a row needs a receiver.
+        (`simnav.estimators.models.coupling`). Such a row needs a receiver. Any row is one if it is made with ``loose``
+        (`simnav.estimator.make`).
     solver : Estimator
         The solver with its pieces. Its attributes are also attributes of the row: ``row.model``, ``row.covariance``.
 
@@ -195,7 +196,7 @@ class Row(Estimator):
     """
 
     recipe: ClassVar[Mapping[str, Piece]] = {}
-    loose: ClassVar[bool] = False
+    loose: bool = False
     solver: Estimator
     #: What is done with readings that arrive late: the parameter ``late`` of `simnav.estimator.make`.
     late: Manner = "replay"

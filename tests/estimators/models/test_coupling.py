@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from simnav.estimator import UnsuitableScenario, lacking, make
+from simnav.estimator import EstimatorError, UnsuitableScenario, lacking, make
 from simnav.estimators.models.coupling import by_source
 from simnav.estimators.models.inertial import InertialModel
 from simnav.estimators.models.nine_state import NineStateModel
@@ -59,6 +59,14 @@ def test_the_receiver_beside_raw_observations_changes_no_bit(recording):
     both = run_trial(make("ekf"), recording)
     alone = run_trial(make("ekf"), record(raw_gnss(4.0), 1))
     assert both.position.tobytes() == alone.position.tobytes()
+
+
+def test_any_row_is_loosely_coupled_on_request(recording):
+    asked, named = (run_trial(made, recording) for made in (make("ekf", loose="true"), make("ekf-loose")))
+    assert asked.position.tobytes() == named.position.tobytes()
+    assert run_trial(make("ekf", loose=False), recording).position.tobytes() != named.position.tobytes()
+    with pytest.raises(EstimatorError, match="parameter 'loose' is true or false, not 2"):
+        make("ekf", loose=2)
 
 
 def test_a_loosely_coupled_row_needs_a_receiver():
