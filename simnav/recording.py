@@ -36,12 +36,23 @@ from simnav.types import (
     TriadDatasheet,
 )
 
-__all__ = ["REFLECTION", "AidStream", "Block", "FaultLabel", "ImuLabels", "Recording", "RecordingError", "packets"]
+__all__ = [
+    "CLOCK_JUMP",
+    "REFLECTION",
+    "AidStream",
+    "Block",
+    "FaultLabel",
+    "ImuLabels",
+    "Recording",
+    "RecordingError",
+    "packets",
+]
 
 #: Version of the files that `Recording.save` writes. It is increased when their format changes.
 FORMAT = 1
-#: Kind of the label of errors by reflections, which the surroundings make and no fault of a scenario.
-REFLECTION = "reflection"
+#: Kinds of labels that no fault of a scenario makes: of errors by reflections, which the surroundings make, and of the
+#: first readings after a step of a receiver's clock.
+REFLECTION, CLOCK_JUMP = "reflection", "clock_jump"
 
 
 class RecordingError(ValueError):

@@ -29,6 +29,7 @@ from simnav.kinds import NavigationPoint
 from simnav.plugins import place_of
 from simnav.types import KINDS, NO_SIDE, Array, Datasheet
 
+from .ambiguity import innovation_of
 from .channels import ChannelDatasheet, whole
 from .delayed import acceleration
 from .levered import observation_of
@@ -329,7 +330,7 @@ class OwnObservation:
             jacobian[range(d), range(bias_at, bias_at + d)] = 1.0
             first = bias_at + len(calibration) - size
             reading = self.kind.add_error(reading, calibration[first : first + d])
-        return self.kind.difference(value, reading), jacobian, self.spread(own, point)
+        return innovation_of(self.kind, self.sheet, value, reading), jacobian, self.spread(own, point)
 
     def differences(self, point: NavigationPoint, errors: Array, bias_at: int, offset: int) -> Array | None:
         """The predicted readings of the instrument at k states, minus that at one state.

@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import partial
 
 from simnav.scenario import Scenario, load
+from simnav.sensors import GnssPosition
 from simnav.sensors.gnss_raw import GnssRaw
 from simnav.sensors.gnss_receiver import GnssReceiver
 
@@ -164,6 +165,7 @@ def _with_pseudoranges(scenario: Scenario) -> Scenario:
     fixes keep their drift, and the datasheet its 3 m. The ephemerides are those that come with simnav.
     """
     fix = scenario.aids["gnss"]
+    assert isinstance(fix, GnssPosition)
     arm = {"lever_arm_m": list(fix.lever_arm)}
     place = {"latitude_deg": 32.6, "longitude_deg": 111.6, "span_s": scenario.duration, "mask_deg": 12.0}
     raw = GnssRaw.from_toml(
