@@ -23,6 +23,7 @@ __all__ = [
     "AuditRequest",
     "BundleOptions",
     "CheckStandardRequest",
+    "DrawRequest",
     "PublishRequest",
     "SiteRequest",
     "StandardRequest",
@@ -156,6 +157,28 @@ class CheckStandardRequest:
     """Say which rows and scenarios have another version than the standard result; nothing is run."""
 
     results: PathLike | None = option("--results", default=None, help="Folder of results. Default: those of simnav.")
+
+
+@request
+class DrawRequest:
+    """Run what the site of the standard result draws: a few rows in two runs of each scenario, and sweeps.
+
+    What comes with simnav and has the versions of today is not run again. The same command continues. Further rows get
+    the distribution of their errors from the results in the folder of `standard run`, where they have series.
+    """
+
+    _: KW_ONLY
+    minutes: float | None = option(
+        default=30.0, least=0.0, help="Start no run after so many minutes. The same command continues."
+    )
+    results: PathLike = option("--results", default="results/standard-drawn", help="Folder to work in.")
+    standard: PathLike = option(default=_WORKING, help="Folder in which 'simnav standard run' worked, if it is there.")
+    profile: PathLike | None = option(
+        default=None, help="What is run: a file like ``leaderboard/standard/drawn.toml``, the default.", cli=str
+    )
+    shipped: PathLike | None = option(default=None, help="Folder of what is drawn. Default: that of simnav.")
+    workers: int = option(default=2, help="Number of processes.", least=1)
+    progress: CampaignProgress = option(default=None, help=CAMPAIGN_PROGRESS, hidden=True)
 
 
 @request

@@ -39,10 +39,11 @@ if TYPE_CHECKING:
         seal,
         verify,
     )
-    from simnav.leaderboard.logs import align, export, inspect_log, score_files, tune_noise
+    from simnav.leaderboard.logs import align, export, inspect_log, recordings, score_files, tune_noise
     from simnav.leaderboard.publishing import (
         audit_standard,
         check_standard,
+        draw_standard,
         publish_standard,
         run_standard,
         site,
@@ -110,6 +111,7 @@ __all__ = [
     "cite",
     "claim",
     "costs",
+    "draw_standard",
     "evaluate",
     "export",
     "inspect_log",
@@ -123,6 +125,7 @@ __all__ = [
     "rank",
     "realism",
     "record",
+    "recordings",
     "register",
     "register_fault",
     "register_instrument",
@@ -188,12 +191,13 @@ _HOMES = {
         "seal",
         "verify",
     ),
-    "leaderboard.logs": ("align", "export", "inspect_log", "score_files", "tune_noise"),
+    "leaderboard.logs": ("align", "export", "inspect_log", "recordings", "score_files", "tune_noise"),
     "leaderboard.results.errors": ("RequestError",),
     "leaderboard.running": ("campaign", "check", "evaluate", "make", "record", "robustness", "run", "sweep", "tune"),
     "leaderboard.publishing": (
         "audit_standard",
         "check_standard",
+        "draw_standard",
         "publish_standard",
         "run_standard",
         "site",

@@ -30,6 +30,7 @@ from simnav.types import (
     Measurement,
     Measurements,
     NavigationStates,
+    ReferenceStates,
     StateBlock,
     TapStates,
     TriadDatasheet,
@@ -119,7 +120,8 @@ class AidStream:
         For each reading, the index of its channel in ``channels``. Readings of one time follow each other, in the order
         of the channels.
     side : (k, s) array
-        Side information of each reading; components as in ``KINDS[kind].side``.
+        Side information of each reading; components as in ``KINDS[kind].side``. Without channels it may be the (k, d)
+        standard deviations that the readings state (`Datasheet.stated`).
     dropped_channel : (m,) int16 array
         The channel of each missing measurement.
     stamp, arrival : (k,) array
@@ -150,6 +152,17 @@ class AidStream:
         return len(self.stamp) > 0 or len(self.arrival) > 0
 
     @property
+    def states_sigma(self) -> bool:
+        """Whether readings of an instrument without channels state their standard deviations."""
+        return not self.channels and self.side.ndim == 2 and self.side.shape[1] > 0
+
+    @property
+    def optional(self) -> tuple[str, ...]:
+        """The arrays that only some streams have, and this one has."""
+        clock = tuple(n for n in _CLOCK_ARRAYS if len(getattr(self, n)))
+        return (*clock, "side") if self.states_sigma else clock
+
+    @property
     def stamps(self) -> Array:
         """(k,) array: the time stamps with which the readings are delivered [s]."""
         return self.stamp if len(self.stamp) else self.time
@@ -162,7 +175,7 @@ class AidStream:
     def rows(self, keep: NDArray[Any] | slice) -> AidStream:
         """Some of the readings: a mask, or the indices of rows."""
         names = (*_AID_ARRAYS[:-1], *(("channel", "side") if self.channels else ()))
-        names += tuple(n for n in _CLOCK_ARRAYS if len(getattr(self, n)))
+        names += self.optional
         return replace(self, **{n: getattr(self, n)[keep] for n in names})
 
     def as_delivered(self) -> AidStream:
@@ -195,6 +208,8 @@ class AidStream:
     def concatenate(parts: Sequence[AidStream]) -> AidStream:
         """Join the measurements of consecutive intervals."""
         names = _CHANNEL_ARRAYS if parts[0].channels else _AID_ARRAYS
+        if any(p.states_sigma for p in parts):
+            names = (*names, "side")
         joined = {n: np.concatenate([getattr(p, n) for p in parts]) for n in names}
         for name in _CLOCK_ARRAYS:
             if any(len(getattr(p, name)) for p in parts):
@@ -211,6 +226,10 @@ class AidStream:
 
     def measurements(self) -> Iterator[Measurement]:
         """The readings as an estimator receives them, in order."""
+        if self.states_sigma:
+            for t, v, side in zip(self.stamps, self.value, self.side, strict=True):
+                yield Measurement(float(t), self.name, self.kind, v, side=side)
+            return
         if not self.channels:
             for t, v in zip(self.stamps, self.value, strict=True):
                 yield Measurement(float(t), self.name, self.kind, v)
@@ -272,7 +291,8 @@ class Block:
             labels = ImuLabels(
                 *(np.concatenate([getattr(p.imu_labels, n) for p in parts]) for n in ("faults", "fault_error"))
             )
-        kind = TapStates if all(isinstance(p.truth, TapStates) for p in parts) else NavigationStates
+        kinds = {_kind_of(p.truth) for p in parts}
+        kind = kinds.pop() if len(kinds) == 1 else NavigationStates
         truth = kind(*(np.concatenate([getattr(p.truth, n) for p in parts]) for n in _STATES_OF[kind]))
         aids = {n: AidStream.concatenate([p.aids[n] for p in parts]) for n in first.aids}
         return Block(first.start, parts[-1].end, imu, labels, aids, truth)
@@ -427,10 +447,17 @@ _STATE_ARRAYS = ("time", "position", "velocity", "attitude")
 _STATES_OF: dict[type[NavigationStates], tuple[str, ...]] = {
     NavigationStates: _STATE_ARRAYS,
     TapStates: (*_STATE_ARRAYS, "angular_rate", "water_velocity"),
+    ReferenceStates: (*_STATE_ARRAYS, "sigma", "quality"),
 }
 
+
+def _kind_of(truth: NavigationStates) -> type[NavigationStates]:
+    """The class of states that a file keeps."""
+    return type(truth) if type(truth) in _STATES_OF else NavigationStates
+
+
 #: Fields of a datasheet that most have not.
-_OPTIONAL = ("details", "blocks", "channels", "processes", "timing", "sources")
+_OPTIONAL = ("details", "blocks", "channels", "processes", "timing", "sources", "stated")
 
 
 def _sheet(sheet: Datasheet | ImuDatasheet) -> dict[str, Any]:
@@ -476,7 +503,7 @@ def _to_arrays(recording: Recording) -> dict[str, Any]:
     def add(prefix: str, holder: object, names: Sequence[str]) -> None:
         arrays.update({f"{prefix}.{n}": getattr(holder, n) for n in names})
 
-    add("truth", data.truth, _STATES_OF[TapStates if isinstance(data.truth, TapStates) else NavigationStates])
+    add("truth", data.truth, _STATES_OF[_kind_of(data.truth)])
     add("initial_truth", recording.initial_truth, _STATE_ARRAYS)
     add("start", recording.start, ("position", "velocity", "attitude", "covariance"))
     if data.imu is not None:
@@ -485,7 +512,7 @@ def _to_arrays(recording: Recording) -> dict[str, Any]:
         add("imu_labels", data.imu_labels, ("faults", "fault_error"))
     for name, stream in data.aids.items():
         add(f"aid.{name}", stream, _CHANNEL_ARRAYS if stream.channels else _AID_ARRAYS)
-        add(f"aid.{name}", stream, [n for n in _CLOCK_ARRAYS if len(getattr(stream, n))])
+        add(f"aid.{name}", stream, stream.optional)
     return arrays
 
 
@@ -520,12 +547,13 @@ def _from_arrays(meta: dict[str, Any], arrays: dict[str, Any]) -> Recording:
     def get(prefix: str, names: Sequence[str]) -> list[Any]:
         return [arrays[f"{prefix}.{n}"] for n in names]
 
-    kind = TapStates if "truth.water_velocity" in arrays else NavigationStates
+    told = (k for k, names in _STATES_OF.items() if f"truth.{names[-1]}" in arrays and k is not NavigationStates)
+    kind = next(told, NavigationStates)
     channels = {aid["name"]: tuple(aid.get("channels", ())) for aid in meta["aids"]}
 
     def stream(name: str, kind: str) -> AidStream:
         names: tuple[str, ...] = _CHANNEL_ARRAYS if channels.get(name) else _AID_ARRAYS
-        names += tuple(n for n in _CLOCK_ARRAYS if f"aid.{name}.{n}" in arrays)
+        names += tuple(n for n in (*_CLOCK_ARRAYS, "side") if f"aid.{name}.{n}" in arrays and n not in names)
         arrays_of = dict(zip(names, get(f"aid.{name}", names), strict=True))
         return AidStream(name, kind, **arrays_of, channels=channels.get(name, ()))
 

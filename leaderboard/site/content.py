@@ -68,6 +68,8 @@ class ScenarioEntry:
         Empty for one that is not in the catalogue.
     from_file : bool
         Whether it is not in the catalogue, so that it came from a file of somebody's own.
+    duration : float
+        Length of a run [s]; 0 where it is not known.
     """
 
     id: str
@@ -82,6 +84,7 @@ class ScenarioEntry:
     toml: str = ""
     group: str = "other"
     from_file: bool = False
+    duration: float = 0.0
 
     @property
     def data(self) -> str:

@@ -68,7 +68,7 @@ def _scenario(identity: str, by: Mapping[str, Runs], page: str) -> ScenarioEntry
         facts.append(Fact("Faults", len(scenario.faults)))
     return ScenarioEntry(
         identity, name or identity, page, seeds, argument_of(identity), tuple(facts), scenario.title,
-        scenario.description, scenario.source, toml_of(identity), scenario.group,
+        scenario.description, scenario.source, toml_of(identity), scenario.group, duration=scenario.duration,
     )  # fmt: skip
 
 

@@ -167,6 +167,7 @@ def estimator_data(
             "title": f"{label} by scenario",
             "columns": column_dicts((*_COLUMNS, *shown)),
             "rows": rows,
+            "sort": "-score",
         },
         "charts": [c.to_dict() for c in (*_profile(label, ranking, scenarios), *profile_charts(label, version))],
         "rows": {label: {"reference": entry.reference}},
@@ -177,7 +178,9 @@ def estimator_data(
             for table in ranking.scenarios
             if label in table.unsuitable
         ],
-        "parameters": [{"name": n, "default": d, "annotation": a} for n, d, a in entry.facts.parameters],
+        "parameters": [
+            {"name": n, "default": d, "annotation": a, "meaning": m} for n, d, a, m in entry.facts.parameters
+        ],
     }
 
 

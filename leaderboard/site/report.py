@@ -9,12 +9,14 @@ from typing import TYPE_CHECKING, Any
 
 from simnav.leaderboard.ranking.confinement import confined
 from simnav.leaderboard.ranking.failures import failures
+from simnav.leaderboard.ranking.voyages import side_by_side
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from simnav.leaderboard.ranking.agreement import RankCorrelation
     from simnav.leaderboard.ranking.board import Ranking
+    from simnav.leaderboard.ranking.voyages import Voyages
     from simnav.leaderboard.results.result import Result
 
 __all__ = ["SiteReport"]
@@ -41,6 +43,11 @@ class SiteReport:
     ranking: Ranking
     correlations: tuple[RankCorrelation, ...] = ()
 
+    @property
+    def voyages(self) -> list[Voyages]:
+        """The places of rows on simulated and on recorded voyages, side by side."""
+        return side_by_side(self.ranking)
+
     def to_dict(self) -> dict[str, Any]:
         """Plain: what the command prints with ``--json``."""
         return {
@@ -50,6 +57,7 @@ class SiteReport:
             "ranking": self.ranking.to_dict(),
             "confinement": confined(self.results),
             "correlations": [c.to_dict() for c in self.correlations],
+            "voyages": [v.to_dict() for v in self.voyages],
         }
 
     def to_frame(self) -> Any:

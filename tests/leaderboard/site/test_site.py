@@ -255,7 +255,11 @@ def test_a_scenario_shows_its_sweeps_with_breaking_points(folder, catalogued):
     page, data = Page(folder / f"{catalogued}.html"), data_of(folder / f"{catalogued}.html")
     assert "How large a fault may be: Jump [m]" in page.text
     assert "beyond 4.0" in page.text  # the one that does not break
-    (chart,) = data["sweeps"][0]["charts"]
+    (sweep,) = data["sweeps"]
+    chart, at_value = sweep["charts"]
+    assert (sweep["values"], sweep["dial"]) == ([0.0, 2.0, 4.0], {"title": "Jump", "unit": "m"})  # of the slider
+    low, high = at_value["spec"]["layer"][1]["encoding"]["x"]["scale"]["domain"]
+    assert 0.0 < low < 1.0 < high  # of all values, so that the axis stands still
     assert chart["data"]["curves"]["rows"]["ekf"]["value"] == [0.0, 2.0, 4.0]
     assert chart["data"]["marks"]["rows"] == {"ekf": {"at": [3.0], "threshold": [2.0]}}
 
@@ -273,6 +277,9 @@ def test_a_scenario_from_elsewhere_has_failures_and_who_does_not_suit(folder):
     page, data = Page(folder / f"{SCENARIOS[1]}.html"), data_of(folder / f"{SCENARIOS[1]}.html")
     assert "timeout" in page.text
     assert [u["name"] for u in data["unsuitable"]] == ["inertial"]
+    (late,) = [f for f in data["failures"] if f["status"] == "timeout"]
+    assert late["names"].endswith(f" ({late['runs']})")
+    assert late["runs"] > 0
     row = next(r for r in data["table"]["rows"] if r["name"]["text"] == "ekf")
     assert row["heading_rmse"]["value"] == pytest.approx(2.0)  # in degrees
     assert all(c["name"] != "timeline" for c in data["charts"])
@@ -312,7 +319,11 @@ def test_the_page_of_an_estimator_says_what_it_is(folder):
     page, data = Page(folder / "estimator-sw-fgo.html"), data_of(folder / "estimator-sw-fgo.html")
     assert "Factor graph" in page.text
     assert "estimators/rows/windows.py, line" in page.text
-    assert {p["name"] for p in data["parameters"]} >= {"window", "iterations"}
+    meant = {p["name"]: p["meaning"] for p in data["parameters"]}
+    assert meant["window"].startswith("Number of epochs")
+    assert meant["iterations"]
+    assert page.text.index("Where it is robust") < page.text.index("By scenario")
+    assert data["table"]["sort"] == "-score"
     assert data["plain"]["label"] == "ekf"
     assert data["worst"]["command"].startswith("simnav run ")
     assert [c["name"] for c in data["worst"]["charts"]][-1] == "run-weight-gnss"
