@@ -17,7 +17,7 @@ from simnav.sensors.depth import Depth
 from simnav.sensors.derived import DerivedInstrument
 from simnav.sensors.dvl import Dvl
 from simnav.sensors.dvl_beams import DvlBeams
-from simnav.sensors.dvl_solution import DvlSolution, DvlWaterSpeed
+from simnav.sensors.dvl_solution import DvlSolution
 from simnav.sensors.faults import AnyFault, FaultLayer, FaultSpec, build_layers, fault_specs, labels, register_fault
 from simnav.sensors.gnss import GnssPosition, GnssVelocity
 from simnav.sensors.gnss_raw import GnssRaw
@@ -38,7 +38,6 @@ __all__ = [
     "Dvl",
     "DvlBeams",
     "DvlSolution",
-    "DvlWaterSpeed",
     "FaultLayer",
     "FaultSpec",
     "GnssPosition",

@@ -2,9 +2,8 @@
 
 It takes the readings of the instrument ``beams`` (`simnav.sensors.dvl_beams`), with all their faults, and solves each
 ping by least squares (`simnav.sensors.janus.solve_beams`). There is a reading with four beams, unless their error
-velocity is too large, and with three, unless ``three_beams`` is false. `DvlSolution` has bottom track: the velocity
-over the ground. `DvlWaterSpeed` has water track: the forward speed through the water. The faults of a reading are those
-of its beams; its ``fault_error`` is the difference from the solution of the same beams without them.
+velocity is too large, and with three, unless ``three_beams`` is false. The beams have bottom track. The faults of a
+reading are those of its beams; its ``fault_error`` is the difference from the solution of the same beams without them.
 """
 
 from __future__ import annotations
@@ -25,7 +24,7 @@ from simnav.sensors.janus import JanusSolution, solve_beams
 from simnav.spec import NonNegative, Positive, Vector, quantity
 from simnav.types import Array, Datasheet
 
-__all__ = ["DvlSolution", "DvlWaterSpeed", "solutions"]
+__all__ = ["DvlSolution", "solutions"]
 
 #: Times closer than this are one and the same [s].
 _SAME = 1e-6
@@ -46,18 +45,6 @@ def _solved(stream: AidStream, value: Array, rows: slice) -> JanusSolution | Non
     return solve_beams(value[rows, 0], side[:, 0], side[:, 1], stream.sigma[rows, 0])
 
 
-class _SolutionSpec(AidSpec):
-    """What both kinds have in common. Attributes as of `DvlSolution`."""
-
-    beams: str = "dvl_beams"
-    error_velocity: Positive = quantity("m_s", 0.1)
-    three_beams: bool = Field(True, description="whether three beams are enough")
-
-    def sources(self) -> Mapping[str, str]:
-        """See `AidSpec.sources`."""
-        return {self.beams: "dvl_beams"}
-
-
 @register_instrument(
     Kind(
         "velocity over the ground of the transducer that the beams give, in body axes",
@@ -67,7 +54,7 @@ class _SolutionSpec(AidSpec):
     ),
     example={"sigma_m_s": [0.003, 0.003, 0.001]},
 )
-class DvlSolution(_SolutionSpec):
+class DvlSolution(AidSpec):
     """Velocity over the ground in body axes, solved from the beams of another instrument.
 
     Attributes
@@ -83,53 +70,37 @@ class DvlSolution(_SolutionSpec):
     """
 
     kind: Literal["dvl_solution"] = "dvl_solution"
+    beams: str = "dvl_beams"
+    error_velocity: Positive = quantity("m_s", 0.1)
+    three_beams: bool = Field(True, description="whether three beams are enough")
     sigma: SigmaTriple = quantity("m_s")
     bias: SigmaTriple = quantity("m_s", ZERO)
     scale: NonNegative = quantity("percent", 0.0)
     misalignment: SigmaTriple = quantity("deg", ZERO)
     lever_arm: Vector = quantity("m", ZERO)
 
-    def build(self, name: str, seed: int) -> Instrument:
-        """See `AidSpec.build`."""
-        return _Solver(self, name, seed, "bottom", slice(0, 3))
-
-
-@register_instrument(
-    Kind(
-        "forward speed through the water that the beams give", "velocity", speed_components("speed"), kinds.WATER_SPEED
-    ),
-    example={"sigma_m_s": 0.02},
-)
-class DvlWaterSpeed(_SolutionSpec):
-    """Forward speed through the water, solved from the beams of another instrument with water track.
-
-    Attributes as of `DvlSolution`.
-    """
-
-    kind: Literal["dvl_water_speed"] = "dvl_water_speed"
-    sigma: NonNegative = quantity("m_s")
-    bias: NonNegative = quantity("m_s", 0.0)
-    scale: NonNegative = quantity("percent", 0.0)
-    lever_arm: Vector = quantity("m", ZERO)
+    def sources(self) -> Mapping[str, str]:
+        """See `AidSpec.sources`."""
+        return {self.beams: "dvl_beams"}
 
     def build(self, name: str, seed: int) -> Instrument:
         """See `AidSpec.build`."""
-        return _Solver(self, name, seed, "water", slice(0, 1))
+        return _Solver(self, name, seed)
 
 
 class _Solver(DerivedInstrument):
-    """Both kinds; ``track`` is that of the beams which are needed, ``components`` what is told of the velocity."""
+    """Parameters as of `Instrument`."""
 
-    def __init__(self, spec: _SolutionSpec, name: str, seed: int, track: str, components: slice):
+    def __init__(self, spec: DvlSolution, name: str, seed: int):
         super().__init__(spec, name, seed)
-        self.spec, self._track, self._components = spec, track, components
+        self.spec = spec
 
     def derive(self, time: Array, streams: Mapping[str, AidStream], sheets: Mapping[str, Datasheet]) -> AidStream:
         """See `DerivedInstrument.derive`."""
         spec, source = self.spec, streams[self.spec.beams]
-        if sheets[spec.beams].details["track"] != self._track:
+        if sheets[spec.beams].details["track"] != "bottom":
             raise InstrumentError(
-                f"instrument {self.name!r} of kind {self.kind!r}: it needs beams with track = {self._track!r}, but "
+                f"instrument {self.name!r} of kind {self.kind!r}: it needs beams with track = 'bottom', but "
                 f"{spec.beams!r} has {sheets[spec.beams].details['track']!r}"
             )
         first = np.searchsorted(source.time, time - _SAME)
@@ -150,7 +121,4 @@ class _Solver(DerivedInstrument):
             rows.append((found.velocity, np.sqrt(np.diag(found.covariance)), faults, wrong if faults else np.zeros(3)))
         value, sigma, error = (np.array([row[k] for row in rows]).reshape(-1, 3) for k in (0, 1, 3))
         faults_of = np.array([row[2] for row in rows], dtype=np.uint32)
-        c = self._components
-        return AidStream(
-            self.name, self.kind, np.array(kept), value[:, c], faults_of, error[:, c], sigma[:, c], np.array(lost)
-        )
+        return AidStream(self.name, self.kind, np.array(kept), value, faults_of, error, sigma, np.array(lost))
