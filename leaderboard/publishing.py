@@ -282,8 +282,8 @@ def draw_standard(request: DrawRequest) -> Drawing:
     RequestError
         If a folder holds something else.
     """
-    from simnav.leaderboard.standard import drawn
-    from simnav.leaderboard.standard.drawing import draw
+    from .standard import drawn
+    from .standard.drawing import draw
 
     profile = drawn.PROFILE if request.profile is None else absolute(request.profile)
     folder = drawn.DRAWN if request.shipped is None else absolute(request.shipped)

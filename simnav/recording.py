@@ -326,6 +326,8 @@ class Recording:
         Datasheets with the true figures, if those in ``instruments`` are wrong.
     actual_covariance : (9, 9) array or None
         True covariance of the errors of ``start``, if the covariance in ``start`` is wrong.
+    origins : mapping of str to mapping
+        What exports need beyond the datasheet, by instrument (`AidSpec.origin`). No estimator receives it.
     """
 
     scenario: str
@@ -339,6 +341,7 @@ class Recording:
     draws: Mapping[str, Any] = field(default_factory=dict)
     actual: Instruments | None = None
     actual_covariance: Array | None = None
+    origins: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         names = [*(["imu"] if self.instruments.imu is not None else []), *self.instruments]
@@ -498,6 +501,8 @@ def _to_arrays(recording: Recording) -> dict[str, Any]:
         meta["actual"] = _sheets(recording.actual)
     if recording.actual_covariance is not None:
         meta["actual_covariance"] = recording.actual_covariance.tolist()
+    if recording.origins:
+        meta["origins"] = {name: dict(origin) for name, origin in recording.origins.items()}
     arrays: dict[str, Any] = {"meta": np.array(json.dumps(meta))}
 
     def add(prefix: str, holder: object, names: Sequence[str]) -> None:
@@ -587,4 +592,5 @@ def _from_arrays(meta: dict[str, Any], arrays: dict[str, Any]) -> Recording:
         meta.get("draws", {}),
         _instruments(meta["actual"], meta["step"]) if "actual" in meta else None,
         np.array(meta["actual_covariance"]) if "actual_covariance" in meta else None,
+        meta.get("origins", {}),
     )

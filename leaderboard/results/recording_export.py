@@ -25,13 +25,17 @@ from .hidden import has_truth
 from .recording_mcap import write_mcap
 from .recording_nmea import write_nmea
 from .recording_readme import readme, start_text
+from .recording_rinex import write_rinex
 from .recording_tracks import write_gpx, write_kml
 from .recording_tum import write_tum
 
 if TYPE_CHECKING:
     from simnav.recording import Recording
 
-__all__ = ["write_csv", "write_gpx", "write_kml", "write_mcap", "write_nmea", "write_npz", "write_parquet", "write_tum"]
+__all__ = [
+    "write_csv", "write_gpx", "write_kml", "write_mcap", "write_nmea", "write_npz", "write_parquet", "write_rinex",
+    "write_tum",
+]  # fmt: skip
 
 #: Columns of the truth and of the IMU, with their units.
 _TRUTH = {

@@ -58,7 +58,7 @@ from simnav.spec import NonNegative, Positive, SpecError, Vector, closest, quant
 from simnav.types import NO_SIDE, Array, TapStates
 from simnav.world.obstacles import Paths
 
-__all__ = ["SHIPPED", "SHIPPED_EPOCH", "SYSTEMS", "GnssRaw", "RawReceiver"]
+__all__ = ["SHIPPED", "SHIPPED_EPOCH", "SYSTEMS", "GnssRaw", "RawReceiver", "ephemerides_of"]
 
 #: Letters of the systems in names of satellites, as RINEX has them.
 SYSTEMS: Mapping[str, str] = {"gps": "G", "galileo": "E", "beidou": "C"}
@@ -82,6 +82,22 @@ def _epoch(text: str) -> datetime:
 def _read(path: Path, modified: int, size: int) -> Ephemerides:
     """The file of a path; read again if it was changed."""
     return read_navigation(path)
+
+
+def ephemerides_of(navigation: str) -> Ephemerides:
+    """The ephemerides of a RINEX navigation file; of an empty name those that come with simnav.
+
+    Raises
+    ------
+    SpecError
+        If the file cannot be read.
+    """
+    path = Path(navigation).expanduser() if navigation else SHIPPED
+    try:
+        state = path.stat()
+    except OSError as error:
+        raise SpecError(f"navigation = {navigation!r}: cannot be read: {error.strerror}") from None
+    return _read(path, state.st_mtime_ns, state.st_size)
 
 
 @lru_cache(maxsize=64)
@@ -249,12 +265,11 @@ class GnssRaw(AidSpec):
 
     def ephemerides(self) -> Ephemerides:
         """The broadcast ephemerides."""
-        path = Path(self.navigation).expanduser() if self.navigation else SHIPPED
-        try:
-            state = path.stat()
-        except OSError as error:
-            raise SpecError(f"navigation = {self.navigation!r}: cannot be read: {error.strerror}") from None
-        return _read(path, state.st_mtime_ns, state.st_size)
+        return ephemerides_of(self.navigation)
+
+    def origin(self) -> Mapping[str, str]:
+        """See `AidSpec.origin`: the epoch, and the navigation file."""
+        return {"epoch": self.epoch, "navigation": self.navigation}
 
     def channels(self) -> tuple[str, ...]:
         """The satellites."""

@@ -225,6 +225,7 @@ def _recording(simulator: Simulator) -> Recording:
         draws=simulator.draws,
         actual=simulator.scenario.actual_sheet(),
         actual_covariance=simulator.scenario.initial_error.actual_covariance(),
+        origins={name: origin for name, spec in simulator.scenario.aids.items() if (origin := spec.origin())},
     )
 
 

@@ -235,7 +235,11 @@ def test_the_catalogue_is_packaged():
     """The wheel takes the files that pyproject.toml names."""
     with (FOLDER.parent / "pyproject.toml").open("rb") as file:
         project = tomllib.load(file)
-    assert project["tool"]["setuptools"]["package-data"]["simnav.scenarios"] == ["*.toml", "families/*.toml"]
+    assert project["tool"]["setuptools"]["package-data"]["simnav.scenarios"] == [
+        "*.toml",
+        "families/*.toml",
+        "recordings/*.toml",
+    ]
     assert project["project"]["entry-points"]["simnav.scenarios"] == {"simnav": "simnav.scenarios"}
 
 
