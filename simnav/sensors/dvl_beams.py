@@ -75,6 +75,11 @@ _STRONG = 40.0
 #: The largest noise is that at this ratio [dB].
 _WEAKEST = -6.0
 _TOLERANCE = 1e-9
+#: Keys of the figures of a class.
+_FIGURES = {
+    "sigma": "sigma_m_s", "slant": "slant_deg", "minimum_altitude": "minimum_altitude_m",
+    "maximum_altitude": "maximum_altitude_m", "bias": "bias_m_s", "sound_speed": "sound_speed_percent",
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -83,8 +88,8 @@ class FrequencyClass:
 
     Attributes
     ----------
-    sigma, speed_noise : float
-        Noise of a beam in one ping: at rest [m/s], and its growth with the speed [-].
+    sigma : float
+        Noise of a beam in one ping [m/s].
     slant : float
         Angle of the beams from straight down [rad].
     minimum_altitude, maximum_altitude : float
@@ -94,7 +99,6 @@ class FrequencyClass:
     """
 
     sigma: float
-    speed_noise: float
     slant: float
     minimum_altitude: float
     maximum_altitude: float
@@ -103,10 +107,10 @@ class FrequencyClass:
 
 
 #: By frequency [kHz]. Their sources are in ``docs/how-to/use-dvl-beams.md``.
-CLASSES: Mapping[int, FrequencyClass] = {
-    300: FrequencyClass(0.0018, 0.0011, radians(30.0), 1.0, 200.0, 0.002, 0.004),
-    600: FrequencyClass(0.0020, 0.00075, radians(30.0), 0.7, 90.0, 0.001, 0.002),
-    1000: FrequencyClass(0.0017, 0.0005, radians(25.0), 0.2, 75.0, 0.001, 0.001),
+CLASSES: Mapping[float, FrequencyClass] = {
+    500.0: FrequencyClass(0.003, radians(25.0), 0.3, 200.0, 0.001, 0.001),
+    600.0: FrequencyClass(0.0035, radians(30.0), 0.7, 90.0, 0.001, 0.002),
+    1000.0: FrequencyClass(0.003, radians(25.0), 0.2, 75.0, 0.001, 0.001),
 }
 
 
@@ -175,8 +179,9 @@ class DvlBeams(AidSpec):
 
     Attributes
     ----------
-    frequency_khz : int
-        Class of the instrument: 300, 600 or 1000. `CLASSES` has the figures that are not given.
+    frequency_khz : float
+        Frequency, for the absorption of sound. At 500, 600 and 1000 `CLASSES` has the figures that are not given; at
+        another one all of them are to be given.
     array : str
         ``piston``: a transducer for each beam; ``phased``: one array that steers the beams.
     track : str
@@ -210,7 +215,7 @@ class DvlBeams(AidSpec):
 
     Examples
     --------
-    >>> spec = DvlBeams.from_toml({"frequency_khz": 300})
+    >>> spec = DvlBeams.from_toml({"frequency_khz": 500})
     >>> spec.maximum_altitude, spec.channels(), [block.name for block in spec.blocks()]
     (200.0, ('1', '2', '3', '4'), ['sound_speed'])
     """
@@ -218,18 +223,18 @@ class DvlBeams(AidSpec):
     errors: ClassVar[tuple[str, ...]] = (*AidSpec.errors, "speed_noise", "sound_speed", "mounting")
 
     kind: Literal["dvl_beams"] = "dvl_beams"
-    frequency_khz: Literal[300, 600, 1000] = 600
+    frequency_khz: float = Field(600.0, ge=20.0, le=5000.0, description="kHz")
     array: Literal["piston", "phased"] = "piston"
     track: Literal["bottom", "water"] = "bottom"
-    sigma: NonNegative = quantity("m_s", CLASSES[600].sigma)
-    speed_noise: NonNegative = quantity("percent", CLASSES[600].speed_noise)
-    bias: NonNegative = quantity("m_s", CLASSES[600].bias)
-    sound_speed: NonNegative = quantity("percent", CLASSES[600].sound_speed)
+    sigma: NonNegative = quantity("m_s", CLASSES[600.0].sigma)
+    speed_noise: NonNegative = quantity("percent", 0.0)
+    bias: NonNegative = quantity("m_s", CLASSES[600.0].bias)
+    sound_speed: NonNegative = quantity("percent", CLASSES[600.0].sound_speed)
     mounting: SigmaTriple = quantity("deg", ZERO)
-    slant: float = quantity("deg", CLASSES[600].slant, gt=0.0, le=radians(60.0))
+    slant: float = quantity("deg", CLASSES[600.0].slant, gt=0.0, le=radians(60.0))
     azimuth: float = quantity("deg", radians(45.0))
-    minimum_altitude: NonNegative = quantity("m", CLASSES[600].minimum_altitude)
-    maximum_altitude: Positive = quantity("m", CLASSES[600].maximum_altitude)
+    minimum_altitude: NonNegative = quantity("m", CLASSES[600.0].minimum_altitude)
+    maximum_altitude: Positive = quantity("m", CLASSES[600.0].maximum_altitude)
     bottom_loss: NonNegative = Field(0.0, description="dB", lt=100.0)
     fading: NonNegative = Field(2.0, description="dB", lt=100.0)
     aeration: NonNegative = Field(0.0, description="dB for each metre of significant wave height", lt=100.0)
@@ -247,9 +252,19 @@ class DvlBeams(AidSpec):
         """What is not given is that of the class."""
         if not isinstance(given, Mapping):
             return given
-        frequency = given.get("frequency_khz", 600)
-        figures = CLASSES.get(frequency) if isinstance(frequency, int) else None
-        return given if figures is None else {**vars(figures), **given}
+        frequency = given.get("frequency_khz", 600.0)
+        if isinstance(frequency, bool) or not isinstance(frequency, int | float):
+            return given  # a message of its own
+        figures = CLASSES.get(float(frequency))
+        if figures is not None:
+            return {**vars(figures), **given}
+        missing = [name for name in _FIGURES if name not in given]
+        if missing:
+            raise ValueError(
+                f"frequency_khz = {frequency:g}: figures are known at {', '.join(f'{f:g}' for f in CLASSES)} kHz; at "
+                f"another frequency give {', '.join(_FIGURES[name] for name in missing)} too"
+            )
+        return given
 
     @model_validator(mode="after")
     def _possible(self) -> Self:

@@ -15,6 +15,7 @@ import numpy as np
 from pydantic import Field
 
 from simnav import kinds
+from simnav.compiled import Integers
 from simnav.kinds import Kind, speed_components
 from simnav.recording import AidStream
 from simnav.sensors.derived import DerivedInstrument
@@ -30,19 +31,45 @@ __all__ = ["DvlSolution", "solutions"]
 _SAME = 1e-6
 
 
-def solutions(stream: AidStream) -> list[tuple[float, JanusSolution | None]]:
-    """The solution of each ping of a stream of beams: its time [s], and None with fewer than three beams.
+def solutions(stream: AidStream, time: Array | None = None) -> tuple[Array, JanusSolution]:
+    """The solution of each ping of a stream of beams.
 
     Error velocity, figure of merit and covariance of each ping are in it.
+
+    Parameters
+    ----------
+    stream : AidStream
+        Readings of an instrument of kind ``dvl_beams``.
+    time : (n,) array, optional
+        Times of the pings [s]; those of the readings are the default.
+
+    Returns
+    -------
+    (n,) array
+        Times of the pings [s].
+    JanusSolution
+        NaN where a ping has fewer than three beams.
     """
-    times, first = np.unique(stream.time, return_index=True)
-    last = np.append(first[1:], len(stream.time))
-    return [(float(t), _solved(stream, stream.value, slice(i, j))) for t, i, j in zip(times, first, last, strict=True)]
+    times = np.unique(stream.time) if time is None else time
+    return times, _solved(stream, stream.value, _pings(stream, times))
 
 
-def _solved(stream: AidStream, value: Array, rows: slice) -> JanusSolution | None:
-    side = stream.side[rows]
-    return solve_beams(value[rows, 0], side[:, 0], side[:, 1], stream.sigma[rows, 0])
+def _pings(stream: AidStream, time: Array) -> Integers:
+    """(m,) number of the ping that each reading belongs to; -1: none of them."""
+    at = np.searchsorted(time, stream.time - _SAME)
+    near = at < len(time)
+    near[near] = abs(time[at[near]] - stream.time[near]) <= _SAME
+    return np.where(near, at, -1)
+
+
+def _solved(stream: AidStream, value: Array, ping: Integers) -> JanusSolution:
+    """The solutions of the pings 0 to the largest one in ``ping``."""
+    of, count = ping >= 0, int(ping.max(initial=-1)) + 1
+    radial, sigma, side = np.full((count, 4), np.nan), np.zeros((count, 4)), np.zeros((4, 2))
+    where = ping[of], stream.channel[of]
+    radial[where], sigma[where] = value[of, 0], stream.sigma[of, 0]
+    side[stream.channel] = stream.side[:, :2]
+    return solve_beams(radial, side[:, 0], side[:, 1], sigma)
 
 
 @register_instrument(
@@ -103,22 +130,16 @@ class _Solver(DerivedInstrument):
                 f"instrument {self.name!r} of kind {self.kind!r}: it needs beams with track = 'bottom', but "
                 f"{spec.beams!r} has {sheets[spec.beams].details['track']!r}"
             )
-        first = np.searchsorted(source.time, time - _SAME)
-        last = np.searchsorted(source.time, time + _SAME)
-        kept, lost, rows = [], [], []
-        for t, i, j in zip(time, first, last, strict=True):
-            ping = slice(int(i), int(j))
-            found = _solved(source, source.value, ping)
-            if found is None or (found.beams == 3 and not spec.three_beams) or (
-                found.beams == 4 and abs(found.error_velocity) > spec.error_velocity
-            ):  # fmt: skip
-                lost.append(t)
-                continue
-            kept.append(t)
-            healthy = _solved(source, source.value - source.fault_error, ping)
-            wrong = found.velocity - (found if healthy is None else healthy).velocity
-            faults = int(np.bitwise_or.reduce(source.faults[ping]))
-            rows.append((found.velocity, np.sqrt(np.diag(found.covariance)), faults, wrong if faults else np.zeros(3)))
-        value, sigma, error = (np.array([row[k] for row in rows]).reshape(-1, 3) for k in (0, 1, 3))
-        faults_of = np.array([row[2] for row in rows], dtype=np.uint32)
-        return AidStream(self.name, self.kind, np.array(kept), value, faults_of, error, sigma, np.array(lost))
+        ping = _pings(source, time)
+        found = _solved(source, source.value, ping)
+        healthy = _solved(source, source.value - source.fault_error, ping)
+        count = len(found.beams)
+        good = (found.beams >= (3 if spec.three_beams else 4)) & ~(abs(found.error_velocity) > spec.error_velocity)
+        faults = np.zeros(count, np.uint32)
+        np.bitwise_or.at(faults, ping[ping >= 0], source.faults[ping >= 0])
+        wrong = np.where((faults != 0)[:, None], found.velocity - healthy.velocity, 0.0)
+        sigma = np.sqrt(np.einsum("nii->ni", found.covariance))
+        lost = np.append(time[:count][~good], time[count:])
+        return AidStream(
+            self.name, self.kind, time[:count][good], found.velocity[good], faults[good], wrong[good], sigma[good], lost
+        )

@@ -20,6 +20,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from simnav.compiled import Integers
 from simnav.types import Array
 
 __all__ = ["JanusSolution", "absorption", "beam_axes", "noise_by_range", "signal_margin", "solve_beams"]
@@ -106,67 +107,64 @@ def noise_by_range(margin: Array) -> Array:
 
 @dataclass(frozen=True)
 class JanusSolution:
-    """The velocity that the beams of one ping give.
+    """The velocities that the beams of n pings give; NaN with fewer than three beams.
 
     Attributes
     ----------
-    velocity : (3,) array
+    velocity : (n, 3) array
         Forward, starboard, down in the axes of the instrument [m/s].
-    error_velocity : float
+    error_velocity : (n,) array
         With four beams the disagreement of their two opposite pairs, as large as the noise of a horizontal component
         [m/s]; NaN with three.
-    figure_of_merit : float
+    figure_of_merit : (n,) array
         Predicted standard deviation of the horizontal velocity, root of the sum of both components [m/s].
-    covariance : (3, 3) array
+    covariance : (n, 3, 3) array
         Of the velocity [m^2/s^2].
-    beams : int
-        Number of beams used.
+    beams : (n,) array of int
+        Number of beams that were heard.
     """
 
     velocity: Array
-    error_velocity: float
-    figure_of_merit: float
+    error_velocity: Array
+    figure_of_merit: Array
     covariance: Array
-    beams: int
+    beams: Integers
 
 
-def solve_beams(radial: Array, azimuth: Array, slant: Array, sigma: Array) -> JanusSolution | None:
-    """Solve the beams of one ping by least squares with equal weights, as instruments do.
+def solve_beams(radial: Array, azimuth: Array, slant: Array, sigma: Array) -> JanusSolution:
+    """Solve the beams of n pings by least squares with equal weights, as instruments do.
 
     Parameters
     ----------
-    radial : (k,) array
-        Velocity along each beam [m/s].
-    azimuth, slant : (k,) array
+    radial : (n, 4) array
+        Velocity along each beam [m/s]; NaN where the beam is lost.
+    azimuth, slant : (4,) array
         Directions of the beams [rad].
-    sigma : (k,) array
+    sigma : (n, 4) array
         Standard deviation of each reading [m/s].
-
-    Returns
-    -------
-    JanusSolution or None
-        None with fewer than three beams.
 
     Examples
     --------
     >>> azimuth = np.radians([45.0, 135.0, 225.0, 315.0])
     >>> slant = np.full(4, np.radians(30.0))
     >>> radial = beam_axes(azimuth, slant) @ [2.0, 0.5, -0.1]
-    >>> found = solve_beams(radial, azimuth, slant, np.full(4, 0.002))
-    >>> found.velocity.round(6), round(found.figure_of_merit, 6)
-    (array([ 2. ,  0.5, -0.1]), 0.004)
+    >>> found = solve_beams(radial[None], azimuth, slant, np.full((1, 4), 0.002))
+    >>> found.velocity.round(6), found.figure_of_merit.round(6)
+    (array([[ 2. ,  0.5, -0.1]]), array([0.004]))
     """
-    if len(radial) < 3:
-        return None
-    axes = beam_axes(azimuth, slant)
-    inverse = np.linalg.pinv(axes)
-    velocity = inverse @ radial
-    covariance = (inverse * np.square(sigma)) @ inverse.T
-    wrong = np.nan
-    if len(radial) == 4:
-        order = np.argsort(azimuth)
-        signs = np.empty(4)
-        signs[order] = [1.0, -1.0, 1.0, -1.0]
-        wrong = float(signs @ radial) / (2.0 * np.sqrt(2.0) * float(np.sin(np.mean(slant))))
-    merit = float(np.sqrt(covariance[0, 0] + covariance[1, 1]))
-    return JanusSolution(velocity, wrong, merit, covariance, len(radial))
+    n = len(radial)
+    axes, heard = beam_axes(azimuth, slant), np.isfinite(radial)
+    beams = heard.sum(axis=1)
+    velocity, covariance, wrong = np.full((n, 3), np.nan), np.full((n, 3, 3), np.nan), np.full(n, np.nan)
+    for lost in (None, 0, 1, 2, 3):
+        use = np.arange(4) != (-1 if lost is None else lost)
+        of = (heard == use).all(axis=1)
+        inverse = np.linalg.pinv(axes[use])
+        velocity[of] = radial[of][:, use] @ inverse.T
+        covariance[of] = np.einsum("ik,nk,jk->nij", inverse, np.square(sigma[of][:, use]), inverse)
+    signs = np.empty(4)
+    signs[np.argsort(azimuth)] = [1.0, -1.0, 1.0, -1.0]
+    whole = beams == 4
+    wrong[whole] = radial[whole] @ signs / (2.0 * np.sqrt(2.0) * float(np.sin(np.mean(slant))))
+    merit = np.sqrt(covariance[:, 0, 0] + covariance[:, 1, 1])
+    return JanusSolution(velocity, wrong, merit, covariance, beams)
