@@ -1,8 +1,8 @@
-"""Raw observations and the receiver that solves them: an estimator with both uses one of them.
+"""Raw readings and the instrument that solves them: an estimator with both uses one of them.
 
-A receiver (`simnav.kinds.Datasheet.sources`) gives a position, or a velocity, that was computed from the readings of
-another instrument. Its errors are theirs, so an estimator that used both would count the same readings twice. The
-rule of all solvers is:
+A receiver of satellites (`simnav.kinds.Datasheet.sources`) gives a position, or a velocity, that was computed from the
+readings of another instrument; so does a DVL with its beams. Its errors are theirs, so an estimator that used both
+would count the same readings twice. The rule of all solvers is:
 
 - **tight coupling**: where the model has an equation for the raw observations, and states for what they bring along
   (`ErrorModel.holds`), the receivers that solve them are not used;
