@@ -163,7 +163,7 @@ def reading_sigma(side: Array, sheet: Datasheet) -> Array:
         role="velocity",
         components=speed_components("radial"),
         equation=observe,
-        datasheet=("array", "track"),
+        datasheet=("array", "track", "frequency_khz"),
         side=(
             Component("azimuth", "deg"),
             Component("slant", "deg"),
