@@ -76,7 +76,12 @@ def test_an_independent_reader_finds_the_beams(recording: Recording, files: dict
     assert (clock[:, :5] == [0, 1, 1, 0, 0]).all()
     np.testing.assert_allclose(clock[:, 5] + 0.01 * clock[:, 6], np.unique(stream.time), atol=0.0051)
     head = found[0]["fixed_leader"]
-    assert (head["Sys_Freq"], head["Beam_Angle"], head["CoordXfrm"], head["EA"]) == ("600 kHz", "30 Degree", "Beam", 45.0)
+    assert (head["Sys_Freq"], head["Beam_Angle"], head["CoordXfrm"], head["EA"]) == (
+        "600 kHz",
+        "30 Degree",
+        "Beam",
+        45.0,
+    )
     assert (head["Xdcr_Facing"], head["N_Beams"]) == ("Down", 4)
     compass = recording.data.aids["gyrocompass"]
     course = [e["variable_leader"]["Heading"] for e in found[1:]]
