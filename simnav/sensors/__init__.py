@@ -24,6 +24,7 @@ from simnav.sensors.gnss_raw import GnssRaw
 from simnav.sensors.gnss_receiver import GnssReceiver, GnssReceiverVelocity
 from simnav.sensors.imu import Imu, ImuSpec
 from simnav.sensors.instrument import AidSpec, Instrument, register_instrument
+from simnav.sensors.magnetic_field import MagneticField
 from simnav.sensors.speed_log import SpeedLog
 from simnav.sensors.terrain import TerrainFix
 from simnav.spec import OneOf
@@ -50,6 +51,7 @@ __all__ = [
     "ImuSpec",
     "Instrument",
     "MagneticCompass",
+    "MagneticField",
     "SpeedLog",
     "TerrainFix",
     "build_layers",
