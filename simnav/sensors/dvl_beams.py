@@ -24,7 +24,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from math import cos, inf, radians
+from math import cos, inf, radians, sin
 from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
@@ -272,6 +272,11 @@ class DvlBeams(AidSpec):
             raise ValueError(
                 f"minimum_altitude_m = {self.minimum_altitude:g}: should be below maximum_altitude_m = "
                 f"{self.maximum_altitude:g}"
+            )
+        if 1.0 + self.fixed_sound_speed <= sin(self.slant):
+            raise ValueError(
+                f"fixed_sound_speed_percent = {100.0 * self.fixed_sound_speed:g}: the assumed speed of sound is so low "
+                "that no beam leaves the instrument; an error is a few percent"
             )
         if self.maximum_altitude == inf:
             raise ValueError("maximum_altitude_m = inf: an echo is weaker the farther it comes; give a finite altitude")

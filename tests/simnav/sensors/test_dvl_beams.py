@@ -308,6 +308,10 @@ def test_water_track_is_relative_to_the_layer_and_needs_one() -> None:
         ({"slant_deg": 95.0}, "slant_deg"),
         ({"minimum_altitude_m": 100.0}, "minimum_altitude_m = 100: should be below maximum_altitude_m = 90"),
         ({"false_beams": 1.5}, "false_beams"),
+        (
+            {"fixed_sound_speed_percent": -100.0},
+            "fixed_sound_speed_percent = -100: the assumed speed of sound is so low",
+        ),
         ({"track": "surface"}, "track"),
     ],
 )
