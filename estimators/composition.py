@@ -139,8 +139,8 @@ class Piece:
         return self.make(**pieces, **{**self.fixed, **self.defaults, **values})
 
 
-#: The kinds of receivers that solve raw observations.
-_RECEIVERS = ("gnss_receiver",)
+#: The kinds of instruments that solve the raw readings of another one.
+_SOLUTIONS = ("gnss_receiver", "dvl_solution")
 _NAMED = (inspect.Parameter.POSITIONAL_OR_KEYWORD, inspect.Parameter.KEYWORD_ONLY)
 
 
@@ -234,13 +234,13 @@ class Row(Estimator):
 
     @property
     def needs(self) -> Needs:
-        """The instruments that its solver needs; and a receiver, if it is loosely coupled."""
-        return (*self.solver.needs, _RECEIVERS) if self.loose else self.solver.needs
+        """The instruments that its solver needs; and one that solves raw readings, if it is loosely coupled."""
+        return (*self.solver.needs, _SOLUTIONS) if self.loose else self.solver.needs
 
     def reset(self, start: InitialState, instruments: Instruments) -> None:
         """Begin a run; UnsuitableScenario where the pieces lack an instrument."""
         if self.loose:
-            if lack := lacking((_RECEIVERS,), instruments):
+            if lack := lacking((_SOLUTIONS,), instruments):
                 raise UnsuitableScenario(f"{self.name}: {lack}")
             instruments = instruments.without({name for sheet in instruments.values() for name in sheet.sources})
         self._instruments = instruments

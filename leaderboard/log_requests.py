@@ -43,7 +43,9 @@ class ExportRequest:
     )
     output: PathLike = option("--output", "-o", help="File or folder to write; of several runs a folder.")
     _: KW_ONLY
-    form: str = option("--format", default="csv", help="Format, such as csv, npz, gpx, kml, tum, nmea, mcap or rinex.")
+    form: str = option(
+        "--format", default="csv", help="Format, such as csv, npz, gpx, kml, tum, nmea, mcap, rinex or pd0."
+    )
     seed: int = option(default=0, help="Seed of the first run; the others count up.", least=0)
     runs: int = option("--runs", "-n", default=1, help="Seeds of each scenario.", least=1)
     truth: bool = option("--truth", default=False, help="Write truth and fault labels, too.")

@@ -36,6 +36,7 @@ _TITLES = {
     "robustness": "Beyond the datasheets",
     "coloured": "Errors as they are at sea",
     "satellites": "Satellites, tightly and loosely coupled",
+    "acoustic": "Beams and ranges of sound",
     "recorded": "Recorded voyages",
     "recordings": "Public recordings",
     "papers": "Scenarios of papers",

@@ -24,6 +24,7 @@ from .formats import writes
 from .hidden import has_truth
 from .recording_mcap import write_mcap
 from .recording_nmea import write_nmea
+from .recording_pd0 import write_pd0
 from .recording_readme import readme, start_text
 from .recording_rinex import write_rinex
 from .recording_tracks import write_gpx, write_kml
@@ -33,8 +34,8 @@ if TYPE_CHECKING:
     from simnav.recording import Recording
 
 __all__ = [
-    "write_csv", "write_gpx", "write_kml", "write_mcap", "write_nmea", "write_npz", "write_parquet", "write_rinex",
-    "write_tum",
+    "write_csv", "write_gpx", "write_kml", "write_mcap", "write_nmea", "write_npz", "write_parquet", "write_pd0",
+    "write_rinex", "write_tum",
 ]  # fmt: skip
 
 #: Columns of the truth and of the IMU, with their units.
