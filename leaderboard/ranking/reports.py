@@ -46,7 +46,8 @@ class _Report(Shown):
     def headline(self) -> str:
         """How much was run."""
         scenarios, labels = ({getattr(r, name) for r in self.results} for name in ("scenario", "estimator"))
-        return f"{len(self.results)} results of {len(labels)} estimators on {len(scenarios)} scenarios"
+        runs = sum(r.tried for r in self.results)
+        return f"{runs} runs of {len(labels)} estimators on {len(scenarios)} scenarios"
 
     def shown(self) -> Sequence[tables.Fitted]:
         """A table for each track."""
@@ -85,7 +86,7 @@ class CampaignReport(_Report):
             "seconds": self.summary.seconds,
             "asked": self.summary.total,
             "computed": self.summary.computed,
-            "runs": len(self.results),
+            "runs": sum(r.tried for r in self.results),
             "failed": failures(self.results),
             "confinement": confined(self.results),
             "ranking": self.ranking.to_dict(),

@@ -52,7 +52,7 @@ class SiteReport:
         """Plain: what the command prints with ``--json``."""
         return {
             "site": str(self.index),
-            "runs": len(self.results),
+            "runs": sum(r.tried for r in self.results),
             "failed": failures(self.results),
             "ranking": self.ranking.to_dict(),
             "confinement": confined(self.results),
