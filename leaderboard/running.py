@@ -103,6 +103,7 @@ def check(estimator: EstimatorLike, **parameters: Any) -> Report:
     Returns
     -------
     simnav.testing.contract_check.Report
+        It calls the estimator as all tables do: one of a file has the name of the file.
 
     Raises
     ------
@@ -111,8 +112,9 @@ def check(estimator: EstimatorLike, **parameters: Any) -> Report:
     """
     from simnav.testing.contract_check import check
 
+    asked = one_request(estimator, parameters)
     with mistakes(ValueError):
-        return check(one_request(estimator, parameters).make)
+        return replace(check(asked.make), estimator=asked.label)
 
 
 @call(RunRequest)
