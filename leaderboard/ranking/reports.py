@@ -22,6 +22,7 @@ from .standing import Standing, standing_table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+    from rich.console import RenderableType
 
     from simnav.leaderboard.campaign.campaign import Summary
 
@@ -49,7 +50,7 @@ class _Report(Shown):
         runs = sum(r.tried for r in self.results)
         return f"{runs} runs of {len(labels)} estimators on {len(scenarios)} scenarios"
 
-    def shown(self) -> Sequence[tables.Fitted]:
+    def shown(self) -> Sequence[RenderableType]:
         """A table for each track."""
         return ranking_tables(self.ranking)
 
@@ -65,6 +66,12 @@ class _Report(Shown):
 @dataclass(frozen=True, eq=False, repr=False)
 class StandardReport(_Report):
     """The result that comes with simnav."""
+
+    def shown(self) -> Sequence[RenderableType]:
+        """The table of the first track, and where the others are."""
+        first, *others = ranking_tables(self.ranking)
+        names = ", ".join(t.track for t in self.ranking.tracks[1:])
+        return [first, f"In .ranking.tracks, too: {names}."] if others else [first]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
