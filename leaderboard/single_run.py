@@ -17,6 +17,7 @@ from simnav.leaderboard.campaign.recorder import record_here
 from simnav.leaderboard.campaign.request import EstimatorRequest
 from simnav.leaderboard.figures.lag_figure import lag_figure
 from simnav.leaderboard.figures.run_figure import run_figure
+from simnav.leaderboard.printed import first_lines
 from simnav.leaderboard.ranking.ranking_table import consistency
 from simnav.leaderboard.ranking.rows import Consistency
 from simnav.leaderboard.results.errors import RequestError, mistakes, printable
@@ -206,7 +207,8 @@ def run_once(
     for k, (request, estimator) in enumerate(zip(requests, estimators, strict=True)):
         report(k, len(requests), note=request.label)
         started = time.perf_counter()
-        trial = run_trial(estimator, recording)
+        with first_lines(request.label):
+            trial = run_trial(estimator, recording)
         seconds = time.perf_counter() - started
         scores = score(trial, recording) if len(trial) else {}
         runs.append(EstimatorRun(request.label, request.parameters, estimator.reference, trial.status,
