@@ -1,22 +1,27 @@
-"""The first picture of the README: a voyage on which receivers are deceived, and two estimators that part there.
+"""The first pictures of a reader: a voyage on which a receiver is deceived, and the first estimator of the tutorial.
 
-``python docs/voyage.py`` draws it. The command ``simnav run gnss-spoofing -e ekf,gnc-fgo --plot`` shows all of the run.
+``python docs/voyage.py`` draws both. The command ``simnav run gnss-spoofing -e ekf,gnc-fgo --plot`` shows all of the
+first run. The second picture is that of the command in the tutorial, of the file that is printed there.
 """
 
 from __future__ import annotations
 
+import re
+import tempfile
 from pathlib import Path
 
 import numpy as np
+from PIL import Image
 
 import simnav
 from simnav.leaderboard.figures.frames import shade
 from simnav.leaderboard.figures.run_figure import fault_spans, fixes, relative_track, true_track
-from simnav.leaderboard.figures.style import Style, figure, save, styled
+from simnav.leaderboard.figures.style import Style, figure, fitted, save, styled
 from simnav.scoring import errors
 
 SCENARIO, ROWS, SEED = "gnss-spoofing", ("ekf", "gnc-fgo"), 0
-PICTURE = Path(__file__).parent / "figures" / "faulty-voyage"
+DOCS = Path(__file__).parent
+PICTURE = DOCS / "figures" / "faulty-voyage"
 AROUND = 40.0  # metres around the largest error that the map shows
 
 
@@ -59,5 +64,19 @@ def draw() -> None:
         save(fig, PICTURE, formats=("png",))
 
 
+def draw_first_estimator() -> None:
+    """Run the estimator of the tutorial as the tutorial does, and write the picture."""
+    page = (DOCS / "tutorials" / "first-estimator.md").read_text(encoding="utf-8")
+    source = re.search(r"^```python\n(.*?)^```", page, re.DOTALL | re.MULTILINE)
+    assert source is not None
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "alpha_beta.py"
+        file.write_text(source[1], encoding="utf-8")
+        report = simnav.run("ship-straight", [str(file), "ship-ekf"])
+    (written,) = save(fitted(report.plot(), 220.0), DOCS / "figures" / "first-estimator", formats=("png",))
+    Image.open(written).convert("RGB").quantize(128, dither=Image.Dither.NONE).save(written, optimize=True)
+
+
 if __name__ == "__main__":
     draw()
+    draw_first_estimator()
