@@ -146,6 +146,7 @@ def scenario_data(
             for n in rows
         },
         "drawn": drawn,
+        "timed": len(over_time),
         "first": first,
         "table": _table(ranking, runs, estimators),
         "failures": _failures(ranking, runs),

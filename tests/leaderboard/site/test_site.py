@@ -42,7 +42,7 @@ def no_charts(monkeypatch):
 
     def nothing(entry, ranking, *_):
         page = {"kind": "scenario", "reference": "", "remarks": [], "unsuitable": [], "failures": [], "instruments": [],
-                "provisional": False, "sweeps": [], "rows": {}, "drawn": []}  # fmt: skip
+                "provisional": False, "sweeps": [], "rows": {}, "drawn": [], "timed": 0}  # fmt: skip
         return ScenarioData(page, {}, (), ())
 
     monkeypatch.setattr(site, "scenario_data", nothing)
