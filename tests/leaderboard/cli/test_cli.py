@@ -145,6 +145,14 @@ def test_show_of_an_unknown_name_names_those_that_are_near():
     assert "called 'sw-fog'; did you mean sw-fgo" in complaint_of(call("show", "sw-fog", code=2))
 
 
+def test_show_takes_a_file_as_all_commands_do(here):
+    assert "Keeps the last fix." in call("show", "mine.py").stdout
+    assert document("show", "mine.py")["estimator"]["parameters"] == {"gain": 1.0, "choice": ""}
+    shown = document("show", "pond.toml")["scenario"]
+    assert (shown["duration"], shown["file"]) == (60.0, "pond.toml")
+    assert "there is no estimator file 'nobody.py'" in complaint("show", "nobody.py")
+
+
 def test_every_command_stands_under_one_heading_of_the_help():
     named = [name for names in HEADINGS.values() for name in names]
     assert sorted(named) == sorted([*COMMANDS, *GROUPS])
