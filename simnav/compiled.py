@@ -102,7 +102,7 @@ class Kernel(Generic[Parameters, Returned]):
         The plain Python function that is compiled.
     signature : str or None
         Numba signature; with it the kernel is compiled for these types only, and can be compiled before
-        its first call. Small helpers that only other kernels call have none.
+        its first call. Small helpers that other kernels call have none; a call from Python runs them as Python.
     fastmath : bool or set of str
         Permitted changes of floating-point arithmetic; passed to Numba.
     """
@@ -232,6 +232,8 @@ class Kernel(Generic[Parameters, Returned]):
     else:
 
         def __call__(self, *args: Any) -> Any:
+            if self.signature is None:  # a helper is compiled within its callers; alone it would be at the first call,
+                return self.function(*args)  # in every process anew, and a confined one cannot write what it compiles
             return (self._dispatcher or self.compile())(*args)
 
 

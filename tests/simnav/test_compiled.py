@@ -226,3 +226,9 @@ def test_the_first_kernel_that_the_cache_lacks_is_announced(tmp_path: Path, monk
         assert said == ["compiling"]
     compiled.Kernel(surroundings, "i8()", False).compile()
     assert said == ["compiling"]
+
+
+def test_a_helper_that_python_calls_is_not_compiled_for_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A confined estimator could not write what is compiled at its first epoch."""
+    monkeypatch.setattr(compiled.Kernel, "compile", lambda self: pytest.fail(f"{self} was compiled"))
+    assert compiled.Kernel(lambda x: 2.0 * x, None, False)(3.0) == 6.0

@@ -1,11 +1,14 @@
-"""The first pictures of a reader: a voyage on which a receiver is deceived, and the first estimator of the tutorial.
+"""Pictures of the guides: a voyage on which a receiver is deceived, the first estimator of the tutorial, and a sweep.
 
-``python docs/voyage.py`` draws both. The command ``simnav run gnss-spoofing -e ekf,gnc-fgo --plot`` shows all of the
-first run. The second picture is that of the command in the tutorial, of the file that is printed there.
+``python docs/pictures.py`` draws them. The command ``simnav run gnss-spoofing -e ekf,gnc-fgo --plot`` shows all of the
+first run. The second picture is that of the command in the tutorial, of the file that is printed there. The third
+is made from the sweep that comes with the standard result.
 """
 
 from __future__ import annotations
 
+import json
+import math
 import re
 import tempfile
 from pathlib import Path
@@ -17,6 +20,8 @@ import simnav
 from simnav.leaderboard.figures.frames import shade
 from simnav.leaderboard.figures.run_figure import fault_spans, fixes, relative_track, true_track
 from simnav.leaderboard.figures.style import Style, figure, fitted, save, styled
+from simnav.leaderboard.figures.sweep_figure import Line, error_against_dial
+from simnav.leaderboard.standard.drawn import DRAWN
 from simnav.scoring import errors
 
 SCENARIO, ROWS, SEED = "gnss-spoofing", ("ekf", "gnc-fgo"), 0
@@ -77,6 +82,27 @@ def draw_first_estimator() -> None:
     Image.open(written).convert("RGB").quantize(128, dither=Image.Dither.NONE).save(written, optimize=True)
 
 
+def draw_sweep() -> None:
+    """The error against the size of a multipath error, from the sweep of the standard result."""
+    found = json.loads((DRAWN / "sweeps" / "sweep-gnss-multipath.json").read_text(encoding="utf-8"))
+    by: dict[str, list[tuple[float, float, float, float]]] = {}
+    for point in found["points"]:
+        error = point["error"]
+        row = (point["values"][0], *(math.nan if error[k] is None else error[k] for k in ("value", "low", "high")))
+        by.setdefault(point["estimator"], []).append(row)
+    lines = [Line(label, *np.array(rows).T) for label, rows in by.items()]
+    marks = {
+        b["estimator"]: b["value"]["value"]
+        for b in found["breaking_points"]
+        if b["criterion"] == "twice-clean" and b["value"]["value"] is not None
+    }
+    (dial,), score = found["dials"], found["score"]
+    across, up = f"{dial['title']} [{dial['unit']}]", f"{score['title']} [{score['unit']}]"
+    fig = error_against_dial(lines, across, up, found["scenario"], found["limit"], marks)
+    save(fig, DOCS / "figures" / "sweep", formats=("png",))
+
+
 if __name__ == "__main__":
     draw()
     draw_first_estimator()
+    draw_sweep()
