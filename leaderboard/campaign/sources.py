@@ -20,7 +20,16 @@ from pathlib import Path
 
 from simnav.plugins import code_text
 
-__all__ = ["LIBRARY", "code_of", "digest", "files_digest", "folder_code", "followed", "is_installed"]
+__all__ = [
+    "LIBRARY",
+    "code_of",
+    "digest",
+    "files_digest",
+    "folder_code",
+    "followed",
+    "is_installed",
+    "may_call_kernels",
+]
 
 #: Folder of the library. The estimators and scenarios are in it, by symbolic links; so is the leaderboard.
 LIBRARY = Path(sys.modules["simnav"].__file__ or "").parent
@@ -83,8 +92,8 @@ class Code:
     digest : str
         Of its syntax tree, without docstrings and positions. Of a file that is no Python: of its bytes.
     imports : tuple of str
-        Names of the modules that it imports anywhere; of ``from . import name`` the name. Imports for type checking
-        only are left out.
+        Names of the modules that it imports anywhere; of ``from . import name`` the name, and of ``from simnav import
+        name`` ``simnav.name``. Imports for type checking only are left out.
     data : tuple of str
         Patterns of the names of files that texts in it name, like ``weights_*.json`` for ``f"weights_{kind}.json"``.
     named : tuple of str
@@ -169,7 +178,10 @@ def _imports(tree: ast.Module) -> Iterator[str]:
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
-            yield from [node.module] if node.module else [alias.name for alias in node.names]
+            if node.module == "simnav":
+                yield from (f"simnav.{alias.name}" for alias in node.names)
+            else:
+                yield from [node.module] if node.module else [alias.name for alias in node.names]
 
 
 def _texts(tree: ast.Module) -> set[str]:
@@ -212,10 +224,36 @@ def followed(files: Iterable[Path]) -> dict[str, str]:
     return dict(sorted(walk.found.items()))
 
 
+def may_call_kernels(file: str) -> bool:
+    """Whether an estimator may call kernels of simnav: False if its files import only what surely has none.
+
+    Parameters
+    ----------
+    file : str
+        The file of the estimator; empty for one that is not in a file.
+    """
+    if not file:
+        return True
+    walk = _Walk()
+    walk.file(Path(file), Path(file).parent)
+    walk.run()
+    return any(
+        module not in _WITHOUT_KERNELS and module.partition(".")[0] not in _ALSO_WITHOUT for module in walk.foreign
+    )
+
+
+#: Of simnav: what has no kernels. And modules of others that do not import simnav.
+_WITHOUT_KERNELS = {"simnav.types"} | {
+    f"simnav.{name}" for name in ("Estimate", "Estimator", "Instruments", "InitialState", "Measurements", "register")
+}
+_ALSO_WITHOUT = {*sys.stdlib_module_names, "numpy", "scipy", "filterpy"} - {"importlib", "runpy"}
+
+
 class _Walk:
     """Files that were found, and those whose imports are still to be followed."""
 
     def __init__(self) -> None:
+        self.foreign: set[str] = set()  # modules that are not files of the user
         self.found: dict[str, str] = {}
         self.todo: list[tuple[Code, Path, Path]] = []  # code, folder that its name is relative to, its own folder
 
@@ -238,16 +276,20 @@ class _Walk:
         while self.todo:
             code, start, folder = self.todo.pop()
             for module in (*code.imports, *code.named):
-                if module.partition(".")[0] != "simnav":
-                    self.take(module, start, folder)
+                if module.partition(".")[0] == "simnav" or not self.take(module, start, folder):
+                    self.foreign.add(module)
 
-    def take(self, name: str, start: Path, folder: Path) -> None:
-        """Take a module that a file imports, if it is one of the user's own."""
-        if not self.beside(name.partition(".")[0], start, folder) and "*" not in name:
+    def take(self, name: str, start: Path, folder: Path) -> bool:
+        """Take a module that a file imports, if it is one of the user's own; returns whether it is."""
+        if self.beside(name.partition(".")[0], start, folder):
+            return True
+        if "*" not in name:
             file = getattr(sys.modules.get(name), "__file__", None)
             path = None if file is None else Path(file).resolve()
             if path is not None and path.suffix == ".py" and path.is_file() and not is_installed(path):
                 self.file(path, start)
+                return True
+        return False
 
     def beside(self, name: str, start: Path, folder: Path) -> bool:
         """Take a module or a package that is beside a file; returns whether there is one."""
