@@ -17,7 +17,6 @@ from simnav.leaderboard.campaign.recorder import record_here
 from simnav.leaderboard.campaign.request import EstimatorRequest
 from simnav.leaderboard.figures.lag_figure import lag_figure
 from simnav.leaderboard.figures.run_figure import run_figure
-from simnav.leaderboard.printed import first_lines
 from simnav.leaderboard.ranking.ranking_table import consistency
 from simnav.leaderboard.ranking.rows import Consistency
 from simnav.leaderboard.results.errors import RequestError, mistakes, printable
@@ -27,6 +26,7 @@ from simnav.scoring import SCORES, protection_levels, score, stanford
 from simnav.scoring.consistency import badge
 from simnav.scoring.lagged import seconds_of
 
+from .printed import first_lines
 from .ranking import tables
 
 if TYPE_CHECKING:
