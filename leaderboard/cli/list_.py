@@ -178,7 +178,8 @@ _MORE = "'simnav show NAME' has the rest."
 
 def _scenario_lines(found: list[ScenarioItem]) -> tables.Lines:
     rows = [[e.name, e.track, tables.duration(e.duration), e.title] for e in found]
-    return tables.Lines("Scenarios", ["name", "track", "duration", "title"], rows, numeric=["duration"], caption=_MORE)
+    return tables.Lines("Scenarios", ["name", "track", "duration", "title"], rows, numeric=["duration"], caption=_MORE,
+                        spare=["track"])  # fmt: skip
 
 
 def _estimator_lines(found: list[EstimatorItem]) -> tables.Lines:

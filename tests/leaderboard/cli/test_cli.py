@@ -124,6 +124,14 @@ def test_a_list_has_one_line_for_each_and_the_whole_name_first(topic, width, mon
     assert max(map(len, lines)) <= int(width)
 
 
+@pytest.mark.parametrize(("width", "track"), [("80", False), ("120", True)])
+def test_a_narrow_list_leaves_out_the_track_so_that_titles_can_be_read(width, track, monkeypatch):
+    monkeypatch.setenv("COLUMNS", width)
+    shown = call("list", "scenarios").stdout
+    assert "Open sea on a clean day" in shown
+    assert ("aided-ins" in shown) is track
+
+
 @pytest.mark.parametrize(
     ("name", "said"),
     [
