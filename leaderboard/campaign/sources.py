@@ -8,7 +8,10 @@ elsewhere. What is installed is not followed.
 from __future__ import annotations
 
 import ast
+import contextlib
 import hashlib
+import inspect
+import json
 import os
 import re
 import sys
@@ -18,6 +21,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
+from simnav.leaderboard.results.user_cache import keep, user_cache
 from simnav.plugins import code_text
 
 __all__ = [
@@ -80,6 +84,7 @@ def folder_code(folder: Path, without: Collection[str] = ()) -> str:
             parts += [path.relative_to(folder).as_posix(), code_of(path).digest]
         elif path.suffix in (".json", ".npz"):
             parts.append(files_digest([(path.relative_to(folder).as_posix(), path)]))
+    _keep_known()
     return digest(*parts)
 
 
@@ -125,13 +130,19 @@ def code_of(path: Path) -> Code:
 @lru_cache(maxsize=4096)
 def _code_of(path: Path, modified: int, size: int) -> Code:
     source = path.read_bytes()
+    ours = path.is_relative_to(LIBRARY)  # it is not followed
+    content = hashlib.blake2b(source, digest_size=16).hexdigest()
+    if ours and content in _known():
+        return Code(_known()[content])
     try:
         tree = ast.parse(source)
     except (SyntaxError, ValueError):
-        return Code(hashlib.blake2b(source, digest_size=16).hexdigest())
+        return Code(content)
     text = code_text(tree)
     found = hashlib.blake2b(text.encode(errors="surrogatepass"), digest_size=16).hexdigest()
-    if path.is_relative_to(LIBRARY):  # it is not followed
+    if ours:
+        _known()[content] = found
+        _new.add(content)
         return Code(found)
     imports, texts = tuple(dict.fromkeys(_imports(tree))), _texts(tree)
     by_text = any(module.partition(".")[0] == "importlib" for module in imports) or any(
@@ -144,6 +155,35 @@ def _code_of(path: Path, modified: int, size: int) -> Code:
         tuple(sorted(t.lstrip(".") for t in texts if by_text and re.fullmatch(_MODULE, t))),
         tuple(sorted(t for t in texts if re.fullmatch(_FOLDER, t))),
     )
+
+
+#: Digests of the code of files of simnav that are kept from one process to the next.
+_MOST_KNOWN = 10_000
+_new: set[str] = set()  # of these, what is not kept yet
+
+
+@lru_cache(maxsize=1)
+def _known_file() -> Path:
+    """Where they are kept: by the version of Python, and by how they are made."""
+    how = digest(sys.version, inspect.getsource(code_text))
+    return user_cache() / f"code-{how}.json"
+
+
+@lru_cache(maxsize=1)
+def _known() -> dict[str, str]:
+    """Digest of the code for the digest of the bytes of a file; to parse all of simnav takes two seconds."""
+    with contextlib.suppress(OSError, ValueError, RecursionError):
+        found = json.loads(_known_file().read_bytes())
+        if isinstance(found, dict) and all(isinstance(v, str) and len(v) == 32 for v in found.values()):
+            return found
+    return {}
+
+
+def _keep_known() -> None:
+    """Keep what is new."""
+    if _new:
+        _new.clear()
+        keep(_known_file(), json.dumps(dict(list(_known().items())[-_MOST_KNOWN:])))
 
 
 _FILE = r"[\w*-]+\.[A-Za-z]\w{0,7}|(?:[\w*-]+/)+[\w*-]+\.[A-Za-z]\w{0,7}"
