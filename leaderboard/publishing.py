@@ -69,6 +69,7 @@ def site(request: SiteRequest) -> SiteReport:
     from simnav.leaderboard.papers.page import pages_in
     from simnav.leaderboard.ranking.agreement import rank_correlations
     from simnav.leaderboard.ranking.ranking import rank as ranked
+    from simnav.leaderboard.results.home import linked_from
     from simnav.leaderboard.site.report import SiteReport
     from simnav.leaderboard.site.site import build
     from simnav.leaderboard.standard.drawn import attached, stored_sweeps
@@ -80,8 +81,9 @@ def site(request: SiteRequest) -> SiteReport:
     found, seeds = attached(results_of(request.results, series=True))
     ranking = ranked(found, tracks=scenario_files.tracks(request.results), requested=requested.read(request.results))
     correlations = () if request.against is None else tuple(rank_correlations(ranking, rank(request.against)))
+    output = absolute(request.output)
     index = build(
-        found, ranking, absolute(request.output), progress=request.progress, workers=processes,
+        found, ranking, output, home=linked_from(output, request.docs), progress=request.progress, workers=processes,
         papers=pages_in(Path(request.papers)), runs_shown=shown, figures=request.figures, seeds=seeds,
         sweeps=[*swept.sweeps_in(Path(request.sweeps)), *stored_sweeps(found)],
     )  # fmt: skip
@@ -354,6 +356,7 @@ def publish_standard(request: PublishRequest) -> Published:
         If runs are missing or out of date; then nothing is written.
     """
     from simnav.leaderboard.papers.page import pages_in
+    from simnav.leaderboard.results.home import linked_from
     from simnav.leaderboard.site.site import build
     from simnav.leaderboard.standard.drawn import attached, stored_sweeps
     from simnav.leaderboard.standard.editions import pages_of
@@ -381,7 +384,8 @@ def publish_standard(request: PublishRequest) -> Published:
         published = {(r.scenario, r.estimator, r.seed) for r in made.results}
         found = [r for r in results_of(working, series=True) if (r.scenario, r.estimator, r.seed) in published]
         found, seeds = attached(found)
-        build(found, made.ranking, absolute(request.site), progress=request.progress, workers=request.workers,
+        output = absolute(request.site)
+        build(found, made.ranking, output, home=linked_from(output), progress=request.progress, workers=request.workers,
               papers=pages_in(Path("reproduced")), editions=pages_of(read(file)), seeds=seeds,
               sweeps=stored_sweeps(found))  # fmt: skip
     return made

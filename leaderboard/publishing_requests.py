@@ -7,6 +7,7 @@ from dataclasses import KW_ONLY
 from pathlib import Path
 
 from simnav.leaderboard.campaign.options import PathLike, part_of
+from simnav.leaderboard.results.home import BUILT
 
 from .calls import option, request
 from .requests import (
@@ -81,6 +82,11 @@ class SiteRequest:
     papers: PathLike = option(default="reproduced", help="Folder that 'simnav reproduce' wrote; its papers get pages.")
     sweeps: PathLike = option(
         default="results", help="Folder with the folders of sweeps; the pages of scenarios show them."
+    )
+    docs: str = option(
+        default=BUILT,
+        help="Documentation that the pages link to: a web address, or the folder that 'make docs' built.",
+        more="Without that folder, the pages link to the address that this installation of simnav names, if any.",
     )
     runs_shown: int = option(default=2, help="Runs of each scenario of which the site has track and errors.", least=1)
     figures: bool = option("--print", default=False, help="Write the charts as SVG and PNG, too.")

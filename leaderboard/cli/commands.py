@@ -91,7 +91,7 @@ class ListCommand:
 class ShowCommand:
     """Show all about a scenario, an estimator, a kind of instrument or a kind of fault."""
 
-    name: str = option(help="Its name, as 'simnav list' has it.", argument=True, metavar="NAME")
+    name: str = option(help="Its name, as 'simnav list' has it, or its file.", argument=True, metavar="NAME")
 
 
 @request

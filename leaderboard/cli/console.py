@@ -171,6 +171,12 @@ class Output:
 
         return watcher
 
+    def compiling(self) -> None:
+        """Say that what comes next takes its time, once."""
+        self.remark(
+            "compiling kernels; they are kept for later runs ('simnav warmup' compiles all, in a minute or two)"
+        )
+
     def document(self, value: Any) -> None:
         """Set what ``--json`` prints when the command ends."""
         self._document = value
@@ -215,6 +221,7 @@ def session(json: bool, debug: bool) -> Iterator[Output]:
     """
     import typer
 
+    from simnav.compiled import announced
     from simnav.log.progress import watched
 
     out = Output(json, debug)
@@ -226,7 +233,7 @@ def session(json: bool, debug: bool) -> Iterator[Output]:
     try:
         if not debug:
             warnings.showwarning = warn
-        with _quiet_stdout(json), watched(out.reading()):
+        with _quiet_stdout(json), watched(out.reading()), announced(out.compiling):
             yield out
     except (typer.Exit, typer.Abort):
         raise

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Protocol
 
 from simnav.leaderboard.results.citation import Citation
+from simnav.leaderboard.results.home import NOWHERE, Home
 from simnav.leaderboard.results.provenance import Provenance
 
 from .facts import EstimatorFacts
@@ -123,8 +124,8 @@ class SiteFacts:
     ----------
     version, generated : str
         Version of simnav that wrote the site; date and time.
-    total : int
-        Results; 0 for a page that stands alone.
+    total, runs : int
+        Results, also of estimators that a scenario does not suit; 0 for a page that stands alone. Runs among them.
     scenarios, estimators : sequence
         What has a page of its own, in the order of the menus.
     papers : sequence of ExtraPage
@@ -139,11 +140,14 @@ class SiteFacts:
         Provenance of the results, each once.
     citation : Citation or None
         Citation of the results.
+    home : Home
+        Where the repository and the documentation are, for links.
     """
 
     version: str
     generated: str
     total: int = 0
+    runs: int = 0
     scenarios: Sequence[ScenarioEntry] = ()
     estimators: Sequence[EstimatorEntry] = ()
     papers: Sequence[ExtraPage] = ()
@@ -152,3 +156,4 @@ class SiteFacts:
     benchmark: str = ""
     provenance: Sequence[Provenance] = field(default_factory=tuple)
     citation: Citation | None = None
+    home: Home = NOWHERE

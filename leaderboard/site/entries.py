@@ -13,10 +13,12 @@ from .content import EstimatorEntry, Fact, ScenarioEntry
 from .facts import catalogued, estimator_facts, toml_of
 
 if TYPE_CHECKING:
-    from simnav.leaderboard.ranking.board import Ranking
+    from simnav.leaderboard.ranking.board import Ranking, ScenarioRanking
     from simnav.leaderboard.ranking.runs import Runs
 
-__all__ = ["argument_of", "entries"]
+__all__ = ["argument_of", "entries", "run_names"]
+
+_LONG = 40  # characters of the name of a run
 
 
 def entries(
@@ -79,3 +81,9 @@ def _slug(text: str, taken: set[str]) -> str:
         plain += "-" + hashlib.blake2b(text.encode(), digest_size=3).hexdigest()
     taken.add(plain)
     return plain
+
+
+def run_names(ranking: ScenarioRanking) -> dict[str, str]:
+    """Short names of the runs whose own one is a sentence: recordings that have no name but what is noted of them."""
+    long = sorted({run for row in ranking.rows for run in row.ratios if len(run) > _LONG})
+    return {run: f"recording {k + 1}" if len(long) > 1 else "recording" for k, run in enumerate(long)}

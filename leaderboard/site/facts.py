@@ -92,7 +92,7 @@ def estimator_facts(label: str) -> EstimatorFacts:
     except (ValueError, ImportError):
         return EstimatorFacts()
     documentation = inspect.getdoc(cls) or ""
-    text = re.split(r"\n(?:Parameters|Attributes|Notes|References)\n-+\n", documentation)[0]
+    text = re.split(r"\n\S[^\n]*\n-{3,}\n", documentation)[0]  # what stands before the first section
     meant = meanings(documentation)
     body = " ".join(text.strip().partition("\n\n")[2].split())
     body, _, source = body.partition("Source: ")

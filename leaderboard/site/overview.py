@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     from .content import EstimatorEntry, ScenarioEntry
 
-__all__ = ["BOARD_COLUMNS", "bar_scale", "board_columns", "board_row", "overview"]
+__all__ = ["BOARD_COLUMNS", "OVER_SCENARIOS", "bar_scale", "board_columns", "board_row", "overview"]
 
 _WIDEST = 100.0  # largest ratio on the scale of the bars
 _INSIDE = 0.9  # share of the rows whose scores the scale must hold
@@ -130,6 +130,9 @@ _AFTER = (
     ),
     Column("memory", "Memory", "Largest memory of all runs.", "size", hidden=True),
 )
+
+#: Keys of columns that say something of several scenarios only.
+OVER_SCENARIOS = ("gain_scenarios", "won", "over_scenarios")
 
 #: Columns whose meaning does not depend on the board.
 BOARD_COLUMNS = tuple(c for c in (*_BEFORE, *_AFTER) if c is not _NAME)

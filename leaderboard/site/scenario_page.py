@@ -21,7 +21,7 @@ from .columns import SCORES_SHOWN
 from .content import PLAIN
 from .curves import Curves, Gathered
 from .latency import latency_chart
-from .overview import bar_scale, board_columns, board_row
+from .overview import OVER_SCENARIOS, bar_scale, board_columns, board_row
 from .rounding import short
 from .sweeps import SweepFile
 
@@ -146,6 +146,7 @@ def scenario_data(
             for n in rows
         },
         "drawn": drawn,
+        "timed": len(over_time),
         "first": first,
         "table": _table(ranking, runs, estimators),
         "failures": _failures(ranking, runs),
@@ -194,8 +195,8 @@ def seeds_to_show(ranking: ScenarioRanking, runs: Mapping[str, Runs], seeds: Seq
 def _table(
     ranking: ScenarioRanking, runs: Mapping[str, Runs], estimators: Mapping[str, EstimatorEntry]
 ) -> dict[str, Any]:
-    relative = bool(ranking.reference.estimator)
-    title = "× reference" if relative else "Error [m]"
+    by = ranking.reference
+    title = ("× oracle" if by.bounds and by.paired else "× reference") if by.estimator else "Error [m]"
     scored = [r for r in ranking.rows if r.ranked and math.isfinite(r.score)]
     shown = [
         c
@@ -226,11 +227,12 @@ def _table(
                 else None,
             }
         rows.append(item)
-    explanation = f"Geometric mean over the runs of the error, divided by {ranking.reference.text}."
+    explanation = f"Geometric mean over the runs of the error, divided by {by.text}."
+    columns = board_columns(title, explanation, bar_scale(scored), shown)
     return {
         "name": "main",
         "title": f"{ranking.scenario}: ranking",
-        "columns": board_columns(title, explanation, bar_scale(scored), shown),
+        "columns": [c for c in columns if c["key"] not in OVER_SCENARIOS],
         "rows": rows,
     }
 

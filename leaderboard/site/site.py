@@ -36,6 +36,7 @@ from simnav.leaderboard.results.citation import citation
 from simnav.leaderboard.results.errors import RequestError
 from simnav.leaderboard.results.export import Document
 from simnav.leaderboard.results.formats import formats, write
+from simnav.leaderboard.results.home import NOWHERE, Home
 from simnav.leaderboard.results.provenance import benchmark_of, distinct
 
 from .background import background_of, prepare
@@ -79,6 +80,7 @@ def build(
     figures: bool = False,
     sweeps: Sequence[SweepFile] = (),
     seeds: Mapping[str, Sequence[int]] | None = None,
+    home: Home = NOWHERE,
 ) -> Path:
     """Write the site.
 
@@ -108,6 +110,8 @@ def build(
         Over dials of the scenarios (`simnav.leaderboard.site.sweeps.sweeps_in`).
     seeds : mapping of str to sequence of int, optional
         By scenario, the runs that have series, where not all have.
+    home : Home
+        Where the repository and the documentation are (`simnav.leaderboard.results.home.linked_from`).
 
     Returns
     -------
@@ -126,7 +130,7 @@ def build(
     with _in_place_of(output) as draft:
         catalogued.cache_clear()
         report = progress or (lambda *_, **__: None)
-        site = _Site(results, ranking, draft, command or reproduce(results), report, workers, papers, editions)
+        site = _Site(results, ranking, draft, command or reproduce(results), report, workers, papers, editions, home)
         site.write(runs_shown, figures, sweeps, seeds or {})
     return output / "index.html"
 
@@ -248,17 +252,19 @@ class _Site:
         workers: int,
         papers: Sequence[ExtraPage],
         editions: Sequence[ExtraPage],
+        home: Home,
     ):
         self.results = sorted(results, key=lambda r: (r.scenario, r.estimator, r.seed))
         self.ranking, self.folder, self.progress, self.workers = ranking, folder, progress, workers
         self.runs = group(self.results)
         self.pages = environment()
         self.estimators, self.scenarios = entries(self.runs, ranking)
-        provenances = [r.provenance for r in self.results]
+        provenances, tried = [r.provenance for r in self.results], [r.provenance for r in self.results if r.tried]
         self.facts = SiteFacts(
             version=version("simnav"),
             generated=datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
             total=len(self.results),
+            runs=len(tried),
             scenarios=list(self.scenarios.values()),
             estimators=list(self.estimators.values()),
             papers=papers,
@@ -266,7 +272,8 @@ class _Site:
             command=command,
             benchmark=benchmark_of(provenances),
             provenance=distinct(provenances),
-            citation=citation(provenances),
+            citation=citation(tried),
+            home=home,
         )
 
     def write(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import json
+import math
 import os
 import re
 import runpy
@@ -16,6 +17,7 @@ from typing import Any
 import pytest
 
 from simnav.estimator import make
+from simnav.geometry import earth
 from simnav.scenario import load
 from simnav.testing.contract_check import check
 
@@ -43,6 +45,20 @@ def simnav(folder: Path, line: str, *more: str) -> str:
     done = subprocess.run([sys.executable, "-m", *words, *more], cwd=folder, env=wide, capture_output=True, text=True)
     assert done.returncode == 0, f"{line}\n{done.stderr}"
     return done.stdout
+
+
+def test_the_contract_states_the_earth_of_the_simulator():
+    page = text("reference/estimator-contract.md")
+    names = ("SEMI_MAJOR_AXIS", "EQUATORIAL_GRAVITY", "SOMIGLIANA", "ROTATION_RATE", "GRAVITATIONAL_CONSTANT")
+    stated = {float(x) for x in re.findall(r"\d+\.?\d*(?:e[+-]?\d+)?", page)}
+    assert [name for name in names if getattr(earth, name) not in stated] == []
+    assert f"1/{1.0 / earth.FLATTENING:.9f}" in page
+    # the formula as it is written there, at 60 degrees and 3 km below the surface
+    s2, h, f, a = 0.75, -3000.0, 1.0 / 298.257223563, 6378137.0
+    surface = 9.7803253359 * (1 + 0.00193185265241 * s2) / (1 - (2 * f - f * f) * s2) ** 0.5
+    m = 7.292115e-5**2 * a**2 * a * (1 - f) / 3.986004418e14
+    written = surface * (1 - 2 / a * (1 + f + m - 2 * f * s2) * h + 3 * h**2 / a**2)
+    assert written == pytest.approx(float(earth.gravity(math.radians(60.0), h)), rel=1e-14)
 
 
 # -- the site ------------------------------------------------------------------------------------------------
@@ -135,7 +151,7 @@ def test_the_first_estimator_as_a_notebook(tmp_path, monkeypatch):
     _, checked, ran, evaluated, called = [
         "".join(o.get("text", "") for o in c.outputs) for c in found.cells if c.cell_type == "code"
     ]
-    assert "alpha-beta passes" in checked
+    assert "alpha_beta passes" in checked
     assert "ship-ekf" in ran
     assert (tmp_path / "run.png").stat().st_size > 10_000
     assert "alpha_beta" in evaluated

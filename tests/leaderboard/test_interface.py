@@ -91,7 +91,8 @@ def call_leaderboard() -> Any:
     made = simnav.site("out", output="mine", workers=1)
     assert made.index == Path("mine/index.html").resolve()
     assert json.loads(made.index.with_name("results.json").read_text())["results"]
-    assert made.to_dict()["runs"] == len(results_of("out")) == 4
+    assert len(results_of("out")) == 4
+    assert made.to_dict()["runs"] == sum(r.tried for r in results_of("out"))
     return made.to_dict()
 
 
