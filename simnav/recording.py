@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simnav.declared_process import DeclaredProcess, Factor
+from simnav.labels import FaultLabel
 from simnav.timing import TimingSheet
 from simnav.types import (
     Array,
@@ -36,60 +37,14 @@ from simnav.types import (
     TriadDatasheet,
 )
 
-__all__ = [
-    "CLOCK_JUMP",
-    "REFLECTION",
-    "AidStream",
-    "Block",
-    "FaultLabel",
-    "ImuLabels",
-    "Recording",
-    "RecordingError",
-    "packets",
-]
+__all__ = ["AidStream", "Block", "ImuLabels", "Recording", "RecordingError", "packets"]
 
 #: Version of the files that `Recording.save` writes. It is increased when their format changes.
 FORMAT = 1
-#: Kinds of labels that no fault of a scenario makes: of errors by reflections, which the surroundings make, and of the
-#: first readings after a step of a receiver's clock.
-REFLECTION, CLOCK_JUMP = "reflection", "clock_jump"
 
 
 class RecordingError(ValueError):
     """A file is not a recording that this version of simnav can read."""
-
-
-@dataclass(frozen=True, eq=False)
-class FaultLabel:
-    """One fault of a run. Estimators do not receive it.
-
-    Attributes
-    ----------
-    kind : str
-        Kind of the fault in the scenario (``outage``, ``gross_error``, ...).
-    instruments : tuple of str
-        Names of the instruments that it affects.
-    start, end : float
-        Beginning and end of the fault [s].
-    parameters : mapping
-        The parameters of the fault in the scenario (sizes, probability, correlation time), as fields of its
-        specification, SI units.
-    channels : tuple of str
-        The channels of the instruments that it affects; empty: all.
-    """
-
-    kind: str
-    instruments: tuple[str, ...]
-    start: float
-    end: float
-    parameters: Mapping[str, Any] = field(default_factory=dict)
-    channels: tuple[str, ...] = ()
-
-    @property
-    def where(self) -> str:
-        """The affected instruments, with their channels in brackets, for a listing; empty without instruments."""
-        names = ", ".join(self.instruments)
-        return f"{names} [{', '.join(self.channels)}]" if self.channels else names
 
 
 def _no_channel() -> NDArray[np.int16]:

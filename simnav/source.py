@@ -5,7 +5,8 @@ from __future__ import annotations
 import contextlib
 from typing import TYPE_CHECKING, Protocol
 
-from simnav.recording import Block, FaultLabel, Recording
+from simnav.labels import FaultLabel
+from simnav.recording import Block, Recording
 from simnav.types import InitialState, Instruments, NavigationStates
 
 if TYPE_CHECKING:

@@ -27,7 +27,8 @@ import numpy as np
 from simnav.estimators.models.channels import of_channels, whole
 from simnav.estimators.models.declared_errors import error_of_fault
 from simnav.estimators.models.fault_states import FaultState
-from simnav.recording import REFLECTION, AidStream, FaultLabel, Recording
+from simnav.labels import REFLECTION, FaultLabel
+from simnav.recording import AidStream, Recording
 from simnav.sensors.faults import FAULTS, effect_of, size_by_component, size_range
 from simnav.types import KINDS, Array, Instruments, Measurement
 

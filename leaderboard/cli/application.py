@@ -50,7 +50,7 @@ def root(
     ] = None,
     figure_width: Annotated[
         float | None,
-        typer.Option(min=50.0, max=1000.0, help="Width of figures that are written [mm], such as 88 or 180."),
+        typer.Option(min=50.0, max=1000.0, help="Width of figures that are written, in mm, such as 88 or 180."),
     ] = None,
 ) -> None:
     """The open benchmark for marine integrated navigation: simulate, estimate, score, rank."""

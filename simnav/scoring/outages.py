@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from simnav.recording import FaultLabel, Recording
+from simnav.labels import FaultLabel
+from simnav.recording import Recording
 from simnav.scoring.navigation_error import horizontal
 from simnav.scoring.registry import Better, ScoringInput, register_score
 from simnav.sensors.faults import effect_of

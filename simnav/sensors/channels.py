@@ -12,7 +12,8 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from simnav.recording import AidStream, FaultLabel
+from simnav.labels import FaultLabel
+from simnav.recording import AidStream
 from simnav.sensors.error_processes import TotalError
 from simnav.sensors.instrument import AidSpec, Instrument, InstrumentError, label_of, raised
 from simnav.sensors.processes import GaussMarkov

@@ -35,7 +35,8 @@ from simnav.blocks import StateBlock
 from simnav.geometry.earth import displace
 from simnav.geometry.rotation import dcm_from_rotation_vector
 from simnav.kinds import Component, Datasheet, Kind, NavigationPoint, speed_components
-from simnav.recording import REFLECTION, AidStream, FaultLabel
+from simnav.labels import REFLECTION, FaultLabel
+from simnav.recording import AidStream
 from simnav.sensors.channels import ChannelInstrument
 from simnav.sensors.instrument import (
     ZERO,

@@ -43,7 +43,8 @@ from pydantic import (
 from simnav.blocks import StateBlock
 from simnav.geometry.earth import displace
 from simnav.kinds import Component, Kind
-from simnav.recording import CLOCK_JUMP, REFLECTION, AidStream, FaultLabel
+from simnav.labels import CLOCK_JUMP, REFLECTION, FaultLabel
+from simnav.recording import AidStream
 from simnav.satellites.ephemeris import Ephemerides
 from simnav.satellites.multipath import multipath_error, sea_reflection, strength_change
 from simnav.satellites.orbit import SPEED_OF_LIGHT

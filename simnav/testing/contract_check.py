@@ -63,9 +63,10 @@ accelerometer = { bias_ug = 200.0, random_walk_ug_sqrt_hz = 50.0 }
 
 _HALF = 30.0  # s
 #: How much of the recording an estimator without one of its instruments runs over [s].
-_THIRD = 20.0
-#: Interval of the readings of an instrument with channels: a reading of n channels costs as much as n others [s].
-_CHANNELS_EVERY = 5.0
+_THIRD = 12.0
+#: Interval of the readings of an instrument with channels or with states of its own: a reading of n channels costs as
+#: much as n others, and states make each epoch dear [s].
+_DEAR_EVERY = 10.0
 
 #: How far the first estimate may be from the initial state: multiples of its sigma, and the motion of one second.
 _SIGMAS, _CHANGE = 6.0, {"velocity": 1.0, "attitude": 0.1}
@@ -310,8 +311,9 @@ def _contract_scenario(specs: Sequence[type[AidSpec]]) -> Scenario:
     table = tomllib.loads(SCENARIO)
     for cls in specs:
         kind = cls.model_fields["kind"].default
-        rare = {"rate_hz": 1.0 / _CHANNELS_EVERY} if cls.from_toml({**cls.example, "kind": kind}).channels() else {}
-        table["instruments"][kind] = {**cls.example, **rare}
+        spec = cls.from_toml({**cls.example, "kind": kind})
+        dear = spec.channels() or len(spec.blocks()) > 1
+        table["instruments"][kind] = {**cls.example, **({"rate_hz": 1.0 / _DEAR_EVERY} if dear else {})}
     return Scenario.from_toml(table, source="the contract test")
 
 

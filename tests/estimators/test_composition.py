@@ -400,9 +400,9 @@ def test_any_adaptation_works_with_any_solver(recording, plain, solver: str, noi
 
 @pytest.mark.usefixtures("clean_registry")
 def test_a_new_row_is_short():
-    """Every declaration of ours, its docstring aside, has at most ten lines."""
+    """Every declaration of ours has at most ten lines; its docstring and its version aside, which have its history."""
     for name in names():
-        body = re.sub(r'"""(?s:.*?)"""', "", inspect.getsource(find(name)))
+        body = re.sub(r'"""(?s:.*?)"""|^    version = .*', "", inspect.getsource(find(name)), flags=re.MULTILINE)
         assert len([line for line in body.splitlines() if line.strip()]) <= 10, name
 
 

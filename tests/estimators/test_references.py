@@ -11,7 +11,8 @@ import pytest
 from simnav.estimator import find, make
 from simnav.estimators.adaptations.base import Innovation
 from simnav.estimators.adaptations.truth import FaultTimes, FisherNoise, MixtureNoise, TrueNoise, fisher_information
-from simnav.recording import AidStream, FaultLabel
+from simnav.labels import FaultLabel
+from simnav.recording import AidStream
 from simnav.scenario import Scenario, load
 from simnav.scoring import errors
 from simnav.scoring.consistency import nees, nees_band

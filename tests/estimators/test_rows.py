@@ -12,7 +12,7 @@ from filterpy.kalman import KalmanFilter, MerweScaledSigmaPoints, UnscentedKalma
 from simnav.estimator import UnsuitableScenario, make, names
 from simnav.estimators.filterpy_adapter import FilterpyEstimator
 from simnav.estimators.rows.dead_reckoning import DeadReckoning
-from simnav.recording import FaultLabel
+from simnav.labels import FaultLabel
 from simnav.scenario import load
 from simnav.source import record
 from simnav.testing.contract_check import CHECKS, Candidate, check

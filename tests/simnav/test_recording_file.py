@@ -9,14 +9,8 @@ import numpy as np
 import pytest
 
 import simnav.recording
-from simnav.recording import (
-    AidStream,
-    Block,
-    FaultLabel,
-    ImuLabels,
-    Recording,
-    RecordingError,
-)
+from simnav.labels import FaultLabel
+from simnav.recording import AidStream, Block, ImuLabels, Recording, RecordingError
 from simnav.types import (
     Datasheet,
     ImuDatasheet,

@@ -15,8 +15,8 @@ from typing import Annotated, Any, ClassVar, Literal, Self, TypeVar, get_args
 from pydantic import BeforeValidator, SerializerFunctionWrapHandler, model_serializer, model_validator
 from pydantic.fields import FieldInfo
 
+from simnav.labels import FaultLabel
 from simnav.plugins import PluginError, Registry, registered_kind, with_named_errors
-from simnav.recording import FaultLabel
 from simnav.sensors.faults.sizes import QUANTITIES, QUANTITY_OF, axes_of, size_by_component
 from simnav.spec import NonNegative, Positive, Spec, SpecError, closest, quantity, unit_of
 from simnav.types import KINDS, Array

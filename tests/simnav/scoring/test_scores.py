@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from simnav.recording import FaultLabel, Recording
+from simnav.labels import FaultLabel
+from simnav.recording import Recording
 from simnav.scoring import SCORES, score, series
 from simnav.scoring.accuracy import distance_travelled
 from simnav.scoring.outages import outages
