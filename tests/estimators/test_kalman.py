@@ -226,7 +226,7 @@ def long_recordings(recording_of) -> dict[bool, Recording]:
 
 
 @pytest.mark.parametrize("name", names())
-@settings(max_examples=2, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=1, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.data())
 def test_every_estimator_stays_finite_on_bad_input(long_recordings, run_over, name: str, data: st.DataObject):
     """Gaps of minutes, absurd values, repetitions, disorder, late measurements: finite, or a sentence."""

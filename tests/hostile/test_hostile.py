@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from simnav.leaderboard.campaign.confinement import bubblewrap
+from simnav.leaderboard.campaign.confinement.attempt import chosen_confinement
 from simnav.warmup import warmup
 from tests.fuzz import fuzz_logs, fuzz_tomls
 from tests.hostile.answers import fuzz_answers
@@ -24,11 +24,10 @@ def warm() -> None:
     warmup(load=False)
 
 
-@pytest.fixture(params=["process", "bubblewrap"])
-def confinement(request: pytest.FixtureRequest) -> str:
-    if request.param == "bubblewrap" and bubblewrap.available():
-        pytest.skip(bubblewrap.available())
-    return str(request.param)
+@pytest.fixture(scope="module")
+def confinement() -> str:
+    """The one that campaigns use here; ``python -m tests.audit security`` tries each."""
+    return chosen_confinement()
 
 
 def test_no_cheat_gains(tmp_path: Path) -> None:

@@ -67,7 +67,7 @@ def small_pictures(monkeypatch, chart):
 
 
 #: Scenarios of different sorts, which have every task here.
-WHOLE = ("OpenSea", "CoastalVoyage", "RandomVoyages", "TrainingShips", "ShipNbp1406", "CarKitti", "TwelveHours")
+WHOLE = ("OpenSea", "CoastalVoyage", "RandomVoyages", "ShipNbp1406")
 
 
 def some_ids():
