@@ -187,7 +187,7 @@ def _read(path: Path) -> Header | None:
         training=table.get("training") is True,
         path=path,
         recorded=re.search(r"^\[log[\].]", text, re.MULTILINE) is not None,
-        channels=re.search(r"^[^#\n]*\bkind *= *[\"']gnss_raw[\"']", text, re.MULTILINE) is not None,
+        channels=re.search(r"^[^#\n]*\bkind *= *[\"'](gnss_raw|dvl_beams)[\"']", text, re.MULTILINE) is not None,
     )
 
 

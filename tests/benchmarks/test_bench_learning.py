@@ -53,7 +53,6 @@ def test_vector_forms_side_by_side(bank, benchmark):
     for envs in others.values():
         envs.reset(seed=1)
     rates = {name: [] for name in ("bank", *others)}
-    bank.reset(seed=1)
     for _ in range(5):  # in turn
         rates["bank"].append(rate(bank, 36))
         for name, envs in others.items():

@@ -34,7 +34,7 @@ from simnav.estimators.solvers.kalman import KalmanEstimator
 from simnav.scenario import load
 from simnav.source import record
 from simnav.types import Estimate, InitialState, Instruments, Measurements
-from tests.cases.sorts_of_rows import first_of_each_sort
+from tests.cases.sorts_of_rows import first_of_each_solver
 
 #: Seconds of the open sea, by whether the row is slow.
 PIECES = {False: (120, 600), True: (30, 120)}
@@ -160,7 +160,7 @@ def table(request):
 @pytest.mark.benchmark(group="memory")
 @pytest.mark.parametrize("name", ROWS)
 def test_peak_memory(benchmark, sea: Sea, peer: Callable[[tuple[int, int]], int], table: list, name: str):
-    if not benchmark.enabled and name not in first_of_each_sort():
+    if not benchmark.enabled and name not in first_of_each_solver():
         pytest.skip("a row of the same pieces is there: with --benchmark-enable only")
     slow, on_gtsam = describe(name).slow, name.startswith("gtsam-")
     if slow and not benchmark.enabled:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cache
 
 from simnav.estimator import make, names
 
-__all__ = ["first_of_each_sort"]
+__all__ = ["first_of_each_solver", "first_of_each_sort"]
 
 
 def _sort(name: str) -> tuple[object, ...]:
@@ -21,7 +22,17 @@ def _sort(name: str) -> tuple[object, ...]:
 @cache
 def first_of_each_sort() -> list[str]:
     """The first row of each sort, in the order of the names."""
+    return _first_of_each(_sort)
+
+
+@cache
+def first_of_each_solver() -> list[str]:
+    """The first row of each class of solver and model: fewer than of sorts."""
+    return _first_of_each(lambda name: _sort(name)[:2])
+
+
+def _first_of_each(sort: Callable[[str], tuple[object, ...]]) -> list[str]:
     found: dict[tuple[object, ...], str] = {}
     for name in names():
-        found.setdefault(_sort(name), name)
+        found.setdefault(sort(name), name)
     return list(found.values())

@@ -17,16 +17,16 @@ from simnav.scenario import load
 from simnav.source import record
 from simnav.testing.contract_check import CHECKS, Candidate, check
 from simnav.types import Datasheet, Instruments
-from tests.cases.sorts_of_rows import first_of_each_sort
+from tests.cases.sorts_of_rows import first_of_each_solver
 
 # All checks of one of these take from three to twelve seconds.
 SLOW = {"fgo-unsimplified", "gtsam-batch", "gtsam-fixed-lag", "gtsam-gnc", "solution-separation"}
-WHOLE = [name for name in first_of_each_sort() if name not in SLOW]
+WHOLE = [name for name in first_of_each_solver() if name not in SLOW]
 
 
 @pytest.mark.parametrize("name", WHOLE)
 def test_the_contract(name: str):
-    """All checks, for one row of each sort of pieces; ``python -m tests.audit contract`` does it for every row."""
+    """All checks, for one row of each solver and model; ``python -m tests.audit contract`` does it for every row."""
     report = check(name)
     assert report.passed, str(report)
 
