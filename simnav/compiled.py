@@ -171,7 +171,7 @@ class Kernel(Generic[Parameters, Returned]):
         with _compiling:
             if self._dispatcher is None:
                 directory = self.directory()
-                if self.signature is not None and not _holds(directory) and (tell := _announce.get()) is not None:
+                if self.signature is not None and (tell := _announce.get()) is not None and not _holds(directory):
                     _announce.set(None)
                     tell()
                 if directory is not None:
