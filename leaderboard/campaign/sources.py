@@ -264,6 +264,13 @@ def followed(files: Iterable[Path]) -> dict[str, str]:
     return dict(sorted(walk.found.items()))
 
 
+#: Of simnav: what has no kernels. And modules of others that do not import simnav.
+_WITHOUT_KERNELS = {"simnav.types"} | {
+    f"simnav.{name}" for name in ("Estimate", "Estimator", "Instruments", "InitialState", "Measurements", "register")
+}
+_ALSO_WITHOUT = {*sys.stdlib_module_names, "numpy", "scipy", "filterpy"} - {"importlib", "runpy"}
+
+
 def may_call_kernels(file: str) -> bool:
     """Whether an estimator may call kernels of simnav: False if its files import only what surely has none.
 
@@ -280,13 +287,6 @@ def may_call_kernels(file: str) -> bool:
     return any(
         module not in _WITHOUT_KERNELS and module.partition(".")[0] not in _ALSO_WITHOUT for module in walk.foreign
     )
-
-
-#: Of simnav: what has no kernels. And modules of others that do not import simnav.
-_WITHOUT_KERNELS = {"simnav.types"} | {
-    f"simnav.{name}" for name in ("Estimate", "Estimator", "Instruments", "InitialState", "Measurements", "register")
-}
-_ALSO_WITHOUT = {*sys.stdlib_module_names, "numpy", "scipy", "filterpy"} - {"importlib", "runpy"}
 
 
 class _Walk:

@@ -39,6 +39,7 @@ def test_every_scenario_loads_and_is_what_its_head_says(header: Header):
     assert (scenario.id, scenario.gym_id) == (header.id, header.gym_id)
     assert (scenario.duration, scenario.title, scenario.tags) == (header.duration, header.title, header.tags)
     assert (scenario.track, scenario.group) == (header.track, header.group)
+    assert header.channels == any(spec.channels() for spec in scenario.aids.values())
     assert header.path.stem in (scenario.name, scenario.id)
     assert load(header.path) == scenario
 
