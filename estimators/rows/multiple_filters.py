@@ -46,9 +46,11 @@ class SolutionSeparationEkf(Row, solver=SolutionSeparation, model=Suitable):
         disturbed IMU would explain why it disagrees, and an excluded one is used again where the position without it
         becomes more uncertain than the separation was. What a compass says does not condemn it, nor does a filter that
         has just begun.
+    3
+        It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
     """
 
-    version = 2
+    version = 3
 
 
 @register("mid-value")
@@ -71,4 +73,11 @@ class MidValue(
     Source: S. Osder, *Practical view of redundancy management application and theory*, J. Guidance, Control, and
     Dynamics 22(1), 1999; H. W. Sorenson and D. L. Alspach, *Recursive Bayesian estimation using Gaussian sums*,
     Automatica 7(4), 1971.
+
+    Versions
+    --------
+    2
+        It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
     """
+
+    version = 2
