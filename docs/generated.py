@@ -17,7 +17,7 @@ NOTE = "*This page is generated from the code.*"
 
 
 def on_files(files: Files, config: MkDocsConfig) -> Files:
-    """Add the generated pages."""
+    """Put the generated pages in the place of those that stand for them in a checkout."""
     pages = {
         "reference/commands.md": commands(),
         "reference/rows.md": rows(),
@@ -28,6 +28,8 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
     files.remove(python)
     pages["reference/python.md"] = f"{python.content_string}\n{calls()}"
     for path, text in pages.items():
+        if (stands := files.get_file_from_path(path)) is not None:
+            files.remove(stands)
         files.append(File.generated(config, path, content=text))
     return files
 

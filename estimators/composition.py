@@ -140,8 +140,8 @@ class Piece:
         return self.make(**pieces, **{**self.fixed, **self.defaults, **values})
 
 
-#: The kinds of receivers that solve raw observations.
-_RECEIVERS = ("gnss_receiver",)
+#: The kinds of instruments that solve the raw readings of another one.
+_SOLUTIONS = ("gnss_receiver", "dvl_solution")
 _NAMED = (inspect.Parameter.POSITIONAL_OR_KEYWORD, inspect.Parameter.KEYWORD_ONLY)
 
 
@@ -184,7 +184,8 @@ class Row(Estimator):
         The pieces: ``solver``, and the pieces of the solver.
     loose : bool
         True for a row that takes the solution of a receiver in place of the raw observations which it solves
-        (`simnav.estimators.models.coupling`). Such a row needs a receiver.
+        (`simnav.estimators.models.coupling`). Such a row needs a receiver. Any row is one if it is made with ``loose``
+        (`simnav.estimator.make`).
     solver : Estimator
         The solver with its pieces. Its attributes are also attributes of the row: ``row.model``, ``row.covariance``.
 
@@ -196,7 +197,7 @@ class Row(Estimator):
     """
 
     recipe: ClassVar[Mapping[str, Piece]] = {}
-    loose: ClassVar[bool] = False
+    loose: bool = False
     solver: Estimator
     #: What is done with readings that arrive late: the parameter ``late`` of `simnav.estimator.make`.
     late: Manner = "replay"
@@ -242,13 +243,13 @@ class Row(Estimator):
 
     @property
     def needs(self) -> Needs:
-        """The instruments that its solver needs; and a receiver, if it is loosely coupled."""
-        return (*self.solver.needs, _RECEIVERS) if self.loose else self.solver.needs
+        """The instruments that its solver needs; and one that solves raw readings, if it is loosely coupled."""
+        return (*self.solver.needs, _SOLUTIONS) if self.loose else self.solver.needs
 
     def reset(self, start: InitialState, instruments: Instruments) -> None:
         """Begin a run; UnsuitableScenario where the pieces lack an instrument."""
         if self.loose:
-            if lack := lacking((_RECEIVERS,), instruments):
+            if lack := lacking((_SOLUTIONS,), instruments):
                 raise UnsuitableScenario(f"{self.name}: {lack}")
             instruments = instruments.without({name for sheet in instruments.values() for name in sheet.sources})
         self._instruments = instruments

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,10 +14,13 @@ from simnav.spec import UNITS, SpecError
 from simnav.types import Array, ImuDatasheet, ImuSamples, TriadDatasheet
 
 from .figures.allan_figure import Panel, allan_panels
+from .ranking import tables
 from .results.frame import frame
+from .results.shown import Shown
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+    from rich.table import Table
 
     from simnav.scenario import Scenario
 
@@ -62,8 +65,8 @@ def markov_variance(sheet: TriadDatasheet, time: Array) -> Array:
     return np.asarray(variance)
 
 
-@dataclass(frozen=True, eq=False)
-class AllanReport:
+@dataclass(frozen=True, eq=False, repr=False)
+class AllanReport(Shown):
     """The Allan deviation of the six axes of an IMU.
 
     Attributes
@@ -86,6 +89,27 @@ class AllanReport:
     duration: float
     curve: AllanCurve
     datasheet: ImuDatasheet | None
+
+    def headline(self) -> str:
+        """Of what, and how long."""
+        length = f"{self.duration / 3600.0:.3g} h at {self.rate:.4g} Hz"
+        return f"{self.title}: Allan deviation, {self.origin}, {length}"
+
+    def shown(self) -> Sequence[Table]:
+        """A row for each axis."""
+        rows = []
+        for row in self.rows():
+            cells = [row["axis"].replace("_", " ")]
+            for name in ("random_walk", "lowest"):
+                told = row[f"{name}_datasheet"]
+                beside = "" if told is None else f" ({tables.number(told)})"
+                at = f" at {tables.number(row['lowest_at_s'])} s" if name == "lowest" else ""
+                cells.append(f"{tables.number(row[name])}{beside} {row[f'{name}_unit']}{at}")
+            cells.append(f"{tables.number(row['bias_instability'])} {row['lowest_unit']}")
+            cells.append(f"{tables.number(row['rate_random_walk'])} {row['rate_random_walk_unit']}")
+            rows.append(cells)
+        columns = ["axis", "white noise", "lowest", "bias instability", "random walk"]
+        return [tables.table(self.headline(), columns, rows)]
 
     def rows(self) -> list[dict[str, Any]]:
         """A row for each axis, in the units of datasheets: coefficients, lowest deviation, and the datasheet."""

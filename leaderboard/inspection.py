@@ -167,7 +167,7 @@ def cite(request: CiteRequest) -> Citation:
     """
     from simnav.leaderboard.results.citation import citation
 
-    found = None if request.results is None else [r.provenance for r in results_of(request.results)]
+    found = None if request.results is None else [r.provenance for r in results_of(request.results) if r.tried]
     return citation(found, request.author)
 
 

@@ -19,7 +19,7 @@ from .claiming import claim
 from .costing import bench, costs
 from .given import results_of, scenario_of, scenarios_of
 from .inspection import allan, bound, cite, merge, rank, realism, reproduce, rescore, seal, verify
-from .logs import align, export, inspect_log, score_files, tune_noise
+from .logs import align, export, inspect_log, recordings, score_files, tune_noise
 from .requests import ScenarioLike, Scenarios
 from .running import campaign, check, evaluate, make, record, robustness, run, sweep, tune
 
@@ -46,6 +46,7 @@ __all__ = [
     "rank",
     "realism",
     "record",
+    "recordings",
     "reproduce",
     "rescore",
     "results_of",

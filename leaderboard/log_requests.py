@@ -11,7 +11,7 @@ from simnav.leaderboard.campaign.options import PathLike
 from .calls import option, request
 from .requests import ScenarioLike, Scenarios
 
-__all__ = ["AlignRequest", "ExportRequest", "InspectRequest", "ScoreRequest", "TuneNoiseRequest"]
+__all__ = ["AlignRequest", "ExportRequest", "InspectRequest", "RecordingsRequest", "ScoreRequest", "TuneNoiseRequest"]
 
 _SCENARIO = "Name, versioned id, or path of a TOML file."
 _SCENARIO_MORE = "Or the `simnav.scenario.Scenario` itself."
@@ -43,7 +43,9 @@ class ExportRequest:
     )
     output: PathLike = option("--output", "-o", help="File or folder to write; of several runs a folder.")
     _: KW_ONLY
-    form: str = option("--format", default="csv", help="Format, such as csv, npz, gpx, kml, tum, nmea or mcap.")
+    form: str = option(
+        "--format", default="csv", help="Format, such as csv, npz, gpx, kml, tum, nmea, mcap, rinex or pd0."
+    )
     seed: int = option(default=0, help="Seed of the first run; the others count up.", least=0)
     runs: int = option("--runs", "-n", default=1, help="Seeds of each scenario.", least=1)
     truth: bool = option("--truth", default=False, help="Write truth and fault labels, too.")
@@ -64,11 +66,35 @@ class AlignRequest:
 
 
 @request
+class RecordingsRequest:
+    """List public recordings of real voyages, or make scenarios from their downloaded files."""
+
+    files: Iterable[PathLike] = option(
+        default=(),
+        help="Downloaded files, or folders with them; told by their checksums. Default: none, list what is known.",
+        argument=True,
+        metavar="FILES",
+        cli=list[Path],
+    )
+    _: KW_ONLY
+    scenarios: Iterable[str] | str | None = option(
+        "--scenario", "-s", default=None, metavar="NAMES", help="Only these, separated by commas. Default: all.",
+        cli=str | None,
+    )  # fmt: skip
+    output: PathLike | None = option(
+        "--output", "-o", default=None, metavar="FOLDER", help="Data folder. Default: SIMNAV_DATA, or ./data."
+    )
+
+
+@request
 class TuneNoiseRequest:
     """Propose noise figures for the datasheets of a log, from its reference and the stillest stretches of its IMU."""
 
     scenario: ScenarioLike = option(help=_SCENARIO, more=_SCENARIO_MORE, argument=True, metavar="SCENARIO")
     seed: int = option(default=0, help="Number of the recording.", least=0)
+    innovations: bool = option(
+        "--innovations", default=False, help="Also those with which the innovations of a filter are as it expects."
+    )
 
 
 @request

@@ -10,7 +10,14 @@ from simnav.leaderboard.results.errors import RequestError, mistakes
 
 from .calls import call, whole_number
 from .given import absolute, scenario_of, scenarios_of
-from .log_requests import AlignRequest, ExportRequest, InspectRequest, ScoreRequest, TuneNoiseRequest
+from .log_requests import (
+    AlignRequest,
+    ExportRequest,
+    InspectRequest,
+    RecordingsRequest,
+    ScoreRequest,
+    TuneNoiseRequest,
+)
 
 if TYPE_CHECKING:
     from simnav.log.alignment import Alignment
@@ -18,9 +25,10 @@ if TYPE_CHECKING:
     from simnav.log.noise_figures import Figure
     from simnav.scenario import Scenario
 
+    from .recordings import PublicRecordings
     from .single_run import RunReport
 
-__all__ = ["align", "export", "inspect_log", "score_files", "tune_noise"]
+__all__ = ["align", "export", "inspect_log", "recordings", "score_files", "tune_noise"]
 
 
 @call(ScoreRequest)
@@ -144,6 +152,32 @@ def align(request: AlignRequest) -> list[Alignment]:
         return align(scenario, whole_number("seed", request.seed, 0))
 
 
+@call(RecordingsRequest)
+def recordings(request: RecordingsRequest) -> list[PublicRecordings]:
+    """Public recordings of real voyages, and the scenarios that their downloaded files give.
+
+    Returns
+    -------
+    list of simnav.leaderboard.recordings.PublicRecordings
+
+    Raises
+    ------
+    RequestError
+        If there is no such scenario or file, or no file is one of a recording.
+    """
+    from .recordings import public_recordings, take
+
+    given = [request.files] if isinstance(request.files, (str, os.PathLike)) else list(request.files or ())
+    asked = request.scenarios or ()
+    names = [n.strip() for n in asked.split(",")] if isinstance(asked, str) else list(asked)
+    output = None if request.output is None else absolute(request.output)
+    if not given:
+        return public_recordings(names, output)
+    root = absolute(os.environ.get("SIMNAV_DATA", "data")) if output is None else output
+    with mistakes(OSError):
+        return take([absolute(path) for path in given], root, names)
+
+
 @call(TuneNoiseRequest)
 def tune_noise(request: TuneNoiseRequest) -> list[Figure]:
     """Noise figures for the datasheets of a log.
@@ -160,9 +194,12 @@ def tune_noise(request: TuneNoiseRequest) -> list[Figure]:
     from simnav.log.alignment import align
     from simnav.log.noise_figures import noise_figures
 
+    from .white_innovations import innovation_figures
+
     scenario, seed = _recorded(request.scenario), whole_number("seed", request.seed, 0)
     with mistakes(ValueError, OSError):
-        return noise_figures(scenario, align(scenario, seed), seed)
+        found = noise_figures(scenario, align(scenario, seed), seed)
+        return found + innovation_figures(scenario, seed) if request.innovations else found
 
 
 def _recorded(given: str | Path | Scenario) -> Scenario:

@@ -20,19 +20,21 @@ from .inspection import rank
 from .publishing_requests import (
     AuditRequest,
     CheckStandardRequest,
+    DrawRequest,
     PublishRequest,
     SiteRequest,
     StandardRequest,
     SubmitRequest,
     VerifyBundleRequest,
 )
-from .running import campaign
+from .running import campaign, sweep
 
 if TYPE_CHECKING:
     from simnav.leaderboard.ranking.reports import CampaignReport, StandardReport
     from simnav.leaderboard.site.report import SiteReport
     from simnav.leaderboard.standard.auditing import Audit
     from simnav.leaderboard.standard.currency import Outdated
+    from simnav.leaderboard.standard.drawing import Drawing
     from simnav.leaderboard.standard.publication import Published
     from simnav.leaderboard.submission.bundle import Row
     from simnav.leaderboard.submission.verifying import SubmissionReport
@@ -41,6 +43,7 @@ __all__ = [
     "Submission",
     "audit_standard",
     "check_standard",
+    "draw_standard",
     "publish_standard",
     "run_standard",
     "site",
@@ -66,20 +69,23 @@ def site(request: SiteRequest) -> SiteReport:
     from simnav.leaderboard.papers.page import pages_in
     from simnav.leaderboard.ranking.agreement import rank_correlations
     from simnav.leaderboard.ranking.ranking import rank as ranked
+    from simnav.leaderboard.results.home import linked_from
     from simnav.leaderboard.site.report import SiteReport
     from simnav.leaderboard.site.site import build
+    from simnav.leaderboard.standard.drawn import attached, stored_sweeps
 
     from .results import requested, scenario_files
     from .site import sweeps as swept
 
     shown, processes = whole_number("runs_shown", request.runs_shown, 1), whole_number("workers", request.workers, 1)
-    found = results_of(request.results, series=True)
+    found, seeds = attached(results_of(request.results, series=True))
     ranking = ranked(found, tracks=scenario_files.tracks(request.results), requested=requested.read(request.results))
     correlations = () if request.against is None else tuple(rank_correlations(ranking, rank(request.against)))
+    output = absolute(request.output)
     index = build(
-        found, ranking, absolute(request.output), progress=request.progress, workers=processes,
-        papers=pages_in(Path(request.papers)), runs_shown=shown, figures=request.figures,
-        sweeps=swept.sweeps_in(Path(request.sweeps)),
+        found, ranking, output, home=linked_from(output, request.docs), progress=request.progress, workers=processes,
+        papers=pages_in(Path(request.papers)), runs_shown=shown, figures=request.figures, seeds=seeds,
+        sweeps=[*swept.sweeps_in(Path(request.sweeps)), *stored_sweeps(found)],
     )  # fmt: skip
     return SiteReport(index, found, ranking, correlations)
 
@@ -264,6 +270,32 @@ def run_standard(request: StandardRequest) -> CampaignReport:
     return CampaignReport(found, rank(found, requested=requested.read(folder)), summary)
 
 
+@call(DrawRequest)
+def draw_standard(request: DrawRequest) -> Drawing:
+    """Run what the site of the standard result draws beside scores, and keep it where it comes with simnav.
+
+    Returns
+    -------
+    simnav.leaderboard.standard.drawing.Drawing
+        What was kept, and how many runs are left.
+
+    Raises
+    ------
+    RequestError
+        If a folder holds something else.
+    """
+    from .standard import drawn
+    from .standard.drawing import draw
+
+    profile = drawn.PROFILE if request.profile is None else absolute(request.profile)
+    folder = drawn.DRAWN if request.shipped is None else absolute(request.shipped)
+    with mistakes(StoreError):
+        return draw(
+            profile, absolute(request.results), absolute(request.standard), folder, sweep=sweep,
+            minutes=request.minutes, workers=whole_number("workers", request.workers, 1), progress=request.progress,
+        )  # fmt: skip
+
+
 @call(CheckStandardRequest)
 def check_standard(request: CheckStandardRequest) -> Outdated:
     """Whether the standard result has the declared versions of today; nothing is run.
@@ -324,7 +356,9 @@ def publish_standard(request: PublishRequest) -> Published:
         If runs are missing or out of date; then nothing is written.
     """
     from simnav.leaderboard.papers.page import pages_in
+    from simnav.leaderboard.results.home import linked_from
     from simnav.leaderboard.site.site import build
+    from simnav.leaderboard.standard.drawn import attached, stored_sweeps
     from simnav.leaderboard.standard.editions import pages_of
     from simnav.leaderboard.standard.history import read
     from simnav.leaderboard.standard.publication import publish
@@ -349,6 +383,9 @@ def publish_standard(request: PublishRequest) -> Published:
     if request.site is not None:
         published = {(r.scenario, r.estimator, r.seed) for r in made.results}
         found = [r for r in results_of(working, series=True) if (r.scenario, r.estimator, r.seed) in published]
-        build(found, made.ranking, absolute(request.site), progress=request.progress, workers=request.workers,
-              papers=pages_in(Path("reproduced")), editions=pages_of(read(file)))  # fmt: skip
+        found, seeds = attached(found)
+        output = absolute(request.site)
+        build(found, made.ranking, output, home=linked_from(output), progress=request.progress, workers=request.workers,
+              papers=pages_in(Path("reproduced")), editions=pages_of(read(file)), seeds=seeds,
+              sweeps=stored_sweeps(found))  # fmt: skip
     return made

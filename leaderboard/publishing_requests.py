@@ -7,6 +7,7 @@ from dataclasses import KW_ONLY
 from pathlib import Path
 
 from simnav.leaderboard.campaign.options import PathLike, part_of
+from simnav.leaderboard.results.home import BUILT
 
 from .calls import option, request
 from .requests import (
@@ -23,6 +24,7 @@ __all__ = [
     "AuditRequest",
     "BundleOptions",
     "CheckStandardRequest",
+    "DrawRequest",
     "PublishRequest",
     "SiteRequest",
     "StandardRequest",
@@ -80,6 +82,11 @@ class SiteRequest:
     papers: PathLike = option(default="reproduced", help="Folder that 'simnav reproduce' wrote; its papers get pages.")
     sweeps: PathLike = option(
         default="results", help="Folder with the folders of sweeps; the pages of scenarios show them."
+    )
+    docs: str = option(
+        default=BUILT,
+        help="Documentation that the pages link to: a web address, or the folder that 'make docs' built.",
+        more="Without that folder, the pages link to the address that this installation of simnav names, if any.",
     )
     runs_shown: int = option(default=2, help="Runs of each scenario of which the site has track and errors.", least=1)
     figures: bool = option("--print", default=False, help="Write the charts as SVG and PNG, too.")
@@ -156,6 +163,28 @@ class CheckStandardRequest:
     """Say which rows and scenarios have another version than the standard result; nothing is run."""
 
     results: PathLike | None = option("--results", default=None, help="Folder of results. Default: those of simnav.")
+
+
+@request
+class DrawRequest:
+    """Run what the site of the standard result draws: a few rows in two runs of each scenario, and sweeps.
+
+    What comes with simnav and has the versions of today is not run again. The same command continues. Further rows get
+    the distribution of their errors from the results in the folder of `standard run`, where they have series.
+    """
+
+    _: KW_ONLY
+    minutes: float | None = option(
+        default=30.0, least=0.0, help="Start no run after so many minutes. The same command continues."
+    )
+    results: PathLike = option("--results", default="results/standard-drawn", help="Folder to work in.")
+    standard: PathLike = option(default=_WORKING, help="Folder in which 'simnav standard run' worked, if it is there.")
+    profile: PathLike | None = option(
+        default=None, help="What is run: a file like ``leaderboard/standard/drawn.toml``, the default.", cli=str
+    )
+    shipped: PathLike | None = option(default=None, help="Folder of what is drawn. Default: that of simnav.")
+    workers: int = option(default=2, help="Number of processes.", least=1)
+    progress: CampaignProgress = option(default=None, help=CAMPAIGN_PROGRESS, hidden=True)
 
 
 @request

@@ -21,6 +21,7 @@ from simnav.leaderboard.results.scratch import scratch
 from .baselines import baselines_or
 from .calls import call, whole_number
 from .given import absolute, results_of, scenario_of, scenarios_of, seeds_of
+from .printed import first_lines
 from .requests import (
     CampaignRequest,
     EvaluateRequest,
@@ -103,6 +104,7 @@ def check(estimator: EstimatorLike, **parameters: Any) -> Report:
     Returns
     -------
     simnav.testing.contract_check.Report
+        It calls the estimator as all tables do: one of a file has the name of the file.
 
     Raises
     ------
@@ -111,8 +113,9 @@ def check(estimator: EstimatorLike, **parameters: Any) -> Report:
     """
     from simnav.testing.contract_check import check
 
-    with mistakes(ValueError):
-        return check(one_request(estimator, parameters).make)
+    asked = one_request(estimator, parameters)
+    with mistakes(ValueError), first_lines(asked.label):
+        return replace(check(asked.make), estimator=asked.label)
 
 
 @call(RunRequest)

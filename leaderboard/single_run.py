@@ -26,6 +26,7 @@ from simnav.scoring import SCORES, protection_levels, score, stanford
 from simnav.scoring.consistency import badge
 from simnav.scoring.lagged import seconds_of
 
+from .printed import first_lines
 from .ranking import tables
 
 if TYPE_CHECKING:
@@ -206,7 +207,8 @@ def run_once(
     for k, (request, estimator) in enumerate(zip(requests, estimators, strict=True)):
         report(k, len(requests), note=request.label)
         started = time.perf_counter()
-        trial = run_trial(estimator, recording)
+        with first_lines(request.label):
+            trial = run_trial(estimator, recording)
         seconds = time.perf_counter() - started
         scores = score(trial, recording) if len(trial) else {}
         runs.append(EstimatorRun(request.label, request.parameters, estimator.reference, trial.status,

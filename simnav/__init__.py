@@ -39,10 +39,11 @@ if TYPE_CHECKING:
         seal,
         verify,
     )
-    from simnav.leaderboard.logs import align, export, inspect_log, score_files, tune_noise
+    from simnav.leaderboard.logs import align, export, inspect_log, recordings, score_files, tune_noise
     from simnav.leaderboard.publishing import (
         audit_standard,
         check_standard,
+        draw_standard,
         publish_standard,
         run_standard,
         site,
@@ -110,6 +111,7 @@ __all__ = [
     "cite",
     "claim",
     "costs",
+    "draw_standard",
     "evaluate",
     "export",
     "inspect_log",
@@ -123,6 +125,7 @@ __all__ = [
     "rank",
     "realism",
     "record",
+    "recordings",
     "register",
     "register_fault",
     "register_instrument",
@@ -188,12 +191,13 @@ _HOMES = {
         "seal",
         "verify",
     ),
-    "leaderboard.logs": ("align", "export", "inspect_log", "score_files", "tune_noise"),
+    "leaderboard.logs": ("align", "export", "inspect_log", "recordings", "score_files", "tune_noise"),
     "leaderboard.results.errors": ("RequestError",),
     "leaderboard.running": ("campaign", "check", "evaluate", "make", "record", "robustness", "run", "sweep", "tune"),
     "leaderboard.publishing": (
         "audit_standard",
         "check_standard",
+        "draw_standard",
         "publish_standard",
         "run_standard",
         "site",
@@ -230,17 +234,17 @@ def _register_scenarios() -> None:
                 vector_entry_point="simnav.environment:NavigationVectorEnv",
                 kwargs={"scenario": header.id},
             )
-        _register_tasks(header.gym_id, header.id, recorded=header.recorded)
+        _register_tasks(header.gym_id, header.id, recorded=header.recorded, channels=header.channels)
 
 
 # The library must not import the learning tasks (they belong to simnav.estimators): their entry points are strings.
 _LEARNING = "simnav.estimators.learning"
 
 
-def _register_tasks(gym_id: str, scenario: str, *, recorded: bool) -> None:
-    """Register the learning tasks over a scenario with Gymnasium."""
+def _register_tasks(gym_id: str, scenario: str, *, recorded: bool, channels: bool) -> None:
+    """Register the learning tasks over a scenario with Gymnasium: those around a filter take no channels."""
     name, _, version = gym_id.rpartition("-v")
-    for task in ("Tuning", "Detection", "Correction"):
+    for task in () if channels else ("Tuning", "Detection", "Correction"):
         task_id = f"{name}-{task}-v{version}"
         if task_id not in _registry:
             _register_env(

@@ -20,13 +20,14 @@ import threading
 import time
 import types
 from collections.abc import Callable, Iterator
+from contextvars import ContextVar
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, ParamSpec, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Array", "Flags", "Integers", "Kernel", "cache_directory", "kernel", "kernels", "prune"]
+__all__ = ["Array", "Flags", "Integers", "Kernel", "announced", "cache_directory", "kernel", "kernels", "prune"]
 
 #: The array type of kernels, and of everything else in simnav: float64.
 Array = NDArray[np.float64]
@@ -41,6 +42,17 @@ KEEP = 60 * 86400.0
 
 _kernels: list[Kernel[..., Any]] = []
 _compiling = threading.RLock()  # Numba takes the cache directory from a global setting
+_announce: ContextVar[Callable[[], None] | None] = ContextVar("announce", default=None)
+
+
+@contextlib.contextmanager
+def announced(tell: Callable[[], None]) -> Iterator[None]:
+    """Within this context ``tell`` is called once, before the first kernel that is not in the cache is compiled."""
+    token = _announce.set(tell)
+    try:
+        yield
+    finally:
+        _announce.reset(token)
 
 
 def cache_directory() -> Path | None:
@@ -90,7 +102,7 @@ class Kernel(Generic[Parameters, Returned]):
         The plain Python function that is compiled.
     signature : str or None
         Numba signature; with it the kernel is compiled for these types only, and can be compiled before
-        its first call. Small helpers that only other kernels call have none.
+        its first call. Small helpers that other kernels call have none; a call from Python runs them as Python.
     fastmath : bool or set of str
         Permitted changes of floating-point arithmetic; passed to Numba.
     """
@@ -152,14 +164,16 @@ class Kernel(Generic[Parameters, Returned]):
 
     def cached(self) -> bool:
         """Whether the cache holds this kernel. It must have a signature."""
-        directory = self.directory()
-        return directory is not None and any(directory.glob("*/*.nbi"))
+        return _holds(self.directory())
 
     def compile(self) -> Callable[..., Any]:
         """Compile the kernel, or load it from the cache, once. Return the compiled function."""
         with _compiling:
             if self._dispatcher is None:
                 directory = self.directory()
+                if self.signature is not None and not _holds(directory) and (tell := _announce.get()) is not None:
+                    _announce.set(None)
+                    tell()
                 if directory is not None:
                     try:
                         directory.mkdir(mode=0o700, exist_ok=True)
@@ -218,7 +232,14 @@ class Kernel(Generic[Parameters, Returned]):
     else:
 
         def __call__(self, *args: Any) -> Any:
+            if self.signature is None:  # a helper is compiled within its callers; alone it would be at the first call,
+                return self.function(*args)  # in every process anew, and a confined one cannot write what it compiles
             return (self._dispatcher or self.compile())(*args)
+
+
+def _holds(directory: Path | None) -> bool:
+    """Whether a directory of the cache holds a compiled kernel."""
+    return directory is not None and any(directory.glob("*/*.nbi"))
 
 
 def _codes(code: types.CodeType) -> Iterator[types.CodeType]:

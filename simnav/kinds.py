@@ -237,6 +237,42 @@ class Component:
         if self.cyclic and self.limit == inf:
             object.__setattr__(self, "limit", 4.0 * pi)
 
+    def __repr__(self) -> str:
+        return f"Component({self.words})"
+
+    @property
+    def words(self) -> str:
+        """Name with the unit that arrays have, in which a reader of the code computes; then the error."""
+        value = f"{self.name} [{in_arrays(self.unit)}]"
+        if self.error == self.name:
+            return value
+        return f"{value} (error: {self.error} [{in_arrays(self.error_unit)}])"
+
+
+#: Units in which arrays are, for those of files that differ; others of `simnav.spec.UNITS` are SI themselves.
+_IN_ARRAYS = {
+    **dict.fromkeys(("deg", "arcsec", "mrad"), "rad"),
+    **dict.fromkeys(("mm", "cm", "km"), "m"),
+    **dict.fromkeys(("min", "h"), "s"),
+    **dict.fromkeys(("ug", "mg", "g", "mm_s2", "m_s2"), "m/s²"),
+    **dict.fromkeys(("m_s", "mm_s", "cm_s", "kn"), "m/s"),
+    **dict.fromkeys(("deg_s", "deg_min", "deg_h"), "rad/s"),
+    **dict.fromkeys(("", "percent", "ppm"), "-"),
+    "hz": "Hz",
+    "k": "K",
+}
+
+
+def in_arrays(unit: str) -> str:
+    """The unit in which arrays have a value that is in ``unit`` in files.
+
+    >>> in_arrays("deg"), in_arrays("m_s"), in_arrays("m"), in_arrays("kpa")
+    ('rad', 'm/s', 'm', 'kpa in SI')
+    """
+    if unit in _IN_ARRAYS:
+        return _IN_ARRAYS[unit]
+    return unit if unit in ("m", "s") else f"{unit} in SI"
+
 
 def geodetic_components(*, height: bool) -> tuple[Component, ...]:
     """Components of a position: latitude, longitude and, with ``height``, height. Errors are north-east-down [m]."""
@@ -452,6 +488,11 @@ class _Kinds(Mapping[str, Kind]):
         kind: Kind = cls.definition
         return kind
 
+    def __repr__(self) -> str:
+        """A line a kind: what it measures, in the units that arrays have."""
+        lines = (f"{name}: {', '.join(c.words for c in kind.components)}" for name, kind in self.items())
+        return "<kinds of instruments, in the units of arrays>\n" + "\n".join(lines)
+
     def __iter__(self) -> Iterator[str]:
         return iter(INSTRUMENTS.items())
 
@@ -507,6 +548,9 @@ class Datasheet:
         What is known of its time stamps, and of how late readings arrive. None: nothing, or that both are perfect.
     sources : tuple of str
         Names of the instruments whose readings it solves: its errors are theirs. Whoever uses both counts them twice.
+    stated : bool
+        Whether it has no channels and states with a reading the standard deviation of its white noise, as the (d,) side
+        information. ``sigma`` is then that of readings that state none.
     """
 
     name: str
@@ -526,6 +570,7 @@ class Datasheet:
     processes: tuple[DeclaredProcess, ...] = ()
     timing: TimingSheet | None = None
     sources: tuple[str, ...] = ()
+    stated: bool = False
 
     def __post_init__(self) -> None:
         if self.kind not in KINDS:

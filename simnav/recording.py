@@ -30,17 +30,29 @@ from simnav.types import (
     Measurement,
     Measurements,
     NavigationStates,
+    ReferenceStates,
     StateBlock,
     TapStates,
     TriadDatasheet,
 )
 
-__all__ = ["REFLECTION", "AidStream", "Block", "FaultLabel", "ImuLabels", "Recording", "RecordingError", "packets"]
+__all__ = [
+    "CLOCK_JUMP",
+    "REFLECTION",
+    "AidStream",
+    "Block",
+    "FaultLabel",
+    "ImuLabels",
+    "Recording",
+    "RecordingError",
+    "packets",
+]
 
 #: Version of the files that `Recording.save` writes. It is increased when their format changes.
 FORMAT = 1
-#: Kind of the label of errors by reflections, which the surroundings make and no fault of a scenario.
-REFLECTION = "reflection"
+#: Kinds of labels that no fault of a scenario makes: of errors by reflections, which the surroundings make, and of the
+#: first readings after a step of a receiver's clock.
+REFLECTION, CLOCK_JUMP = "reflection", "clock_jump"
 
 
 class RecordingError(ValueError):
@@ -119,7 +131,8 @@ class AidStream:
         For each reading, the index of its channel in ``channels``. Readings of one time follow each other, in the order
         of the channels.
     side : (k, s) array
-        Side information of each reading; components as in ``KINDS[kind].side``.
+        Side information of each reading; components as in ``KINDS[kind].side``. Without channels it may be the (k, d)
+        standard deviations that the readings state (`Datasheet.stated`).
     dropped_channel : (m,) int16 array
         The channel of each missing measurement.
     stamp, arrival : (k,) array
@@ -150,6 +163,17 @@ class AidStream:
         return len(self.stamp) > 0 or len(self.arrival) > 0
 
     @property
+    def states_sigma(self) -> bool:
+        """Whether readings of an instrument without channels state their standard deviations."""
+        return not self.channels and self.side.ndim == 2 and self.side.shape[1] > 0
+
+    @property
+    def optional(self) -> tuple[str, ...]:
+        """The arrays that only some streams have, and this one has."""
+        clock = tuple(n for n in _CLOCK_ARRAYS if len(getattr(self, n)))
+        return (*clock, "side") if self.states_sigma else clock
+
+    @property
     def stamps(self) -> Array:
         """(k,) array: the time stamps with which the readings are delivered [s]."""
         return self.stamp if len(self.stamp) else self.time
@@ -162,7 +186,7 @@ class AidStream:
     def rows(self, keep: NDArray[Any] | slice) -> AidStream:
         """Some of the readings: a mask, or the indices of rows."""
         names = (*_AID_ARRAYS[:-1], *(("channel", "side") if self.channels else ()))
-        names += tuple(n for n in _CLOCK_ARRAYS if len(getattr(self, n)))
+        names += self.optional
         return replace(self, **{n: getattr(self, n)[keep] for n in names})
 
     def as_delivered(self) -> AidStream:
@@ -195,6 +219,8 @@ class AidStream:
     def concatenate(parts: Sequence[AidStream]) -> AidStream:
         """Join the measurements of consecutive intervals."""
         names = _CHANNEL_ARRAYS if parts[0].channels else _AID_ARRAYS
+        if any(p.states_sigma for p in parts):
+            names = (*names, "side")
         joined = {n: np.concatenate([getattr(p, n) for p in parts]) for n in names}
         for name in _CLOCK_ARRAYS:
             if any(len(getattr(p, name)) for p in parts):
@@ -211,6 +237,10 @@ class AidStream:
 
     def measurements(self) -> Iterator[Measurement]:
         """The readings as an estimator receives them, in order."""
+        if self.states_sigma:
+            for t, v, side in zip(self.stamps, self.value, self.side, strict=True):
+                yield Measurement(float(t), self.name, self.kind, v, side=side)
+            return
         if not self.channels:
             for t, v in zip(self.stamps, self.value, strict=True):
                 yield Measurement(float(t), self.name, self.kind, v)
@@ -272,7 +302,8 @@ class Block:
             labels = ImuLabels(
                 *(np.concatenate([getattr(p.imu_labels, n) for p in parts]) for n in ("faults", "fault_error"))
             )
-        kind = TapStates if all(isinstance(p.truth, TapStates) for p in parts) else NavigationStates
+        kinds = {_kind_of(p.truth) for p in parts}
+        kind = kinds.pop() if len(kinds) == 1 else NavigationStates
         truth = kind(*(np.concatenate([getattr(p.truth, n) for p in parts]) for n in _STATES_OF[kind]))
         aids = {n: AidStream.concatenate([p.aids[n] for p in parts]) for n in first.aids}
         return Block(first.start, parts[-1].end, imu, labels, aids, truth)
@@ -306,6 +337,8 @@ class Recording:
         Datasheets with the true figures, if those in ``instruments`` are wrong.
     actual_covariance : (9, 9) array or None
         True covariance of the errors of ``start``, if the covariance in ``start`` is wrong.
+    origins : mapping of str to mapping
+        What exports need beyond the datasheet, by instrument (`AidSpec.origin`). No estimator receives it.
     """
 
     scenario: str
@@ -319,6 +352,7 @@ class Recording:
     draws: Mapping[str, Any] = field(default_factory=dict)
     actual: Instruments | None = None
     actual_covariance: Array | None = None
+    origins: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         names = [*(["imu"] if self.instruments.imu is not None else []), *self.instruments]
@@ -427,10 +461,17 @@ _STATE_ARRAYS = ("time", "position", "velocity", "attitude")
 _STATES_OF: dict[type[NavigationStates], tuple[str, ...]] = {
     NavigationStates: _STATE_ARRAYS,
     TapStates: (*_STATE_ARRAYS, "angular_rate", "water_velocity"),
+    ReferenceStates: (*_STATE_ARRAYS, "sigma", "quality"),
 }
 
+
+def _kind_of(truth: NavigationStates) -> type[NavigationStates]:
+    """The class of states that a file keeps."""
+    return type(truth) if type(truth) in _STATES_OF else NavigationStates
+
+
 #: Fields of a datasheet that most have not.
-_OPTIONAL = ("details", "blocks", "channels", "processes", "timing", "sources")
+_OPTIONAL = ("details", "blocks", "channels", "processes", "timing", "sources", "stated")
 
 
 def _sheet(sheet: Datasheet | ImuDatasheet) -> dict[str, Any]:
@@ -471,12 +512,14 @@ def _to_arrays(recording: Recording) -> dict[str, Any]:
         meta["actual"] = _sheets(recording.actual)
     if recording.actual_covariance is not None:
         meta["actual_covariance"] = recording.actual_covariance.tolist()
+    if recording.origins:
+        meta["origins"] = {name: dict(origin) for name, origin in recording.origins.items()}
     arrays: dict[str, Any] = {"meta": np.array(json.dumps(meta))}
 
     def add(prefix: str, holder: object, names: Sequence[str]) -> None:
         arrays.update({f"{prefix}.{n}": getattr(holder, n) for n in names})
 
-    add("truth", data.truth, _STATES_OF[TapStates if isinstance(data.truth, TapStates) else NavigationStates])
+    add("truth", data.truth, _STATES_OF[_kind_of(data.truth)])
     add("initial_truth", recording.initial_truth, _STATE_ARRAYS)
     add("start", recording.start, ("position", "velocity", "attitude", "covariance"))
     if data.imu is not None:
@@ -485,7 +528,7 @@ def _to_arrays(recording: Recording) -> dict[str, Any]:
         add("imu_labels", data.imu_labels, ("faults", "fault_error"))
     for name, stream in data.aids.items():
         add(f"aid.{name}", stream, _CHANNEL_ARRAYS if stream.channels else _AID_ARRAYS)
-        add(f"aid.{name}", stream, [n for n in _CLOCK_ARRAYS if len(getattr(stream, n))])
+        add(f"aid.{name}", stream, stream.optional)
     return arrays
 
 
@@ -520,12 +563,13 @@ def _from_arrays(meta: dict[str, Any], arrays: dict[str, Any]) -> Recording:
     def get(prefix: str, names: Sequence[str]) -> list[Any]:
         return [arrays[f"{prefix}.{n}"] for n in names]
 
-    kind = TapStates if "truth.water_velocity" in arrays else NavigationStates
+    told = (k for k, names in _STATES_OF.items() if f"truth.{names[-1]}" in arrays and k is not NavigationStates)
+    kind = next(told, NavigationStates)
     channels = {aid["name"]: tuple(aid.get("channels", ())) for aid in meta["aids"]}
 
     def stream(name: str, kind: str) -> AidStream:
         names: tuple[str, ...] = _CHANNEL_ARRAYS if channels.get(name) else _AID_ARRAYS
-        names += tuple(n for n in _CLOCK_ARRAYS if f"aid.{name}.{n}" in arrays)
+        names += tuple(n for n in (*_CLOCK_ARRAYS, "side") if f"aid.{name}.{n}" in arrays and n not in names)
         arrays_of = dict(zip(names, get(f"aid.{name}", names), strict=True))
         return AidStream(name, kind, **arrays_of, channels=channels.get(name, ()))
 
@@ -559,4 +603,5 @@ def _from_arrays(meta: dict[str, Any], arrays: dict[str, Any]) -> Recording:
         meta.get("draws", {}),
         _instruments(meta["actual"], meta["step"]) if "actual" in meta else None,
         np.array(meta["actual_covariance"]) if "actual_covariance" in meta else None,
+        meta.get("origins", {}),
     )

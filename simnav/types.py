@@ -37,6 +37,7 @@ __all__ = [
     "Measurement",
     "Measurements",
     "NavigationStates",
+    "ReferenceStates",
     "StateBlock",
     "TapStates",
     "TriadDatasheet",
@@ -206,7 +207,8 @@ class Measurement(NamedTuple):
         Which channel it is, one of ``Datasheet.channels``; empty for an instrument without channels.
     side : (s,) array
         What else the instrument says about the reading, which is no measurement: the position of the satellite, the
-        direction of the beam. Components as in ``KINDS[kind].side``.
+        direction of the beam. Components as in ``KINDS[kind].side``. Of an instrument that states its noise
+        (`Datasheet.stated`) the standard deviations (d,) of this reading, or nothing.
     """
 
     time: float
@@ -341,6 +343,22 @@ class NavigationStates:
 
     def __getitem__(self, index: slice) -> NavigationStates:
         return NavigationStates(self.time[index], self.position[index], self.velocity[index], self.attitude[index])
+
+
+@dataclass(frozen=True, eq=False)
+class ReferenceStates(NavigationStates):
+    """The reference of a log at n times, which stands for the truth and says how well it is known.
+
+    Attributes
+    ----------
+    sigma : (n, 3) array
+        Standard deviation of its position, north-east-down [m]; NaN where it is not known.
+    quality : (n,) array
+        Its solution: 1 fixed, 2 float, NaN where it is not said.
+    """
+
+    sigma: Array
+    quality: Array
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,7 +12,7 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from pathlib import Path
 from typing import Any
 
-from simnav.compiled import Kernel, kernels, prune
+from simnav.compiled import Kernel, announced, kernels, prune
 from simnav.plugins import entry_points
 
 __all__ = ["warmup"]
@@ -35,7 +35,11 @@ def warmup(progress: Callback | None = None, *, load: bool = True, processes: in
     processes : int, optional
         Number of processes that compile at the same time; by default the number of cores, at most 4.
     """
-    report = progress or (lambda done, total, name: None)
+    with announced(lambda: None):  # the progress says it
+        _warm_up(progress or (lambda done, total, name: None), load, processes)
+
+
+def _warm_up(report: Callback, load: bool, processes: int | None) -> None:
     _import_all()
     every = kernels()
     missing = [k for k in every if not k.cached()]

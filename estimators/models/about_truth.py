@@ -300,9 +300,11 @@ class AboutTruthModel(ErrorModel):
         d, m = len(own.innovation), _INERTIAL
         innovation, jacobian = own.innovation.copy(), np.zeros((d, self.size))
         jacobian[:, :m] = own.jacobian[:, :m]
+        if measurement.instrument in self.nominal.own:
+            jacobian[:, _NAV : _NAV + 3] = self._by_bias(measurement)
         for k, error in enumerate(self._imu_errors):
             if error.times < 0:
-                jacobian[:, m + k] = own.jacobian[:, _NAV + error.axis]
+                jacobian[:, m + k] = jacobian[:, _NAV + error.axis]
         sheet, errors = self.sheets[measurement.instrument], self._aids[measurement.instrument]
         for mine, theirs in self._block_at:
             jacobian[:, mine] = own.jacobian[:, theirs]
@@ -329,6 +331,15 @@ class AboutTruthModel(ErrorModel):
             heading = np.arctan2(self.nominal.dcm[1, 0], self.nominal.dcm[0, 0])
             jacobian[0, errors.deviation : errors.deviation + 2] = np.sin(heading), np.cos(heading)
         return Linearised(innovation - jacobian @ self.y, jacobian, own.noise)
+
+    def _by_bias(self, measurement: Measurement) -> Array:
+        """(d, 3) derivative of a reading that is predicted by a function, by the biases of the gyroscopes.
+
+        The nominal rate is as measured, so the swing of a lever arm has the whole bias of the gyroscopes in it.
+        """
+        own = self.nominal.own[measurement.instrument]
+        point = own.point(measurement.time, *self.nominal.state_of_own(), side=measurement.side)
+        return -own.by_angular_rate(point)
 
     def correct(self, dx: Array) -> None:
         """Add a correction to the state."""

@@ -33,6 +33,7 @@ from numpy.typing import NDArray
 from simnav.kinds import NavigationPoint
 from simnav.types import KINDS, NO_SIDE, Array, Datasheet, Estimate, InitialState, Instruments, Measurement
 
+from .ambiguity import innovation_of
 from .base import Linearised
 from .chain import Chain, Columns, chain_of
 from .declared_errors import bias_of
@@ -217,7 +218,7 @@ class GeneralModel(PointModel, MovingModel):
                     length += error[j]
             if length:
                 jacobian[:, j] = kind.difference(ends[0], ends[1]) / length
-        return kind.difference(value, reading), jacobian
+        return innovation_of(kind, sheet, value, reading), jacobian
 
     def _extra_of(self, name: str) -> list[int]:
         """Which of ``extra`` an instrument depends on."""

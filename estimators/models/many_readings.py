@@ -17,6 +17,7 @@ from simnav.geometry.earth import earth_rate
 from simnav.kinds import NavigationPoints, Observations
 from simnav.types import Array
 
+from .ambiguity import innovation_of
 from .channels import ChannelDatasheet, whole
 from .own_observation import OwnObservation
 
@@ -108,7 +109,7 @@ class ManyReadings:
         jacobian[:, :, :9] = given[NAVIGATION]
         for name, where in at.items():
             jacobian[:, :, where.start + offset : where.stop + offset] = given[name]
-        return self.kind.difference(value, reading), jacobian
+        return innovation_of(self.kind, self._sheet, value, reading), jacobian
 
     def noise(self, side: Array) -> Array:
         """The (n, d) variances of the white noise of n readings, from their (n, s) side information.

@@ -29,6 +29,7 @@ from simnav.kinds import NavigationPoint
 from simnav.plugins import place_of
 from simnav.types import KINDS, NO_SIDE, Array, Datasheet
 
+from .ambiguity import innovation_of
 from .channels import ChannelDatasheet, whole
 from .delayed import acceleration
 from .levered import observation_of
@@ -41,6 +42,8 @@ _COMPONENTS = 9
 #: that is zero.
 _STEPS = np.repeat([0.1, 1e-3, 1e-5], 3)
 _PART_OF_SIGMA, _SMALLEST_STEP = 1e-3, 1e-6
+#: Step of an angular rate, of which a swing is linear [rad/s].
+_RATE_STEP = 1e-2
 _NONE: Mapping[str, Array] = MappingProxyType({})
 
 
@@ -327,7 +330,7 @@ class OwnObservation:
             jacobian[range(d), range(bias_at, bias_at + d)] = 1.0
             first = bias_at + len(calibration) - size
             reading = self.kind.add_error(reading, calibration[first : first + d])
-        return self.kind.difference(value, reading), jacobian, self.spread(own, point)
+        return innovation_of(self.kind, self.sheet, value, reading), jacobian, self.spread(own, point)
 
     def differences(self, point: NavigationPoint, errors: Array, bias_at: int, offset: int) -> Array | None:
         """The predicted readings of the instrument at k states, minus that at one state.
@@ -369,6 +372,25 @@ class OwnObservation:
         if bias_at >= 0:
             differences += errors[:, bias_at : bias_at + len(reading)]
         return differences
+
+    def by_angular_rate(self, point: NavigationPoint) -> Array:
+        """The (d, 3) derivative of the reading by the angular rate of the body, by differences; zero without a reading.
+
+        A reading has it by the swing of a lever arm. `linearise` leaves it out: a filter that subtracts its estimate of
+        the gyroscopes' bias from the rate is left with the error of that estimate, which is small. A model whose rate
+        is not corrected needs it (`simnav.estimators.models.about_truth`).
+        """
+        jacobian = np.zeros((len(self.kind.components), 3))
+        reading = self.read(point)
+        if reading is None:
+            return jacobian
+        for k in range(3):
+            rate = point.angular_rate.copy()
+            rate[k] += _RATE_STEP
+            there = self.read(point._replace(angular_rate=rate))
+            if there is not None:
+                jacobian[:, k] = self.kind.difference(there, reading) / _RATE_STEP
+        return jacobian
 
     def _blocks_at(self, point: NavigationPoint, error: Array, offset: int) -> Mapping[str, Array]:
         """The blocks at a state that differs from a point by an (n,) error."""

@@ -15,6 +15,7 @@ import numpy as np
 from simnav.kinds import NavigationPoint
 from simnav.types import NO_SIDE, Array, Datasheet
 
+from .ambiguity import innovation_of
 from .base import Linearised
 from .own_observation import OwnObservation
 from .ship_kernels import CE, CN, PSI, E, N, R, U, displace_ship
@@ -85,7 +86,7 @@ class ShipObservation(OwnObservation):
         noise = self._white + own @ self._unknown @ own.T + np.outer(aside, aside)
         more = self.spread(whole, point)
         noise = noise if more is None else noise + more
-        return Linearised(self.kind.difference(value, reading), jacobian, noise)
+        return Linearised(innovation_of(self.kind, self.sheet, value, reading), jacobian, noise)
 
     def differences_at(self, time: float, position: Array, x: Array, errors: Array, side: Array = NO_SIDE) -> Array:
         """What the instrument should read at k states, minus what it should read at one.

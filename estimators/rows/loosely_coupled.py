@@ -1,7 +1,7 @@
-"""Loosely coupled rows: they take the solution of a receiver in place of the raw observations which it solves.
+"""Loosely coupled rows: they take the solution of a receiver or a DVL in place of the raw readings which it solves.
 
 Where a voyage has both, the other rows are tightly coupled (`simnav.estimators.models.coupling`). These are for the
-comparison: the same solver and pieces, with what the receiver leaves them. They need a receiver.
+comparison: the same solver and pieces, with what the receiver or the DVL leaves them. They need one of them.
 """
 
 from simnav.estimator import register

@@ -47,6 +47,7 @@ class MidValue(
     isolation=FaultIsolation,
     iteration=poor_heading,
 ):
+    version = 2
     def __init__(
         self,
         *,

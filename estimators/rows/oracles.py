@@ -23,7 +23,15 @@ class Oracle(Row, solver=piece(OracleEstimator, restore=False), adaptation=TrueN
     """Kalman filter about the truth that knows each measurement's noise and faults; rows are compared with it.
 
     It is not ranked. (Oracle O1.) Source: `simnav.estimators.solvers.oracle`, where its rules are.
+
+    Versions
+    --------
+    2
+        The swing of the lever arm of an instrument that is observed by a function (raw observations of satellites, or
+        an uncertain lever arm) takes account of the gyroscopes' biases.
     """
+
+    version = 2
 
 
 @register("oracle-clairvoyant")
@@ -31,7 +39,15 @@ class OracleClairvoyant(Row, solver=piece(OracleEstimator, restore=True), adapta
     """Oracle that takes off each measurement what the faults added; only outages are left of them. (Oracle O0.)
 
     What an estimator would do on the clean run; the bound ``clean`` is its. Source: `simnav.estimators.solvers.oracle`.
+
+    Versions
+    --------
+    2
+        The swing of the lever arm of an instrument that is observed by a function (raw observations of satellites, or
+        an uncertain lever arm) takes account of the gyroscopes' biases.
     """
+
+    version = 2
 
 
 @register("oracle-rts")
@@ -40,7 +56,15 @@ class OracleRts(Oracle, smoother=Smoother):
 
     Source: H. E. Rauch, F. Tung and C. T. Striebel, *Maximum likelihood estimates of linear dynamic systems*, AIAA
     Journal 3(8), 1965.
+
+    Versions
+    --------
+    2
+        The swing of the lever arm of an instrument that is observed by a function (raw observations of satellites, or
+        an uncertain lever arm) takes account of the gyroscopes' biases.
     """
+
+    version = 2
 
 
 @register("oracle-mixture")
@@ -50,7 +74,15 @@ class OracleMixture(Oracle, adaptation=MixtureNoise):
     The realistic target of robust estimators: the schedule of the faults and their sizes are known, each hit has to be
     told from the innovation (`simnav.estimators.adaptations.truth.MixtureNoise`). The bound ``mix`` is its. Source:
     `simnav.estimators.solvers.oracle`.
+
+    Versions
+    --------
+    2
+        The swing of the lever arm of an instrument that is observed by a function (raw observations of satellites, or
+        an uncertain lever arm) takes account of the gyroscopes' biases.
     """
+
+    version = 2
 
 
 @register("oracle-times")
@@ -60,4 +92,12 @@ class OracleTimes(Oracle, adaptation=FaultTimes):
     The limit of detection and exclusion: what a row would reach that found every wrong measurement, at once and without
     a false alarm. A disturbance of the IMU is subtracted, as for the other oracles. Source:
     `simnav.estimators.solvers.oracle`.
+
+    Versions
+    --------
+    2
+        The swing of the lever arm of an instrument that is observed by a function (raw observations of satellites, or
+        an uncertain lever arm) takes account of the gyroscopes' biases.
     """
+
+    version = 2

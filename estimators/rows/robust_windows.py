@@ -179,18 +179,22 @@ class GncFgo(
     and 1.8 times after one of 3 % in the scale factor of a DVL; and 3.7 times on ``wrong-start``. Beside an IMU that is
     poorer than its datasheet it had 11.5 times the error of ``sw-fgo`` on voyage 87000 of ``training-poor-imu``.
 
-    Version 2: a log that is the last witness beside the motion is not rejected for good.
-
     Source: H. Yang, P. Antonante, V. Tzoumas and L. Carlone, *Graduated non-convexity for robust spatial perception*,
     IEEE Robotics and Automation Letters 5(2), 2020.
 
     Versions
     --------
     2
+        A log that is the last witness beside the motion is not rejected for good.
+    3
+        A satellite that the others contradict is left out without a schedule
+        (`simnav.estimators.weightings.sibling_vote`). Where no instrument has channels, the numbers are those of
+        version 2.
+    4
         It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
     """
 
-    version = 2
+    version = 4
 
 
 @register("max-mixture-fgo")

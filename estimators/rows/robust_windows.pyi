@@ -145,6 +145,7 @@ class GncFgo(
     solver=piece(WindowEstimator, defaults={"tolerance": 0.05, "iterations": 15}, every_sample=False),
     weighting=GraduatedNonConvexity,
 ):
+    version = 3
     def __init__(
         self,
         *,

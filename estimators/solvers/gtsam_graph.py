@@ -25,6 +25,7 @@ from simnav.compiled import kernel
 from simnav.estimators.models.base import Linearised
 from simnav.estimators.models.inertial import InertialModel
 from simnav.estimators.models.measurements import DVL, GNSS_POSITION, GNSS_VELOCITY, SPEED_LOG, observe_inertial
+from simnav.estimators.models.stated_sigmas import with_stated_sigmas
 from simnav.geometry.rotation import rpy_from_dcm
 from simnav.types import Array, Estimate, InitialState, Instruments, Measurement
 
@@ -133,7 +134,7 @@ class InertialGraph:
         """Node 0; returns its prior factors and its values. Raises UnsuitableScenario without an IMU."""
         import gtsam
 
-        self.model = InertialModel(calibrate=False)
+        self.model = with_stated_sigmas(InertialModel(calibrate=False), instruments)
         covariance = self.model.begin(start, instruments)[:15, :15].copy()
         index = np.arange(9, 15)
         covariance[index, index] = np.maximum(covariance[index, index], np.repeat(np.square(LEAST_BIAS), 3))

@@ -29,6 +29,7 @@ from simnav.estimators.composition import Solver
 from simnav.estimators.models.base import ErrorModel, Linearised, Observation
 from simnav.estimators.models.channels import owners, summary
 from simnav.estimators.models.coupling import by_source
+from simnav.estimators.models.stated_sigmas import with_stated_sigmas
 from simnav.estimators.models.suitable import ModelChoice
 from simnav.types import Array, Estimate, InitialState, Instruments, Measurement, Measurements, NavigationStates
 
@@ -114,7 +115,7 @@ class KalmanEstimator(Solver):
 
     def _chosen(self, instruments: Instruments) -> ErrorModel:
         """The model of a run; subclasses may override it."""
-        return self._choice.choose(instruments, self.label)
+        return with_stated_sigmas(self._choice.choose(instruments, self.label), instruments)
 
     def update(self, measurements: Measurements) -> Estimate:
         """Take one step's measurements, each at its own time."""

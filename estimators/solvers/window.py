@@ -57,6 +57,7 @@ from simnav.estimators.models.base import ErrorModel
 from simnav.estimators.models.chains import Chain, chain_of
 from simnav.estimators.models.channels import owners, summary
 from simnav.estimators.models.coupling import by_source
+from simnav.estimators.models.stated_sigmas import with_stated_sigmas
 from simnav.estimators.models.suitable import ModelChoice
 from simnav.estimators.weightings.base import Factors, Isolation, Weighting
 from simnav.types import Array, Estimate, InitialState, Instruments, Measurement, Measurements
@@ -174,7 +175,7 @@ class WindowEstimator(LooksBack, Solver):
     def reset(self, start: InitialState, instruments: Instruments) -> None:
         """Begin a run; UnsuitableScenario if the model lacks an instrument."""
         instruments = by_source(instruments, self._choice, self.label)
-        self.chain = chain_of(self._choice.choose(instruments, self.label))
+        self.chain = chain_of(with_stated_sigmas(self._choice.choose(instruments, self.label), instruments))
         self.chain.front.reports_all |= self.reports_all
         self.covariance = self.chain.begin(start, instruments)
         observed = [name for name, sheet in instruments.items() if self.chain.observes(sheet)]

@@ -12,6 +12,12 @@ v is the residual, R the covariance of the noise, c the constant of the cost, u_
 of convexity. Here mu changes by a factor at each Gauss-Newton iteration. A sliding window changes little from epoch to
 epoch. So if no new measurement is an outlier (u > 1 after the window has been solved with it), mu keeps its final
 value. Only an outlier starts a new schedule of mu, in which every measurement of the window is weighted again.
+
+A channel that its siblings contradict, such as a satellite, is left out without a schedule
+(`simnav.estimators.weightings.sibling_vote`). At the mu with which a large outlier begins, all measurements have a
+weight near zero, and the window follows the motion. From there it comes to exclude healthy ones that it would use if it
+began with their full weight, and now and then it does not come back. While one of eight satellites was spoofed, the
+schedules left out healthy ones twice as often as the window does without that satellite.
 """
 
 from __future__ import annotations
@@ -25,6 +31,7 @@ from simnav.types import Array, Instruments
 from .base import Factors
 from .m_estimators import constants, geman_mcclure, truncated
 from .robust_weighting import RobustWeighting
+from .sibling_vote import SiblingVote
 
 __all__ = ["GraduatedNonConvexity", "softened_geman_mcclure", "softened_truncated"]
 
@@ -75,15 +82,18 @@ class GraduatedNonConvexity(RobustWeighting):
         tuned = constants(truncated if cost == "tls" else geman_mcclure, efficiency)
         self._scale = np.array([1.0, *tuned]) ** -2.0
         self._soft = softened_truncated if cost == "tls" else softened_geman_mcclure
+        self._vote = SiblingVote()
 
     def reset(self, instruments: Instruments) -> None:
         """Begin a run."""
         self._mu = self._hard = HARD if self.cost == "tls" else 1.0
         self._seen = self._newest = -np.inf
         self._fresh = True
+        self._vote.reset(instruments)
 
     def begin(self) -> None:
         """Start an epoch."""
+        self._vote.begin()
         self._seen, self._fresh = self._newest, True
 
     def choose(self, factors: Factors) -> bool:
@@ -91,16 +101,25 @@ class GraduatedNonConvexity(RobustWeighting):
         square = factors.norm * factors.norm * self._scale[factors.components]
         if self._fresh:
             self._fresh = False
-            self._soften(factors, square)
+            first = int(np.searchsorted(factors.time, self._seen, side="right"))
+            self._soften(factors, square, first)
+            if self._mu != self._hard and self._vote.ask(factors, square, first):
+                return False
+        elif self._vote.asked:
+            settled = self._vote.answer(factors, square)
+            if settled is None:
+                return False
+            if settled:
+                self._mu = self._hard
         elif self._mu != self._hard:
             self._harden()
         factors.weight[:] = self._soft(square, self._mu)
         return self._mu == self._hard
 
-    def _soften(self, factors: Factors, square: Array) -> None:
-        """Choose the epoch's first mu."""
+    def _soften(self, factors: Factors, square: Array, first: int) -> None:
+        """Choose the epoch's first mu; ``first`` is the index of the first new measurement."""
         self._mu = self._hard
-        new = square[np.searchsorted(factors.time, self._seen, side="right") :]
+        new = square[first:]
         if not len(new):
             return
         self._newest = float(factors.time[-1])

@@ -286,7 +286,7 @@ def _entrants(asked: Campaign, confinement: str, path: Path) -> list[Entrant]:
     """The estimators that take part, looked at where they can do no harm."""
     hidden = asked.seal.unreadable(path)
     try:
-        entrants = [resolve(request, confinement, hidden, asked.alone) for request in asked.estimators]
+        entrants = [resolve(request, confinement, hidden) for request in asked.estimators]
     except ServerError as error:
         raise CampaignError(str(error)) from None
     if not asked.seal.secret:  # the seeds of a sealed campaign are drawn from 2**63

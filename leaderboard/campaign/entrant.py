@@ -34,6 +34,8 @@ class Entrant:
         Declared version of the estimator.
     own : str
         Digest of the user's own code alone; empty for an estimator that comes with simnav.
+    kernels : bool
+        Whether it may call kernels of simnav, which are then loaded before it begins.
     code : bytes
         The class itself, where no other process can import it.
     point : str
@@ -56,6 +58,7 @@ class Entrant:
     learned: Mapping[str, Any] = field(default_factory=dict)
     version: int = 1
     own: str = ""
+    kernels: bool = True
 
     def find(self) -> type[Estimator]:
         """Its class, in the process in which it is run."""

@@ -15,7 +15,7 @@ from typing import Any, TypeAlias
 from simnav.estimator import Estimator, describe, find, make, names, register
 from simnav.estimator.late_arrivals import LATE
 from simnav.estimator.looking_back import LAGS
-from simnav.estimator.lookup import former_names_of
+from simnav.estimator.lookup import LOOSE, former_names_of
 from simnav.estimator.parameters import former_names, under_present_names
 from simnav.leaderboard.results.admission import label_fault, lookalikes
 from simnav.leaderboard.results.errors import RequestError, mistakes
@@ -245,7 +245,7 @@ def _items(given: Estimators) -> list[EstimatorLike]:
 def _known(item: EstimatorLike, parameters: Mapping[str, Any]) -> dict[str, Any]:
     """Those of the parameters that an estimator has."""
     about = describe(request(item).name)
-    known = {p.name for p in about.parameters} | set(former_names(about.cls)) | {LAGS, LATE}
+    known = {p.name for p in about.parameters} | set(former_names(about.cls)) | {LAGS, LATE, LOOSE}
     return {k: v for k, v in parameters.items() if k in known}
 
 

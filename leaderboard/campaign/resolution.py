@@ -38,7 +38,7 @@ _IMPORT_TIME = 60.0  # for importing and describing an estimator [s]
 _MEMORY = 2 << 30  # likewise [bytes]
 
 
-def resolve(request: EstimatorRequest, confinement: str, hidden: Sequence[Path], alone: bool) -> Entrant:
+def resolve(request: EstimatorRequest, confinement: str, hidden: Sequence[Path]) -> Entrant:
     """Find an estimator and look at it: one of others in a process of its own, for importing a file runs it."""
     name, source = request.name, ""
     file = file_of(name)
@@ -73,7 +73,7 @@ def resolve(request: EstimatorRequest, confinement: str, hidden: Sequence[Path],
         found, why = outcome.value, outcome.reason
     else:
         try:
-            server = prepare(confinement, hidden, loaded=alone)
+            server = prepare(confinement, hidden, loaded=False)
             found, why = describe(server, entrant, Limits(_IMPORT_TIME, _MEMORY)), ""
         except ValueError as error:
             found, why = None, str(error)
@@ -91,7 +91,7 @@ def resolve(request: EstimatorRequest, confinement: str, hidden: Sequence[Path],
         raise RequestError(f"estimator {request.name!r}: {error}") from None
     return replace(
         entrant, source=source or with_library(found["source"]), learned_from=learned_from, learned=learned,
-        version=found["version"], own=found["source"],
+        version=found["version"], own=found["source"], kernels=found.get("kernels", True),
     )  # fmt: skip
 
 

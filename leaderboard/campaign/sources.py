@@ -8,7 +8,10 @@ elsewhere. What is installed is not followed.
 from __future__ import annotations
 
 import ast
+import contextlib
 import hashlib
+import inspect
+import json
 import os
 import re
 import sys
@@ -18,9 +21,19 @@ from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
+from simnav.leaderboard.results.user_cache import keep, user_cache
 from simnav.plugins import code_text
 
-__all__ = ["LIBRARY", "code_of", "digest", "files_digest", "folder_code", "followed", "is_installed"]
+__all__ = [
+    "LIBRARY",
+    "code_of",
+    "digest",
+    "files_digest",
+    "folder_code",
+    "followed",
+    "is_installed",
+    "may_call_kernels",
+]
 
 #: Folder of the library. The estimators and scenarios are in it, by symbolic links; so is the leaderboard.
 LIBRARY = Path(sys.modules["simnav"].__file__ or "").parent
@@ -71,6 +84,7 @@ def folder_code(folder: Path, without: Collection[str] = ()) -> str:
             parts += [path.relative_to(folder).as_posix(), code_of(path).digest]
         elif path.suffix in (".json", ".npz"):
             parts.append(files_digest([(path.relative_to(folder).as_posix(), path)]))
+    _keep_known()
     return digest(*parts)
 
 
@@ -83,8 +97,8 @@ class Code:
     digest : str
         Of its syntax tree, without docstrings and positions. Of a file that is no Python: of its bytes.
     imports : tuple of str
-        Names of the modules that it imports anywhere; of ``from . import name`` the name. Imports for type checking
-        only are left out.
+        Names of the modules that it imports anywhere; of ``from . import name`` the name, and of ``from simnav import
+        name`` ``simnav.name``. Imports for type checking only are left out.
     data : tuple of str
         Patterns of the names of files that texts in it name, like ``weights_*.json`` for ``f"weights_{kind}.json"``.
     named : tuple of str
@@ -116,13 +130,19 @@ def code_of(path: Path) -> Code:
 @lru_cache(maxsize=4096)
 def _code_of(path: Path, modified: int, size: int) -> Code:
     source = path.read_bytes()
+    ours = path.is_relative_to(LIBRARY)  # it is not followed
+    content = hashlib.blake2b(source, digest_size=16).hexdigest()
+    if ours and content in _known():
+        return Code(_known()[content])
     try:
         tree = ast.parse(source)
     except (SyntaxError, ValueError):
-        return Code(hashlib.blake2b(source, digest_size=16).hexdigest())
+        return Code(content)
     text = code_text(tree)
     found = hashlib.blake2b(text.encode(errors="surrogatepass"), digest_size=16).hexdigest()
-    if path.is_relative_to(LIBRARY):  # it is not followed
+    if ours:
+        _known()[content] = found
+        _new.add(content)
         return Code(found)
     imports, texts = tuple(dict.fromkeys(_imports(tree))), _texts(tree)
     by_text = any(module.partition(".")[0] == "importlib" for module in imports) or any(
@@ -135,6 +155,35 @@ def _code_of(path: Path, modified: int, size: int) -> Code:
         tuple(sorted(t.lstrip(".") for t in texts if by_text and re.fullmatch(_MODULE, t))),
         tuple(sorted(t for t in texts if re.fullmatch(_FOLDER, t))),
     )
+
+
+#: Digests of the code of files of simnav that are kept from one process to the next.
+_MOST_KNOWN = 10_000
+_new: set[str] = set()  # of these, what is not kept yet
+
+
+@lru_cache(maxsize=1)
+def _known_file() -> Path:
+    """Where they are kept: by the version of Python, and by how they are made."""
+    how = digest(sys.version, inspect.getsource(code_text))
+    return user_cache() / f"code-{how}.json"
+
+
+@lru_cache(maxsize=1)
+def _known() -> dict[str, str]:
+    """Digest of the code for the digest of the bytes of a file; to parse all of simnav takes two seconds."""
+    with contextlib.suppress(OSError, ValueError, RecursionError):
+        found = json.loads(_known_file().read_bytes())
+        if isinstance(found, dict) and all(isinstance(v, str) and len(v) == 32 for v in found.values()):
+            return found
+    return {}
+
+
+def _keep_known() -> None:
+    """Keep what is new."""
+    if _new:
+        _new.clear()
+        keep(_known_file(), json.dumps(dict(list(_known().items())[-_MOST_KNOWN:])))
 
 
 _FILE = r"[\w*-]+\.[A-Za-z]\w{0,7}|(?:[\w*-]+/)+[\w*-]+\.[A-Za-z]\w{0,7}"
@@ -169,7 +218,10 @@ def _imports(tree: ast.Module) -> Iterator[str]:
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
-            yield from [node.module] if node.module else [alias.name for alias in node.names]
+            if node.module == "simnav":
+                yield from (f"simnav.{alias.name}" for alias in node.names)
+            else:
+                yield from [node.module] if node.module else [alias.name for alias in node.names]
 
 
 def _texts(tree: ast.Module) -> set[str]:
@@ -212,10 +264,36 @@ def followed(files: Iterable[Path]) -> dict[str, str]:
     return dict(sorted(walk.found.items()))
 
 
+def may_call_kernels(file: str) -> bool:
+    """Whether an estimator may call kernels of simnav: False if its files import only what surely has none.
+
+    Parameters
+    ----------
+    file : str
+        The file of the estimator; empty for one that is not in a file.
+    """
+    if not file:
+        return True
+    walk = _Walk()
+    walk.file(Path(file), Path(file).parent)
+    walk.run()
+    return any(
+        module not in _WITHOUT_KERNELS and module.partition(".")[0] not in _ALSO_WITHOUT for module in walk.foreign
+    )
+
+
+#: Of simnav: what has no kernels. And modules of others that do not import simnav.
+_WITHOUT_KERNELS = {"simnav.types"} | {
+    f"simnav.{name}" for name in ("Estimate", "Estimator", "Instruments", "InitialState", "Measurements", "register")
+}
+_ALSO_WITHOUT = {*sys.stdlib_module_names, "numpy", "scipy", "filterpy"} - {"importlib", "runpy"}
+
+
 class _Walk:
     """Files that were found, and those whose imports are still to be followed."""
 
     def __init__(self) -> None:
+        self.foreign: set[str] = set()  # modules that are not files of the user
         self.found: dict[str, str] = {}
         self.todo: list[tuple[Code, Path, Path]] = []  # code, folder that its name is relative to, its own folder
 
@@ -238,16 +316,20 @@ class _Walk:
         while self.todo:
             code, start, folder = self.todo.pop()
             for module in (*code.imports, *code.named):
-                if module.partition(".")[0] != "simnav":
-                    self.take(module, start, folder)
+                if module.partition(".")[0] == "simnav" or not self.take(module, start, folder):
+                    self.foreign.add(module)
 
-    def take(self, name: str, start: Path, folder: Path) -> None:
-        """Take a module that a file imports, if it is one of the user's own."""
-        if not self.beside(name.partition(".")[0], start, folder) and "*" not in name:
+    def take(self, name: str, start: Path, folder: Path) -> bool:
+        """Take a module that a file imports, if it is one of the user's own; returns whether it is."""
+        if self.beside(name.partition(".")[0], start, folder):
+            return True
+        if "*" not in name:
             file = getattr(sys.modules.get(name), "__file__", None)
             path = None if file is None else Path(file).resolve()
             if path is not None and path.suffix == ".py" and path.is_file() and not is_installed(path):
                 self.file(path, start)
+                return True
+        return False
 
     def beside(self, name: str, start: Path, folder: Path) -> bool:
         """Take a module or a package that is beside a file; returns whether there is one."""

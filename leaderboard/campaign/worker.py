@@ -139,7 +139,8 @@ def _prepare_worker(unit: Unit) -> None:
     global _prepared
     first, _prepared = not _prepared, True
     if unit.confinement != "none":  # it loads its kernels while the first recording is made
-        prepare(unit.confinement, unit.seal.unreadable(unit.folder))
+        wanted = any(entrant.kernels and not entrant.reference for entrant, _ in unit.entrants)
+        prepare(unit.confinement, unit.seal.unreadable(unit.folder), loaded=wanted)
     if first:
         _load_kernels(unit.confinement == "none" or any(entrant.reference for entrant, _ in unit.entrants))
 
@@ -151,7 +152,8 @@ def _load_kernels(estimators: bool) -> None:
     importlib.import_module("simnav.simulation.simulator")
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        discover_own()
+        if estimators:
+            discover_own()
         for kernel in kernels():
             if estimators or not kernel.__module__.startswith("simnav.estimators."):
                 kernel.compile()

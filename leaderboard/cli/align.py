@@ -6,21 +6,26 @@ from dataclasses import replace
 
 import numpy as np
 
+from simnav.leaderboard.figures.log_figures import DelayCurve, delay_panels
+from simnav.leaderboard.figures.style import save_as
 from simnav.leaderboard.given import scenario_of
-from simnav.leaderboard.log_requests import AlignRequest
 from simnav.leaderboard.logs import align
 from simnav.leaderboard.ranking import tables
 
+from .commands import AlignCommand
 from .console import Output
+from .options import absolute, require_figure
 
 __all__ = ["show"]
 
 
-def show(out: Output, request: AlignRequest) -> None:
+def show(out: Output, request: AlignCommand) -> None:
     """Compare every instrument of a log with the reference."""
+    require_figure("--plot", request.plot)
     scenario = scenario_of(request.scenario)
     found = align.of(replace(request, scenario=scenario))
     out.document({"scenario": scenario.id, "instruments": [a.to_dict() for a in found]})
+    curves = [DelayCurve(a.instrument, a.curve, a.delay, a.delay_sigma) for a in found if a.curve]
     rows = []
     for a in found:
         late = "" if not np.isfinite(a.delay) else f"{a.delay:.2f} +- {a.delay_sigma:.2g}"
@@ -31,4 +36,8 @@ def show(out: Output, request: AlignRequest) -> None:
     out.print(tables.table(f"{scenario.id} against its reference (SI units, radians)", columns, rows),
               "A delay d is taken out by offset_s = -d of the channel; a lever arm adds to lever_arm_m of the "
               "instrument.",
+              "A mounting is relative to the axes of [log.imu]; in degrees it is mounting_deg, if there was none.",
               "Residuals are correlated, so that the sigmas are rather too small.")  # fmt: skip
+    if request.plot is not None and curves:
+        title = f"{scenario.id}: rms of what is left, over its smallest value"
+        out.print(f"figure: {save_as(delay_panels(curves, title), absolute(request.plot))}")

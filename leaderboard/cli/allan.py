@@ -9,7 +9,6 @@ import numpy as np
 
 from simnav.leaderboard.figures.style import save_as
 from simnav.leaderboard.inspection import allan
-from simnav.leaderboard.ranking import tables
 from simnav.leaderboard.results.errors import mistakes
 
 from .commands import AllanCommand
@@ -17,8 +16,6 @@ from .console import Output
 from .options import absolute, require_figure
 
 if TYPE_CHECKING:
-    from rich.table import Table
-
     from simnav.leaderboard.allan import AllanReport
 
 __all__ = ["show"]
@@ -32,30 +29,11 @@ def show(out: Output, request: AllanCommand) -> None:
     written = None if request.csv is None else _write(report, absolute(request.csv))
     files = {"plot": None if drawn is None else str(drawn), "csv": None if written is None else str(written)}
     out.document({**report.to_dict(), **files})
-    out.print(_table(report))
+    out.print(*report.shown())
     out.print("in brackets: datasheet; lowest: of the Allan deviation, at its averaging time")
     for name, file in files.items():
         if file is not None:
             out.print(f"{'figure' if name == 'plot' else 'table'}: {file}")
-
-
-def _table(report: AllanReport) -> Table:
-    """A row for each axis."""
-    rows = []
-    for row in report.rows():
-        cells = [row["axis"].replace("_", " ")]
-        for name in ("random_walk", "lowest"):
-            told = row[f"{name}_datasheet"]
-            beside = "" if told is None else f" ({tables.number(told)})"
-            at = f" at {tables.number(row['lowest_at_s'])} s" if name == "lowest" else ""
-            cells.append(f"{tables.number(row[name])}{beside} {row[f'{name}_unit']}{at}")
-        cells.append(f"{tables.number(row['bias_instability'])} {row['lowest_unit']}")
-        cells.append(f"{tables.number(row['rate_random_walk'])} {row['rate_random_walk_unit']}")
-        rows.append(cells)
-    title = (
-        f"{report.title}: Allan deviation, {report.origin}, {report.duration / 3600.0:.3g} h at {report.rate:.4g} Hz"
-    )
-    return tables.table(title, ["axis", "white noise", "lowest", "bias instability", "random walk"], rows)
 
 
 def _write(report: AllanReport, path: Path) -> Path:

@@ -48,8 +48,16 @@ def root(
         list[Path] | None,
         typer.Option(help="Python file that registers instruments, scores, formats or others; repeatable."),
     ] = None,
+    figure_width: Annotated[
+        float | None,
+        typer.Option(min=50.0, max=1000.0, help="Width of figures that are written [mm], such as 88 or 180."),
+    ] = None,
 ) -> None:
     """The open benchmark for marine integrated navigation: simulate, estimate, score, rank."""
+    if figure_width is not None:
+        from simnav.leaderboard.figures.style import WIDTH
+
+        WIDTH.set(figure_width)
     if plugin:
         from simnav.plugins import PluginError, load_plugin
 

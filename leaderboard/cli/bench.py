@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 from simnav.leaderboard.costing import bench, costs
-from simnav.leaderboard.ranking.costs import cost_table, multiple_table
 from simnav.leaderboard.results.errors import RequestError
 
 from .commands import BenchCommand
@@ -28,7 +27,7 @@ def show(out: Output, request: BenchCommand) -> None:
     with out.progress("measuring") as bar:
         report = bench.of(replace(request, progress=bar))
     out.document(report.to_dict())
-    out.print(multiple_table(report.multiples), cost_table(report))
+    out.print(*report.shown())
     out.print(*(f"{c.estimator}: {c.status}: {c.reason}" for c in report.costs if c.status != "ok"))
     out.print("time: processor time of update(); memory: from construction to smooth(), measurements aside")
     measured = {m.estimator for m in report.multiples.rows}
@@ -45,7 +44,7 @@ def _all(out: Output, request: BenchCommand) -> None:
             output=request.output, progress=bar,
         )  # fmt: skip
     out.document(report.to_dict())
-    out.print(multiple_table(report))
+    out.print(*report.shown())
     out.print(*(f"{u.estimator}: {u.status}: {u.reason}" for u in report.unmeasured))
     if report.file:
         out.print(f"stored: {report.file}")

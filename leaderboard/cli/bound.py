@@ -10,7 +10,6 @@ import numpy as np
 
 from simnav.leaderboard.given import scenario_of
 from simnav.leaderboard.inspection import bound
-from simnav.leaderboard.ranking import tables
 from simnav.leaderboard.results.errors import mistakes
 
 from .commands import BoundCommand
@@ -18,14 +17,9 @@ from .console import Output
 from .options import absolute
 
 if TYPE_CHECKING:
-    from rich.table import Table
-
     from simnav.leaderboard.ranking.bounds import BoundReport
 
 __all__ = ["show"]
-
-#: Epochs that the table shows.
-_ROWS = 12
 
 
 def show(out: Output, request: BoundCommand) -> None:
@@ -35,21 +29,10 @@ def show(out: Output, request: BoundCommand) -> None:
         report = bound.of(replace(request, scenario=chosen, progress=progress))
     written = None if request.csv is None else _write(report, absolute(request.csv))
     out.document({**report.to_dict(), "csv": None if written is None else str(written)})
-    out.print(_table(report))
+    out.print(*report.shown())
     out.print("clean: no faults; flags: faults known as they come; mix: only their statistics known")
     if written is not None:
         out.print(f"table: {written}")
-
-
-def _table(report: BoundReport) -> Table:
-    """A dozen epochs and the whole run."""
-
-    shown = np.unique(np.linspace(0, len(report.time) - 1, _ROWS).astype(int))
-    rows = [[f"{report.time[i]:g}", *(tables.number(float(b.horizontal[i])) for b in report.bounds)] for i in shown]
-    rows.append(["whole run", *(tables.number(b.horizontal_rms) for b in report.bounds)])
-    error = "horizontal error of smoothed output" if report.smoothed else "horizontal error"
-    title = f"{report.scenario}: bound on the RMS {error} [m], {report.runs} seeds"
-    return tables.table(title, ["time [s]", "clean", "flags", "mix"], rows)
 
 
 def _write(report: BoundReport, path: Path) -> Path:

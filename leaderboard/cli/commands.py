@@ -15,6 +15,7 @@ from simnav.leaderboard.log_requests import (
     AlignRequest,
     ExportRequest,
     InspectRequest,
+    RecordingsRequest,
     ScoreRequest,
     TuneNoiseRequest,
 )
@@ -22,6 +23,7 @@ from simnav.leaderboard.publishing_requests import (
     AuditRequest,
     BundleOptions,
     CheckStandardRequest,
+    DrawRequest,
     PublishRequest,
     SiteRequest,
     StandardRequest,
@@ -89,7 +91,7 @@ class ListCommand:
 class ShowCommand:
     """Show all about a scenario, an estimator, a kind of instrument or a kind of fault."""
 
-    name: str = option(help="Its name, as 'simnav list' has it.", argument=True, metavar="NAME")
+    name: str = option(help="Its name, as 'simnav list' has it, or its file.", argument=True, metavar="NAME")
 
 
 @request
@@ -202,6 +204,24 @@ class BoundCommand(BoundRequest):
 
 
 @request
+class AlignCommand(AlignRequest):
+    """Compare every instrument of a log with the reference: delay, lever arm, mounting, offset, scale, with sigmas."""
+
+    _: KW_ONLY
+    plot: Path | None = option(default=None, help=_FIGURE)
+
+
+@request
+class InspectCommand(InspectRequest):
+    """Show what the files of a log hold, and write a scenario to begin with."""
+
+    _: KW_ONLY
+    plot: Path | None = option(
+        default=None, help="Write a map of the tracks, and when there are data: .png, .svg or .pdf."
+    )
+
+
+@request
 class AllanCommand(AllanRequest):
     """Show the Allan deviation of an IMU and its noise coefficients, beside its datasheet."""
 
@@ -289,9 +309,10 @@ COMMANDS: Mapping[str, tuple[type[Any], str]] = {
     "simulate": (SimulateCommand, "simulate"),
     "score": (ScoreCommand, "score"),
     "export": (ExportRequest, "export"),
-    "inspect": (InspectRequest, "inspect"),
-    "align": (AlignRequest, "align"),
+    "inspect": (InspectCommand, "inspect"),
+    "align": (AlignCommand, "align"),
     "tune-noise": (TuneNoiseRequest, "tune_noise"),
+    "recordings": (RecordingsRequest, "recordings"),
     "check": (CheckCommand, "check"),
     "bench": (BenchCommand, "bench"),
     "new-estimator": (NewEstimatorCommand, "new_estimator"),
@@ -320,7 +341,7 @@ COMMANDS: Mapping[str, tuple[type[Any], str]] = {
 HEADINGS: Mapping[str, Sequence[str]] = {
     "Every day": ("list", "show", "run", "evaluate", "check", "new-estimator", "simulate", "sweep", "campaign",
                   "leaderboard"),
-    "Logs and programs of others": ("inspect", "align", "tune-noise", "export", "score"),
+    "Logs and programs of others": ("inspect", "align", "tune-noise", "recordings", "export", "score"),
     "Study and publish": ("tune", "train", "bench", "robustness", "bound", "allan", "realism", "reproduce", "claim",
                           "rescore", "merge", "submit", "verify", "seal", "cite"),
     "Maintain": ("standard", "reference", "warmup"),
@@ -334,6 +355,7 @@ GROUPS: Mapping[str, tuple[str, Mapping[str, tuple[type[Any], str]]]] = {
             "run": (StandardRequest, "standard_run"),
             "check": (CheckStandardRequest, "standard_check"),
             "audit": (AuditRequest, "standard_audit"),
+            "draw": (DrawRequest, "standard_draw"),
             "publish": (PublishRequest, "standard_publish"),
         },
     ),

@@ -13,6 +13,7 @@ import sys
 import time
 import warnings
 from collections.abc import Iterator
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from simnav.leaderboard.results.errors import RequestError, sentence, shortened
@@ -20,6 +21,8 @@ from simnav.leaderboard.results.plain import as_json
 
 if TYPE_CHECKING:
     from rich.console import Console, RenderableType
+
+    from simnav.log.progress import Watcher
 
 __all__ = ["Output", "ProgressBar", "session"]
 
@@ -156,6 +159,24 @@ class Output:
         """A progress display on standard error."""
         return ProgressBar(self._console(stderr=True), text, total)
 
+    def reading(self) -> Watcher:
+        """Tells every few seconds how far a log file has been read."""
+        said = time.monotonic()
+
+        def watcher(path: Path, done: int, total: int) -> None:
+            nonlocal said
+            if time.monotonic() - said >= ProgressBar.PAUSE and total > 0:
+                said = time.monotonic()
+                self.note(f"reading {path.name}: {100 * done // total} %")
+
+        return watcher
+
+    def compiling(self) -> None:
+        """Say that what comes next takes its time, once."""
+        self.remark(
+            "compiling kernels; they are kept for later runs ('simnav warmup' compiles all, in a minute or two)"
+        )
+
     def document(self, value: Any) -> None:
         """Set what ``--json`` prints when the command ends."""
         self._document = value
@@ -200,6 +221,9 @@ def session(json: bool, debug: bool) -> Iterator[Output]:
     """
     import typer
 
+    from simnav.compiled import announced
+    from simnav.log.progress import watched
+
     out = Output(json, debug)
     previous = warnings.showwarning
 
@@ -209,7 +233,7 @@ def session(json: bool, debug: bool) -> Iterator[Output]:
     try:
         if not debug:
             warnings.showwarning = warn
-        with _quiet_stdout(json):
+        with _quiet_stdout(json), watched(out.reading()), announced(out.compiling):
             yield out
     except (typer.Exit, typer.Abort):
         raise

@@ -10,6 +10,7 @@ from simnav.leaderboard.ranking.agreement import LEAST, correlation_table
 from simnav.leaderboard.ranking.confinement import confinement_line
 from simnav.leaderboard.ranking.failures import failure_table
 from simnav.leaderboard.ranking.ranking_table import ranking_tables
+from simnav.leaderboard.ranking.voyages import voyage_tables
 
 from .console import Output
 
@@ -23,6 +24,7 @@ def show(out: Output, request: SiteRequest) -> None:
     out.document(made.to_dict())
     out.print(*ranking_tables(made.ranking), *failure_table(made.results))
     out.print(*filter(None, [confinement_line(made.results)]))
+    out.print(*voyage_tables(made.voyages))
     if made.correlations:
         out.print(correlation_table(made.correlations))
     elif request.against is not None:

@@ -178,11 +178,12 @@ _MORE = "'simnav show NAME' has the rest."
 
 def _scenario_lines(found: list[ScenarioItem]) -> tables.Lines:
     rows = [[e.name, e.track, tables.duration(e.duration), e.title] for e in found]
-    return tables.Lines("Scenarios", ["name", "track", "duration", "title"], rows, numeric=["duration"], caption=_MORE)
+    return tables.Lines("Scenarios", ["name", "track", "duration", "title"], rows, numeric=["duration"], caption=_MORE,
+                        spare=["track"])  # fmt: skip
 
 
 def _estimator_lines(found: list[EstimatorItem]) -> tables.Lines:
-    rows = [[e.name + (" *" if e.reference else ""), e.summary] for e in found]
+    rows = [[e.name + (" *" if e.reference else ""), e.summary.replace("``", "")] for e in found]
     dim = [i for i, e in enumerate(found) if e.reference]
     caption = f"{_MORE} * reference: it is told the truth, and is not ranked." if dim else _MORE
     return tables.Lines("Estimators", ["name", "what it is"], rows, dim=dim, caption=caption)

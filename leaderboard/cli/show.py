@@ -9,9 +9,10 @@ from collections.abc import Mapping
 from typing import Any, TypeAlias
 
 from simnav.estimator import describe
+from simnav.leaderboard.campaign.request import file_of
+from simnav.leaderboard.given import scenario_of
 from simnav.leaderboard.ranking import tables
-from simnav.leaderboard.results.errors import RequestError
-from simnav.scenario import load
+from simnav.leaderboard.results.errors import RequestError, mistakes
 
 from .commands import ShowCommand
 from .console import Output
@@ -32,6 +33,8 @@ def show(out: Output, request: ShowCommand) -> None:
         "fault": {f.kind: f for f in faults()},
     }
     found = {sort: items[name] for sort, items in every.items() if name in items}
+    if not found and (item := _of_file(request.name)) is not None:
+        found = {"scenario" if isinstance(item, ScenarioItem) else "estimator": item}
     if not found:
         near = difflib.get_close_matches(name, [n for items in every.values() for n in items], 3, 0.6)
         meant = f"; did you mean {' or '.join(near)}?" if near else ""
@@ -46,13 +49,26 @@ def show(out: Output, request: ShowCommand) -> None:
             out.print(_kind(sort, item))
 
 
+def _of_file(name: str) -> Item | None:
+    """A scenario or an estimator of a file; None for any other name."""
+    if name.endswith(".toml"):
+        s = scenario_of(name)
+        return ScenarioItem(name, s.id, s.title, s.duration, tuple(s.tags), s.track, s.group, "", name)
+    if not file_of(name):
+        return None
+    with mistakes(ValueError, FileNotFoundError):
+        told = describe(name)
+    defaults = {p.name: None if p.required else p.default for p in told.parameters}
+    return EstimatorItem(name, (), told.summary, told.reference, defaults, told.file, told.line)
+
+
 def _facts(title: str, facts: Mapping[str, Any]) -> Any:
     """A table of two columns."""
     return tables.table(title, ["", ""], [[key, value] for key, value in facts.items() if value not in ("", None)])
 
 
 def _scenario(item: ScenarioItem) -> list[Any]:
-    scenario = load(item.name)
+    scenario = scenario_of(item.name)
     facts = {
         "title": item.title, "track": item.track, "group": item.group, "duration": tables.duration(item.duration),
         "vessel": getattr(scenario.vessel, "kind", ""), "environment": item.gymnasium, "tags": ", ".join(item.tags),

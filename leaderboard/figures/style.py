@@ -8,7 +8,9 @@ are ordinary light figures everywhere else.
 from __future__ import annotations
 
 import io
+import warnings
 from collections.abc import Iterable, Sequence
+from contextvars import ContextVar
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -25,8 +27,10 @@ __all__ = [
     "INK",
     "PALETTE",
     "SHADE",
+    "WIDTH",
     "Style",
     "figure",
+    "fitted",
     "save",
     "save_as",
     "styled",
@@ -45,6 +49,11 @@ _DARK = {
 }
 TRUTH = INK
 _DPI = 160  # of PNG files
+_SMALLEST = 7.0 / 9.0  # of the size of letters
+_NARROWEST = 0.44  # of the width: labels and panels are still side by side
+
+#: Width of the figures that `save_as` writes [mm]; None: as they were made.
+WIDTH: ContextVar[float | None] = ContextVar("width", default=None)
 
 _RC: dict[Any, Any] = {
     "font.family": "DejaVu Sans",
@@ -186,8 +195,42 @@ def save(fig: Figure, path: Path, *, formats: Sequence[str] = ("svg", "png")) ->
     return written
 
 
+def fitted(fig: Figure, width: float) -> Figure:
+    """A figure for the column of a journal, changed in place.
+
+    Letters get smaller, down to seven ninths, so that 9 pt become 7 pt; the height is that which they need. A figure of
+    several columns of panels stays wider than one column, with a warning.
+
+    Parameters
+    ----------
+    fig : matplotlib.figure.Figure
+        A figure that was not written before.
+    width : float
+        Width of the column [mm].
+    """
+    from matplotlib.text import Text
+
+    before, height = fig.get_size_inches()
+    wide = max(width / 25.4, _NARROWEST * before)
+    if wide > width / 25.4:
+        warnings.warn(f"the figure is {25.4 * wide:.0f} mm wide: its panels need that", UserWarning, stacklevel=2)
+    letters = min(1.0, max(_SMALLEST, (wide / before) ** 0.5))
+    for text in fig.findobj(Text):
+        text.set_fontsize(text.get_fontsize() * letters)
+    for axes in fig.axes:
+        axes.tick_params(labelsize=_RC["xtick.labelsize"] * letters)
+    fig.set_size_inches(wide, height * letters)
+    return fig
+
+
 def save_as(fig: Figure, path: Path) -> Path:
-    """Write a figure in the format that its file's suffix names, such as ``.png``; returns the path."""
+    """Write a figure in the format that its file's suffix names, such as ``.png``; returns the path.
+
+    Its width is `WIDTH`, where that is set.
+    """
+    width = WIDTH.get()
+    if width is not None:
+        fitted(fig, width)
     return save(fig, path, formats=(path.suffix[1:].lower(),))[0]
 
 

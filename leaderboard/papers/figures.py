@@ -197,7 +197,7 @@ class _Sketch:
         key = (scenario, request.label)
         if key not in self.trials:
             confinement = chosen_confinement()
-            entrant = resolve(request, confinement, (), alone=True)
+            entrant = resolve(request, confinement, ())
             made = try_estimator(entrant, self._recording(scenario), Limits(_TIMEOUT, _MEMORY), confinement)
             self.trials[key] = (
                 made.trial if made.status == "ok" and made.trial is not None and len(made.trial) else None

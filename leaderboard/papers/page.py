@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 import shutil
+import sys
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from functools import cache
+from io import BytesIO
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
+from zipfile import BadZipFile, ZipFile
 
 from pydantic import TypeAdapter
 
 from simnav.leaderboard.results.files import write_whole
+from simnav.leaderboard.results.user_cache import keep, user_cache
 from simnav.leaderboard.site.content import SiteFacts
 from simnav.leaderboard.site.pages import STATIC, TEMPLATES, environment
 
@@ -28,6 +33,7 @@ if TYPE_CHECKING:
 __all__ = ["PaperPage", "pages_in", "write"]
 
 _FORMAT = 4  # of the document
+_NAME, _MOST_KEPT = "document.json", 20  # of the pages that are kept in the user's cache
 
 
 @dataclass(frozen=True)
@@ -179,9 +185,44 @@ def _stored(folder: Path, key: str) -> PaperPage | None:
         return None
 
 
-@cache
 def _drawn(key: str) -> tuple[_Document, dict[str, bytes]]:
-    """The page from the stored results with its figures, by name: the same in each site that a process makes."""
+    """The page from the stored results with its figures, by name; kept in the user's cache, for to draw takes seconds.
+
+    What is kept is known by all code of simnav, by all files of the papers and of the scenarios, and by the versions of
+    the libraries.
+    """
+    kept = user_cache() / "papers" / f"{key}-{_state()}.zip"
+    with suppress(OSError, ValueError, KeyError, BadZipFile), ZipFile(kept) as file:
+        figures = {name: file.read(name) for name in file.namelist()}
+        return _json().validate_json(figures.pop(_NAME)), figures
+    document, figures = _draw(key)
+    content = BytesIO()
+    with ZipFile(content, "w") as file:
+        for name, figure in {_NAME: _json().dump_json(document), **figures}.items():
+            file.writestr(name, figure)
+    keep(kept, content.getvalue())
+    with suppress(OSError):
+        for old in sorted(kept.parent.glob("*.zip"), key=lambda p: p.stat().st_mtime)[:-_MOST_KEPT]:
+            old.unlink(missing_ok=True)
+    return document, figures
+
+
+@cache
+def _state() -> str:
+    """Digest of all that decides a page from stored results."""
+    from importlib.metadata import version
+
+    from simnav.leaderboard.campaign.sources import LIBRARY, digest, files_digest, folder_code
+
+    here = Path(__file__).parent
+    files = [p for place in (here, LIBRARY / "scenarios") for p in sorted(place.rglob("*")) if p.is_file()]
+    data = files_digest((str(p), p) for p in files if p.suffix not in (".py", ".pyc"))
+    versions = [version(name) for name in ("simnav", "matplotlib", "numpy")]
+    return digest(folder_code(LIBRARY), data, sys.version, *versions)
+
+
+def _draw(key: str) -> tuple[_Document, dict[str, bytes]]:
+    """The page from the stored results with its figures, by name."""
     from . import paper, stored
     from .figures import write_figures
 

@@ -21,7 +21,7 @@ from .board import Ranking, TrackRanking
 if TYPE_CHECKING:
     from rich.table import Table
 
-__all__ = ["LEADING", "LEAST", "RankCorrelation", "correlation_table", "rank_correlations"]
+__all__ = ["LEADING", "LEAST", "RankCorrelation", "correlation_table", "rank_correlation", "rank_correlations"]
 
 #: With fewer rows in common an order says nothing.
 LEAST = 5
@@ -81,12 +81,13 @@ def rank_correlations(board: Ranking, other: Ranking) -> list[RankCorrelation]:
     found = []
     for k, first in enumerate(board.tracks):
         for second in other.tracks[k + 1 :] if same else other.tracks:
-            if first.score == second.score and (found_here := _correlation(first, second)) is not None:
+            if first.score == second.score and (found_here := rank_correlation(first, second)) is not None:
                 found.append(found_here)
     return found
 
 
-def _correlation(first: TrackRanking, second: TrackRanking) -> RankCorrelation | None:
+def rank_correlation(first: TrackRanking, second: TrackRanking) -> RankCorrelation | None:
+    """The correlation of two tracks; None with fewer than `LEAST` ranked rows in common, or where all are equal."""
     scores, others = ({r.estimator: r.score for r in t.rows if r.ranked} for t in (first, second))
     rows = tuple(name for name in scores if name in others)
     leaders = set(sorted(scores, key=lambda name: scores[name])[:LEADING])

@@ -2,28 +2,37 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from simnav.leaderboard.figures.panels import curves_over_time
 from simnav.leaderboard.figures.plots import Curve
 from simnav.leaderboard.figures.style import Style
 from simnav.leaderboard.results.errors import mistakes
 from simnav.leaderboard.results.frame import frame
+from simnav.leaderboard.results.shown import Shown
 from simnav.types import COMPONENTS, Array
+
+from . import tables
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+    from rich.table import Table
 
     from simnav.estimators.bound import Bound
     from simnav.scenario import Scenario
 
 __all__ = ["BoundReport", "bounds_of"]
 
+#: Epochs that the table shows.
+_ROWS = 12
 
-@dataclass(frozen=True, eq=False)
-class BoundReport:
+
+@dataclass(frozen=True, eq=False, repr=False)
+class BoundReport(Shown):
     """The bounds of a scenario.
 
     Attributes
@@ -42,6 +51,18 @@ class BoundReport:
     runs: int
     smoothed: bool
     bounds: tuple[Bound, ...]
+
+    def headline(self) -> str:
+        """Of which error, and over how many seeds."""
+        error = "horizontal error of smoothed output" if self.smoothed else "horizontal error"
+        return f"{self.scenario}: bound on the RMS {error} [m], {self.runs} seeds"
+
+    def shown(self) -> Sequence[Table]:
+        """A dozen epochs and the whole run."""
+        at = np.unique(np.linspace(0, len(self.time) - 1, _ROWS).astype(int))
+        rows = [[f"{self.time[i]:g}", *(tables.number(float(b.horizontal[i])) for b in self.bounds)] for i in at]
+        rows.append(["whole run", *(tables.number(b.horizontal_rms) for b in self.bounds)])
+        return [tables.table(self.headline(), ["time [s]", *(b.kind for b in self.bounds)], rows)]
 
     @property
     def time(self) -> Array:

@@ -12,6 +12,7 @@ from simnav.leaderboard.figures.panels import Bar, bars
 from simnav.leaderboard.figures.style import Style
 from simnav.leaderboard.results.errors import mistakes
 from simnav.leaderboard.results.frame import frame
+from simnav.leaderboard.results.shown import Shown
 from simnav.testing.cost import Cost, measure
 
 from . import tables
@@ -30,8 +31,8 @@ __all__ = ["BESIDE", "CostReport", "MultipleReport", "cost_table", "costs_of", "
 BESIDE = ("dead-reckoning", "gnss-only", "ship-ekf", "ekf", "ukf", "sw-fgo", "ekf-rts")
 
 
-@dataclass(frozen=True)
-class MultipleReport:
+@dataclass(frozen=True, repr=False)
+class MultipleReport(Shown):
     """Processor times as multiples of those of the plain row.
 
     Attributes
@@ -49,6 +50,14 @@ class MultipleReport:
     unmeasured: tuple[Unmeasured, ...]
     file: str = ""
 
+    def headline(self) -> str:
+        """How many rows were measured."""
+        return f"processor times of {len({row.estimator for row in self.rows})} estimators beside the plain row"
+
+    def shown(self) -> Sequence[Table]:
+        """A row a multiple."""
+        return [multiple_table(self)]
+
     def to_dict(self) -> dict[str, Any]:
         """What ``simnav bench --all --json`` prints."""
         return asdict(self)
@@ -58,8 +67,8 @@ class MultipleReport:
         return frame([asdict(row) for row in self.rows])
 
 
-@dataclass(frozen=True)
-class CostReport:
+@dataclass(frozen=True, repr=False)
+class CostReport(Shown):
     """What an epoch costs.
 
     Attributes
@@ -85,6 +94,14 @@ class CostReport:
     estimators: tuple[str, ...]
     costs: tuple[Cost, ...]
     multiples: MultipleReport
+
+    def headline(self) -> str:
+        """What was measured."""
+        return f"{self.scenario}, {self.epochs} epochs: cost of {', '.join(self.estimators)}"
+
+    def shown(self) -> Sequence[Table]:
+        """Multiples of the plain row, then times and memory."""
+        return [multiple_table(self.multiples), cost_table(self)]
 
     def to_dict(self) -> dict[str, Any]:
         """What ``simnav bench --json`` prints."""

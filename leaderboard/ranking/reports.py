@@ -22,6 +22,7 @@ from .standing import Standing, standing_table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+    from rich.console import RenderableType
 
     from simnav.leaderboard.campaign.campaign import Summary
 
@@ -46,9 +47,10 @@ class _Report(Shown):
     def headline(self) -> str:
         """How much was run."""
         scenarios, labels = ({getattr(r, name) for r in self.results} for name in ("scenario", "estimator"))
-        return f"{len(self.results)} results of {len(labels)} estimators on {len(scenarios)} scenarios"
+        runs = sum(r.tried for r in self.results)
+        return f"{runs} runs of {len(labels)} estimators on {len(scenarios)} scenarios"
 
-    def shown(self) -> Sequence[tables.Fitted]:
+    def shown(self) -> Sequence[RenderableType]:
         """A table for each track."""
         return ranking_tables(self.ranking)
 
@@ -64,6 +66,12 @@ class _Report(Shown):
 @dataclass(frozen=True, eq=False, repr=False)
 class StandardReport(_Report):
     """The result that comes with simnav."""
+
+    def shown(self) -> Sequence[RenderableType]:
+        """The table of the first track, and where the others are."""
+        first, *others = ranking_tables(self.ranking)
+        names = ", ".join(t.track for t in self.ranking.tracks[1:])
+        return [first, f"In .ranking.tracks, too: {names}."] if others else [first]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -85,7 +93,7 @@ class CampaignReport(_Report):
             "seconds": self.summary.seconds,
             "asked": self.summary.total,
             "computed": self.summary.computed,
-            "runs": len(self.results),
+            "runs": sum(r.tried for r in self.results),
             "failed": failures(self.results),
             "confinement": confined(self.results),
             "ranking": self.ranking.to_dict(),

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from . import tables
-from .statistics import compare
+from .statistics import compare, smallest_p_value
 
 if TYPE_CHECKING:
     from .runs import Runs
@@ -40,6 +40,8 @@ class StandingRow:
         Share of the seeds on which the estimator in question has the smaller error.
     p_value : float or None
         p-value of the paired test.
+    smoothed_horizontal_rmse : float or None
+        Median of the smoothed trajectories [m]; None for an estimator that does not smooth.
     """
 
     estimator: str
@@ -54,6 +56,7 @@ class StandingRow:
     ratio_high: float | None = None
     better: float | None = None
     p_value: float | None = None
+    smoothed_horizontal_rmse: float | None = None
 
 
 @dataclass(frozen=True)
@@ -140,11 +143,13 @@ def _apart(row: StandingRow) -> bool:
 def _row(runs: Runs, mine: Runs | None) -> StandingRow:
     score = runs.score("horizontal_rmse")
     figures = (runs.estimator, runs.reference, len(runs.tried), runs.failed, score.value, score.low, score.high)
+    late = runs.score("smoothed_horizontal_rmse").value
+    smoothed = late if math.isfinite(late) else None
     if mine is not None and runs is not mine and mine.tried:
         with contextlib.suppress(ValueError):  # no seed in common, or errors of zero
             c = compare(_errors(mine), _errors(runs))
-            return StandingRow(*figures, c.ratio, c.low, c.high, c.better, c.p_value)
-    return StandingRow(*figures)
+            return StandingRow(*figures, c.ratio, c.low, c.high, c.better, c.p_value, smoothed)
+    return StandingRow(*figures, smoothed_horizontal_rmse=smoothed)
 
 
 def _errors(runs: Runs) -> dict[object, float]:
@@ -155,24 +160,28 @@ def _errors(runs: Runs) -> dict[object, float]:
 def standing_table(stand: Standing) -> tables.Fitted:
     """The table of a standing for the terminal."""
     rows = []
+    smoothed = any(r.smoothed_horizontal_rmse is not None for r in stand.rows)
     for r in stand.rows:
         better = "" if r.better is None else tables.percent(r.better)
         ratio = "" if r.ratio is None else tables.interval(r.ratio, r.ratio_low, r.ratio_high)
         p = "" if r.p_value is None else ("< 0.001" if r.p_value < 0.001 else f"{r.p_value:.3f}")
+        p = p if r.p_value is None or smallest_p_value(r.runs) < _LEVEL else tables.MISSING  # too few seeds to decide
         rows.append([r.estimator + (" *" if r.reference else ""), f"{r.failed} of {r.runs}",
-                     tables.interval(r.horizontal_rmse, r.low, r.high), ratio, better, p])  # fmt: skip
+                     tables.interval(r.horizontal_rmse, r.low, r.high),
+                     tables.number(r.smoothed_horizontal_rmse) if smoothed else "", ratio, better, p])  # fmt: skip
     mine = stand.estimator
     with_interval = " with its 95 % interval" if any(math.isfinite(r.low) for r in stand.rows) else ""
-    columns = ["estimator", "failed", "horizontal RMSE [m]", f"{mine} / it", f"{mine} better in", "p"]
+    columns = ["estimator", "failed", "horizontal RMSE [m]", "smoothed [m]", f"{mine} / it", f"{mine} better in", "p"]
     return tables.Fitted(
         f"{stand.scenario}: {mine} {stand.places}",
         columns,
         rows,
-        ["estimator", f"{mine} / it", "p", "horizontal RMSE [m]", "failed", f"{mine} better in"],
+        ["estimator", f"{mine} / it", "p", "horizontal RMSE [m]", "smoothed [m]", "failed", f"{mine} better in"],
         numeric=columns[1:],
         dim=[i for i, r in enumerate(stand.rows) if r.reference],
         strong=[i for i, r in enumerate(stand.rows) if r.estimator == mine],
         caption=f"Median over the seeds{with_interval}. Ratio: geometric mean over the same seeds; below 1 "
         "the estimator is better; a run that only one of the two failed counts 1000. p: studentised bootstrap. "
-        "Intervals need 6 seeds. * reference: told the truth.",
+        "Intervals and p-values need 6 seeds. * reference: told the truth.",
+        explained={"smoothed [m]": "Smoothed: the same of the smoothed trajectories; all else is in real time."},
     )

@@ -182,6 +182,8 @@ class Lines:
         Cells of each entry.
     numeric, dim, caption
         As in `table`.
+    spare : sequence of str
+        Columns that are left out, one after the other, while they leave too little for the last one.
     """
 
     title: str
@@ -190,20 +192,28 @@ class Lines:
     numeric: Sequence[str] = ()
     dim: Sequence[int] = ()
     caption: str | None = None
+    spare: Sequence[str] = ()
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
-        widths = [max(map(len, (name, *cells))) for name, *cells in zip(self.columns[:-1], *self.heads, strict=True)]
-        room = max(options.max_width - _EDGES - sum(widths) - _BETWEEN * len(widths), _LEAST)
-        rows = [[*head, _cut(row[-1], room)] for head, row in zip(self.heads, self.rows, strict=True)]
-        yield table(self.title, self.columns, rows, numeric=self.numeric, dim=self.dim, caption=self.caption)
+        heads = dict(zip(self.columns[:-1], list(zip(*self.rows, strict=True))[:-1], strict=False))
+        spare = list(self.spare)
+        while (room := self._room(heads, options.max_width)) < _ENOUGH and spare:
+            heads.pop(spare.pop(0), None)
+        last = [_cut(row[-1], max(room, _LEAST)) for row in self.rows]
+        rows = [list(cells) for cells in zip(*heads.values(), last, strict=True)]
+        columns = [*heads, self.columns[-1]]
+        numeric = [name for name in self.numeric if name in columns]
+        yield table(self.title, columns, rows, numeric=numeric, dim=self.dim, caption=self.caption)
 
-    @property
-    def heads(self) -> list[Sequence[str]]:
-        """The cells of all columns but the last."""
-        return [row[:-1] for row in self.rows]
+    @staticmethod
+    def _room(heads: Mapping[str, Sequence[str]], width: int) -> int:
+        """What columns leave of a width for the last one [characters]."""
+        widths = (max(map(len, (name, *cells))) for name, cells in heads.items())
+        return width - _EDGES - sum(w + _BETWEEN for w in widths)
 
 
 _LEAST = 12  # characters of the last column of `Lines`, be the terminal ever so narrow
+_ENOUGH = 30  # characters of it that can be read
 
 
 def _cut(text: str, width: int) -> str:

@@ -15,9 +15,11 @@ from simnav.scenario.catalogue import headers
 if TYPE_CHECKING:
     from simnav.scenario.catalogue import Header
 
-__all__ = ["POST_PROCESSED", "RECORDED", "SMOOTHED", "Track", "catalogued", "tracks_of"]
+__all__ = ["POST_PROCESSED", "RECORDED", "RECORDINGS", "SMOOTHED", "Track", "catalogued", "title", "tracks_of"]
 
 RECORDED = "recorded"
+#: Public recordings that are no part of the catalogue (`simnav.leaderboard.recordings`).
+RECORDINGS = "recordings"
 #: The score of the track of smoothed trajectories.
 SMOOTHED = "smoothed_horizontal_rmse"
 #: The tracks whose scenarios are ranked for smoothed output, too.
@@ -34,7 +36,9 @@ _TITLES = {
     "robustness": "Beyond the datasheets",
     "coloured": "Errors as they are at sea",
     "satellites": "Satellites, tightly and loosely coupled",
+    "acoustic": "Beams and ranges of sound",
     "recorded": "Recorded voyages",
+    "recordings": "Public recordings",
     "papers": "Scenarios of papers",
     "other": "Other scenarios",
 }

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 
 from .errors import RequestError
+from .home import home
 from .provenance import BENCHMARK, Provenance, benchmark_of, distinct
 
 __all__ = ["AUTHORS", "TITLE", "Citation", "citation"]
@@ -31,6 +32,8 @@ class Citation:
         Who made the results; of simnav itself its authors.
     note : str
         Version of the benchmark; of results also the commit, the days of the runs and how many runs there are.
+    repository : str
+        Web address of the repository of simnav; empty where it is not known.
     """
 
     key: str
@@ -38,13 +41,14 @@ class Citation:
     version: str
     note: str
     author: str = AUTHORS
+    repository: str = ""
 
     @property
     def bibtex(self) -> str:
         """A ``@software`` entry; a group has braces of its own, persons are parted by "and"."""
         author = f"{{{AUTHORS}}}" if self.author == AUTHORS else self.author
         fields = {"author": author, "title": f"{{{TITLE}}}", "year": self.year,
-                  "version": self.version, "note": self.note}  # fmt: skip
+                  "version": self.version, "url": self.repository, "note": self.note}  # fmt: skip
         lines = [f"  {name:<7} = {{{value}}}" for name, value in fields.items() if value]
         return f"@software{{{self.key},\n" + ",\n".join(lines) + "\n}"
 
@@ -52,7 +56,8 @@ class Citation:
     def text(self) -> str:
         """One line."""
         version = f", version {self.version}" if self.version else ""
-        return f"{self.author} ({self.year}). {TITLE}{version}. {self.note}."
+        place = f" {self.repository}" if self.repository else ""
+        return f"{self.author} ({self.year}). {TITLE}{version}. {self.note}.{place}"
 
     def to_dict(self) -> dict[str, str]:
         """What ``simnav cite --json`` prints."""
@@ -79,7 +84,8 @@ def citation(provenances: Iterable[Provenance] | None = None, author: str = "") 
 
         if author:
             raise RequestError("an author is named for results only; simnav itself has its own")
-        return Citation("simnav", f"{datetime.now(UTC).year}", version("simnav"), BENCHMARK)
+        return Citation("simnav", f"{datetime.now(UTC).year}", version("simnav"), BENCHMARK,
+                        repository=home().repository)  # fmt: skip
     if fault := _author_fault(author):
         raise RequestError(f'author {author!r:.80}: {fault}; like "Ana Silva and Per Olsen"')
     every = list(provenances)
@@ -94,7 +100,8 @@ def citation(provenances: Iterable[Provenance] | None = None, author: str = "") 
         note.append(f"computed on {days[0]}" if len(days) == 1 else f"computed from {days[0]} to {days[-1]}")
     versions = ", ".join(sorted({p.simnav for p in known if p.simnav}))
     year = days[-1][:4] if days else f"{datetime.now(UTC).year}"
-    return Citation(benchmark.replace(" ", "-") or "simnav", year, versions, "; ".join(note), author or AUTHORS)
+    return Citation(benchmark.replace(" ", "-") or "simnav", year, versions, "; ".join(note), author or AUTHORS,
+                    home().repository)  # fmt: skip
 
 
 def _author_fault(author: str) -> str:

@@ -274,14 +274,14 @@ def write_tables(file: BinaryIO, tables: Iterator[pa.Table], *, level: int | Non
     level : int, optional
         Level of the compression.
     split : bool
-        Store the bytes of scores by their place, which makes them smaller.
+        Store the bytes of scores and series by their place, which makes them smaller.
     """
     import pyarrow.parquet as pq
 
     options: dict[str, Any] = {"compression": "zstd", "compression_level": level, "write_page_checksum": True}
     if split:
-        values = "scores.key_value.value"
-        options["column_encoding"] = {values: "BYTE_STREAM_SPLIT"}
+        values = "scores.key_value.value", "series.list.element.values.list.element"
+        options["column_encoding"] = dict.fromkeys(values, "BYTE_STREAM_SPLIT")
         options["use_dictionary"] = [n for n in schema().names if n not in ("scores", "series")] + [
             "scores.key_value.key"
         ]

@@ -19,10 +19,10 @@ import numpy as np
 from simnav.leaderboard.campaign.fingerprint import recording_digest
 from simnav.leaderboard.campaign.sources import code_of, digest
 from simnav.leaderboard.figures.run_figure import fixes, innovation_unit, true_track
+from simnav.leaderboard.results.user_cache import keep, user_cache
 
 from .charts import NO_BOUND, columns
 from .facts import EVENT, catalogued, datasheets, events
-from .library import cache, write_cache
 from .rounding import short, spaced
 
 if TYPE_CHECKING:
@@ -95,7 +95,7 @@ def background_of(identity: str, seeds: Sequence[int]) -> Background:
             return Background(**json.loads(path.read_bytes()))
     made = background(identity, seeds)
     if path is not None:
-        write_cache(path, json.dumps(asdict(made), separators=(",", ":")))
+        keep(path, json.dumps(asdict(made), separators=(",", ":")))
         _forget(path.parent)
     return made
 
@@ -221,7 +221,7 @@ def _file(identity: str, seeds: Sequence[int]) -> Path | None:
         return None
     simulator, code = _code()
     words = scenario.model_dump_json() + str(BOUND_RUNS) + ",".join(map(str, seeds))
-    return cache() / "site" / f"{digest(recording_digest(scenario, simulator), code, words)}.json"
+    return user_cache() / "site" / f"{digest(recording_digest(scenario, simulator), code, words)}.json"
 
 
 def _forget(folder: Path) -> None:

@@ -13,27 +13,40 @@ from typing import Any
 
 from simnav.leaderboard.figures.appearance import EAST, HORIZONTAL_ERROR, NORTH, PROTECTION_LEVEL, TIME
 
+from .labels import GAP, LETTER, WIDE
+
 __all__ = [
+    "COLOUR",
+    "COST_HEIGHT",
+    "DETECTION_HEIGHT",
     "NO_BOUND",
     "NO_FAULTS",
+    "ZOOM_HELP",
     "Chart",
     "accuracy_and_cost",
+    "bands_of",
     "columns",
     "detection",
-    "dial",
     "distribution",
+    "front_colour",
+    "front_names",
+    "lines_of",
     "over_time",
+    "quantity",
     "ratios_by_group",
     "spread",
     "spread_data",
     "stanford",
     "timed",
     "timeline",
+    "tips",
     "track",
 ]
 
 Spec = dict[str, Any]
 
+#: Heights of charts whose names are set apart [pixels].
+COST_HEIGHT, DETECTION_HEIGHT = 340.0, 300.0
 
 #: Zoom by the wheel with Shift, so that the page still scrolls; a double click shows all again.
 _ZOOM = {
@@ -41,7 +54,7 @@ _ZOOM = {
     "select": {"type": "interval", "zoom": "wheel![event.shiftKey]"},
     "bind": "scales",
 }
-_ZOOM_HELP = "Drag to move, Shift and wheel to zoom, double click to see all again."
+ZOOM_HELP = "Drag to move, Shift and wheel to zoom, double click to see all again."
 
 
 @dataclass(frozen=True)
@@ -102,7 +115,8 @@ def timed(
     return {"curves": curves, "faults": faults, "bound": bound}
 
 
-def _axis(name: str, title: str, *, log: bool = False, **more: Any) -> Spec:
+def quantity(name: str, title: str, *, log: bool = False, **more: Any) -> Spec:
+    """A place on an axis, by a number."""
     scale = {"type": "log", "nice": False} if log else {"zero": False, "nice": False}
     return {"field": name, "type": "quantitative", "title": title, "scale": scale, **more}
 
@@ -112,11 +126,11 @@ def _roomy(axis: Spec, pixels: int = 14) -> Spec:
     return {**axis, "scale": {**axis["scale"], "padding": pixels}}
 
 
-_COLOUR = {"field": "row", "type": "nominal", "scale": "$colours", "legend": None}
-_ROW = {"color": _COLOUR, "strokeDash": {**_COLOUR, "scale": "$dashes"}}
+COLOUR = {"field": "row", "type": "nominal", "scale": "$colours", "legend": None}
+_ROW = {"color": COLOUR, "strokeDash": {**COLOUR, "scale": "$dashes"}}
 
 
-def _lines(curves: Spec, encoding: Spec) -> Spec:
+def lines_of(curves: Spec, encoding: Spec) -> Spec:
     """A line a row, which zooms."""
     return {
         **curves,
@@ -126,16 +140,18 @@ def _lines(curves: Spec, encoding: Spec) -> Spec:
     }
 
 
-def _bands(curves: Spec, x: Spec, y: Spec) -> Spec:
-    """A band a row, from ``low`` to ``high``."""
+def bands_of(curves: Spec, x: Spec, y: Spec) -> Spec:
+    """A band a row, from ``low`` to ``high``, of the first three rows that are shown: more hide each other."""
+    first = {"filter": {"field": "row", "oneOf": "$banded"}}
     return {
         **curves,
+        "transform": [*curves.get("transform", ()), first],
         "mark": {"type": "area", "opacity": 0.13},
-        "encoding": {"x": x, "y": {**y, "field": "low"}, "y2": {"field": "high"}, "color": _COLOUR},
+        "encoding": {"x": x, "y": {**y, "field": "low"}, "y2": {"field": "high"}, "color": COLOUR},
     }
 
 
-def _tip(**fields: str) -> list[Spec]:
+def tips(**fields: str) -> list[Spec]:
     """Fields that are shown on hover, with their headings; figures have three digits."""
     return [
         {"field": name, "title": title} if name in _TEXTS else {"field": name, "title": title, "format": ".3~g"}
@@ -180,8 +196,8 @@ def over_time(
         As of `timed`. ``curves``: curves by row over ``time`` with ``middle`` (and ``low``, ``high``); ``faults``:
         columns ``start``, ``end``, ``name``; ``bound``: columns ``time``, ``bound``.
     """
-    x = _axis("time", TIME)
-    y = _axis("middle", f"{title} [{unit}]", log=log)
+    x = quantity("time", TIME)
+    y = quantity("middle", f"{title} [{unit}]", log=log)
     kept = "datum.middle > 0" if log else "isValid(datum.middle)"
     curves = {"data": {"name": "curves"}, "transform": [{"filter": kept}]}
     layers: list[Spec] = [
@@ -191,46 +207,46 @@ def over_time(
             "encoding": {
                 "x": {"field": "start", "type": "quantitative"},
                 "x2": {"field": "end"},
-                "tooltip": _tip(name="Fault", start="From [s]", end="To [s]"),
+                "tooltip": tips(name="Fault", start="From [s]", end="To [s]"),
             },
         },
-        *([_bands(curves, x, y)] if spread else []),
-        _lines(curves, {"x": x, "y": y}),
+        *([bands_of(curves, x, y)] if spread else []),
+        lines_of(curves, {"x": x, "y": y}),
         {
             "data": {"name": "bound"},
             "mark": {"type": "line", "clip": True, "color": "$ink", "strokeDash": [3, 3], "strokeWidth": 1.4},
             "encoding": {"x": x, "y": {**y, "field": "bound"}},
         },
         _hover(
-            {**curves, "encoding": {"x": x, "y": y, "color": _COLOUR}},
-            _tip(row="Estimator", time=TIME, middle=f"{title} [{unit}]"),
+            {**curves, "encoding": {"x": x, "y": y, "color": COLOUR}},
+            tips(row="Estimator", time=TIME, middle=f"{title} [{unit}]"),
         ),
     ]
     return Chart(
-        name, f"{title} over time", f"{caption} {_ZOOM_HELP}", {"height": 300, "layer": layers}, data, byrow=True
+        name, f"{title} over time", f"{caption} {ZOOM_HELP}", {"height": 300, "layer": layers}, data, byrow=True
     )
 
 
 def distribution(name: str, title: str, unit: str, data: Mapping[str, Any], caption: str) -> Chart:
     """Share of the epochs whose error is below a value; ``curves``: ``error`` by row over ``share``."""
-    x, y = _axis("error", f"{title} [{unit}]", log=True), _axis("share", "Share of the epochs [%]")
+    x, y = quantity("error", f"{title} [{unit}]", log=True), quantity("share", "Share of the epochs [%]")
     curves = {"data": {"name": "curves"}, "transform": [{"filter": "datum.error > 0"}]}
     layers: list[Spec] = [
-        _lines(curves, {"x": x, "y": y, "order": {"field": "share"}}),
+        lines_of(curves, {"x": x, "y": y, "order": {"field": "share"}}),
         {
             "data": {"values": [{"level": 50}, {"level": 95}]},
             "mark": {"type": "rule", "color": "$grey", "strokeDash": [2, 2]},
             "encoding": {"y": {"field": "level", "type": "quantitative"}},
         },
         _hover(
-            {**curves, "encoding": {"x": x, "y": y, "color": _COLOUR}},
-            _tip(row="Estimator", error=f"{title} [{unit}]", share="Share of the epochs [%]"),
+            {**curves, "encoding": {"x": x, "y": y, "color": COLOUR}},
+            tips(row="Estimator", error=f"{title} [{unit}]", share="Share of the epochs [%]"),
         ),
     ]
     return Chart(
         name,
         f"Distribution of the {title.lower()}",
-        f"{caption} {_ZOOM_HELP}",
+        f"{caption} {ZOOM_HELP}",
         {"height": 280, "layer": layers},
         data,
         byrow=True,
@@ -239,18 +255,18 @@ def distribution(name: str, title: str, unit: str, data: Mapping[str, Any], capt
 
 def track(name: str, title: str, data: Mapping[str, Any], caption: str) -> Chart:
     """A horizontal track: truth (``truth``), fixes, where faults act, estimates (``curves``)."""
-    x, y = _axis("east", EAST), _axis("north", NORTH)
+    x, y = quantity("east", EAST), quantity("north", NORTH)
     order = {"order": {"field": "time"}}
     layers: list[Spec] = [
         {
             "data": {"name": "fixes"},
             "mark": {"type": "point", "color": "$grey", "opacity": 0.5, "size": 8, "filled": True},
-            "encoding": {"tooltip": _tip(name="Fix", time=TIME)},
+            "encoding": {"tooltip": tips(name="Fix", time=TIME)},
         },
         {
             "data": {"name": "faulty"},
             "mark": {"type": "line", "color": "$second", "opacity": 0.35, "strokeWidth": 9, "strokeCap": "round"},
-            "encoding": {"detail": {"field": "part"}, "tooltip": _tip(name="Fault"), **order},
+            "encoding": {"detail": {"field": "part"}, "tooltip": tips(name="Fault"), **order},
         },
         {"data": {"name": "truth"}, "mark": {"type": "line", "color": "$ink", "strokeWidth": 2.4}, "encoding": order},
         {
@@ -268,15 +284,15 @@ def track(name: str, title: str, data: Mapping[str, Any], caption: str) -> Chart
                     "legend": None,
                     "scale": {"domain": ["start", "end"], "range": ["circle", "square"]},
                 },
-                "tooltip": _tip(name="Truth"),
+                "tooltip": tips(name="Truth"),
             },
         },
-        _hover({"data": {"name": "curves"}, "encoding": {"color": _COLOUR}}, _tip(row="Estimator", time=TIME)),
+        _hover({"data": {"name": "curves"}, "encoding": {"color": COLOUR}}, tips(row="Estimator", time=TIME)),
     ]
     return Chart(
         name,
         title,
-        f"{caption} {_ZOOM_HELP}",
+        f"{caption} {ZOOM_HELP}",
         {"encoding": {"x": x, "y": y}, "layer": layers},
         data,
         byrow=True,
@@ -295,13 +311,13 @@ def accuracy_and_cost(name: str, y_title: str, plain: str, data: Mapping[str, An
         The row that processor times are multiples of.
     data : mapping
         ``rows``: columns ``row``, ``cost`` (multiple), ``low``, ``high`` (its 95 % interval), ``error``, ``family``,
-        ``front`` (bool).
+        ``front`` (bool), and the columns of `simnav.leaderboard.site.labels.shifts`.
     missing : str
         A sentence on the rows whose cost was not measured, for the caption.
     """
     cost = f"Processor time (× {plain})"
-    x = _roomy(_axis("cost", cost, log=True))
-    y = _roomy(_axis("error", y_title, log=True), _NAME_ROOM)
+    x = _roomy(quantity("cost", cost, log=True))
+    y = _roomy(quantity("error", y_title, log=True), _NAME_ROOM)
     rows = {"data": {"name": "rows"}}
     layers: list[Spec] = [
         {
@@ -329,7 +345,7 @@ def accuracy_and_cost(name: str, y_title: str, plain: str, data: Mapping[str, An
                 "y": y,
                 "color": front_colour(),
                 "opacity": {"condition": {"test": "datum.front", "value": 1}, "value": 0.55},
-                "tooltip": _tip(
+                "tooltip": tips(
                     row="Estimator",
                     family="Family",
                     cost=cost,
@@ -344,9 +360,9 @@ def accuracy_and_cost(name: str, y_title: str, plain: str, data: Mapping[str, An
     caption = (
         "Each point is an estimator. Those in the other colour form the Pareto front: no estimator is both more "
         "accurate and quicker. Lines: 95 % interval of the processor time, which is a multiple of that of "
-        f"{plain}, measured in turns with it.{' ' * bool(missing)}{missing} {_ZOOM_HELP}"
+        f"{plain}, measured in turns with it.{' ' * bool(missing)}{missing} {ZOOM_HELP}"
     )
-    return Chart(name, "Accuracy against cost", caption, {"height": 340, "layer": layers}, data)
+    return Chart(name, "Accuracy against cost", caption, {"height": COST_HEIGHT, "layer": layers}, data)
 
 
 def detection(name: str, data: Mapping[str, Any]) -> Chart:
@@ -355,11 +371,12 @@ def detection(name: str, data: Mapping[str, Any]) -> Chart:
     Parameters
     ----------
     data : mapping
-        ``rows``: columns ``row``, ``found``, ``false``, ``front`` (bool).
+        ``rows``: columns ``row``, ``found``, ``false``, ``front`` (bool), and those of
+        `simnav.leaderboard.site.labels.shifts`.
     """
-    x, y = _axis("false", "False alarms [%]"), _axis("found", "Faults detected [%]")
+    x, y = quantity("false", "False alarms [%]"), quantity("found", "Faults detected [%]")
     place = {"x": _roomy(x), "y": _roomy(y, _NAME_ROOM)}
-    tip = _tip(row="Estimator", found="Faults detected [%]", false="False alarms [%]")
+    tip = tips(row="Estimator", found="Faults detected [%]", false="False alarms [%]")
     layers: list[Spec] = [
         {
             "params": [_ZOOM],
@@ -370,9 +387,9 @@ def detection(name: str, data: Mapping[str, Any]) -> Chart:
     ]
     caption = (
         "An estimator at the upper left detects every fault and raises no false alarm. Names: no other estimator "
-        f"detects more faults with fewer false alarms. {_ZOOM_HELP}"
+        f"detects more faults with fewer false alarms. {ZOOM_HELP}"
     )
-    spec = {"height": 300, "data": {"name": "rows"}, "layer": layers}
+    spec = {"height": DETECTION_HEIGHT, "data": {"name": "rows"}, "layer": layers}
     return Chart(name, "Detection against false alarms", caption, spec, data)
 
 
@@ -382,17 +399,20 @@ def front_colour() -> Spec:
 
 
 def front_names(place: Spec) -> Spec:
-    """The names of the points of a Pareto front, above them: to the left where the right edge would cut the name."""
+    """The names of the points of a Pareto front: to the left of them where the right edge would cut the name.
+
+    The data have ``row``, and ``shift`` and ``shift_narrow`` as from `simnav.leaderboard.site.labels.shifts`.
+    """
     at = f"scale('x', datum['{place['x']['field']}'])"
-    left = f"{at} > width / 2 && {at} + {_NAME_GAP} + {_LETTER} * length(datum.row) > width"
+    left = f"{at} > width / 2 && {at} + {GAP} + {LETTER} * length(datum.row) > width"
     return {
         "transform": [{"filter": "datum.front"}],
         "mark": {
             "type": "text",
             "align": {"expr": f"{left} ? 'right' : 'left'"},
-            "dx": {"expr": f"{left} ? {-_NAME_GAP} : {_NAME_GAP}"},
+            "dx": {"expr": f"{left} ? {-GAP} : {GAP}"},
             "baseline": "bottom",
-            "dy": -4,
+            "dy": {"expr": f"width < {WIDE} ? datum.shift_narrow : datum.shift"},
             "fontSize": 11,
             "color": "$ink",
         },
@@ -400,49 +420,7 @@ def front_names(place: Spec) -> Spec:
     }
 
 
-_NAME_GAP, _LETTER = 7, 6.5  # from a point to its name, and a letter of it [pixels]
 _NAME_ROOM = 26  # for a name above the highest point [pixels]
-
-
-def dial(name: str, across: str, up: str, data: Mapping[str, Any], caption: str, *, breaking: bool = True) -> Chart:
-    """Error against a dial, with the values at which estimators break if ``breaking``.
-
-    Parameters
-    ----------
-    data : mapping
-        ``curves``: by row ``value`` (of the dial), ``middle``, ``low``, ``high``, ``failed``; ``marks``: by row ``at``
-        and ``threshold``, one each.
-    """
-    x, y = _axis("value", across), _axis("middle", up, log=True)
-    curves = {"data": {"name": "curves"}, "transform": [{"filter": "datum.middle > 0"}]}
-    sure = {"data": {"name": "curves"}, "transform": [{"filter": "datum.low > 0"}]}
-    layers: list[Spec] = [
-        _bands(sure, x, y),
-        _lines(curves, {"x": x, "y": y}),
-        {
-            **curves,
-            "mark": {"type": "point", "filled": True, "size": 35},
-            "encoding": {
-                "x": x,
-                "y": y,
-                "color": _COLOUR,
-                "tooltip": _tip(row="Estimator", value=across, middle=up, low="Low", high="High", failed="Failed runs"),
-            },
-        },
-        {
-            "data": {"name": "marks"},
-            "mark": {"type": "point", "shape": "cross", "size": 130, "filled": True, "angle": 45},
-            "encoding": {
-                "x": {**x, "field": "at"},
-                "y": {**y, "field": "threshold"},
-                "color": _COLOUR,
-                "tooltip": _tip(row="Estimator", at="Breaks at", threshold="Twice its clean error"),
-            },
-        },
-    ]
-    crosses = " Crosses: breaking points, where the error passes twice that at the clean value." if breaking else ""
-    title, spec = f"Error against {across}", {"height": 300, "layer": layers if breaking else layers[:-1]}
-    return Chart(name, title, f"{caption}{crosses} {_ZOOM_HELP}", spec, data, byrow=True)
 
 
 def spread(
@@ -454,7 +432,7 @@ def spread(
     """
     order = list(data["middles"]["row"])
     y = {"field": "row", "type": "nominal", "title": None, "sort": order}
-    x = _roomy(_axis("value", x_title, log=True))
+    x = _roomy(quantity("value", x_title, log=True))
     layers: list[Spec] = []
     if len(ideal) == 2:
         layers.append(
@@ -468,7 +446,7 @@ def spread(
         {
             "data": {"name": "runs"},
             "mark": {"type": "tick", "opacity": 0.4, "thickness": 1.2, "color": "$strong"},
-            "encoding": {"x": x, "y": y, "tooltip": _tip(row="Estimator", run="Run", value=x_title)},
+            "encoding": {"x": x, "y": y, "tooltip": tips(row="Estimator", run="Run", value=x_title)},
         },
         {
             "data": {"name": "middles"},
@@ -478,7 +456,7 @@ def spread(
         {
             "data": {"name": "middles"},
             "mark": {"type": "point", "filled": True, "size": 55, "opacity": 1, "color": "$ink"},
-            "encoding": {"x": x, "y": y, "tooltip": _tip(row="Estimator", value=x_title, low="Low", high="High")},
+            "encoding": {"x": x, "y": y, "tooltip": tips(row="Estimator", value=x_title, low="Low", high="High")},
         },
     ]
     return Chart(name, title, caption, {"height": {"step": 17}, "layer": layers}, data)
@@ -529,7 +507,7 @@ def stanford(name: str, data: Mapping[str, Any], limit: float, caption: str) -> 
                     "scale": {"type": "log", "scheme": "$scheme"},
                     "legend": {"title": "Epochs", "orient": "bottom"},
                 },
-                "tooltip": _tip(row="Estimator", x="Error from [m]", y="Level from [m]", epochs="Epochs"),
+                "tooltip": tips(row="Estimator", x="Error from [m]", y="Level from [m]", epochs="Epochs"),
             },
         },
         {
@@ -559,13 +537,13 @@ def timeline(name: str, data: Mapping[str, Any], caption: str, duration: float) 
         "data": {"name": "events"},
         "mark": {"type": "bar", "height": 16, "cornerRadius": 3},
         "encoding": {
-            "x": {**_axis("start", TIME), "scale": {"domain": [0.0, duration], "nice": False}},
+            "x": {**quantity("start", TIME), "scale": {"domain": [0.0, duration], "nice": False}},
             "x2": {"field": "end"},
             "y": {"field": "group", "type": "nominal", "title": None, "sort": None},
             "color": {"condition": {"test": "datum.group == 'manoeuvres'", "value": "$shade"}, "value": "$second"},
             "stroke": {"value": "$ink"},
             "strokeWidth": {"value": 0.5},
-            "tooltip": _tip(name="What", start="From [s]", end="To [s]", words="How"),
+            "tooltip": tips(name="What", start="From [s]", end="To [s]", words="How"),
         },
     }
     return Chart(name, "What happens when", caption, spec, data, wide=True)
@@ -582,12 +560,12 @@ def ratios_by_group(name: str, data: Mapping[str, Any], caption: str) -> Chart:
         {
             "mark": {"type": "point", "filled": True, "size": 60, "opacity": 0.9},
             "encoding": {
-                "x": _roomy(_axis("value", "Error, as a multiple of the reference figure", log=True)),
+                "x": _roomy(quantity("value", "Error, as a multiple of the reference figure", log=True)),
                 "y": {"field": "group", "type": "nominal", "title": None, "sort": None},
                 "yOffset": {"field": "row", "type": "nominal"},
                 "color": {"condition": {"test": "datum.plain", "value": "$grey"}, "value": "$second"},
                 "shape": {"condition": {"test": "datum.plain", "value": "diamond"}, "value": "circle"},
-                "tooltip": _tip(row="Estimator", scenario="Scenario", value="Multiple of the reference"),
+                "tooltip": tips(row="Estimator", scenario="Scenario", value="Multiple of the reference"),
             },
         },
     ]

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Protocol
 
 from simnav.leaderboard.results.citation import Citation
+from simnav.leaderboard.results.home import NOWHERE, Home
 from simnav.leaderboard.results.provenance import Provenance
 
 from .facts import EstimatorFacts
@@ -68,6 +69,8 @@ class ScenarioEntry:
         Empty for one that is not in the catalogue.
     from_file : bool
         Whether it is not in the catalogue, so that it came from a file of somebody's own.
+    duration : float
+        Length of a run [s]; 0 where it is not known.
     """
 
     id: str
@@ -82,6 +85,7 @@ class ScenarioEntry:
     toml: str = ""
     group: str = "other"
     from_file: bool = False
+    duration: float = 0.0
 
     @property
     def data(self) -> str:
@@ -120,8 +124,8 @@ class SiteFacts:
     ----------
     version, generated : str
         Version of simnav that wrote the site; date and time.
-    total : int
-        Results; 0 for a page that stands alone.
+    total, runs : int
+        Results, also of estimators that a scenario does not suit; 0 for a page that stands alone. Runs among them.
     scenarios, estimators : sequence
         What has a page of its own, in the order of the menus.
     papers : sequence of ExtraPage
@@ -136,11 +140,14 @@ class SiteFacts:
         Provenance of the results, each once.
     citation : Citation or None
         Citation of the results.
+    home : Home
+        Where the repository and the documentation are, for links.
     """
 
     version: str
     generated: str
     total: int = 0
+    runs: int = 0
     scenarios: Sequence[ScenarioEntry] = ()
     estimators: Sequence[EstimatorEntry] = ()
     papers: Sequence[ExtraPage] = ()
@@ -149,3 +156,4 @@ class SiteFacts:
     benchmark: str = ""
     provenance: Sequence[Provenance] = field(default_factory=tuple)
     citation: Citation | None = None
+    home: Home = NOWHERE

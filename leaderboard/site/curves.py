@@ -104,19 +104,21 @@ def gather(over_all: Iterable[Result], single: Collection[Result]) -> Gathered:
     for result in wanted | alone:
         every.setdefault(id(result.series), []).append(result)
     for series, read in read_ahead([results[0].series for results in every.values()]):
-        if not has_series(read, "time"):
+        if not (has_series(read, "time") or has_series(read, "quantiles")):
             continue
         for result in every[id(series)]:
             if result.status != "ok":
                 continue
             if result in wanted:
                 found.curves[result] = _curves(read, times)
-            if result in alone:
+            if result in alone and "time" in read:
                 found.single[result] = _thinned(read)
     return found
 
 
 def _curves(s: Mapping[str, Series], times: dict[bytes, Thin]) -> Curves:
+    if "time" not in s:  # of some rows only the distribution comes with simnav
+        return Curves(np.zeros(0, np.float32), {}, s["quantiles"].copy() if has_series(s, "quantiles") else None)
     keep = spaced(len(s["time"]), _POINTS)
     time = s["time"][keep]
     time = times.setdefault(time.tobytes(), time)
@@ -149,7 +151,7 @@ def _level(s: Mapping[str, Series]) -> NDArray[Any] | None:
 
 def axis(curves: Iterable[Curves]) -> Array:
     """The common time of the curves of a scenario [s]: that of its longest run."""
-    longest = max((c.time for c in curves), key=lambda t: float(t[-1]), default=np.zeros(0))
+    longest = max((c.time for c in curves if len(c.time)), key=lambda t: float(t[-1]), default=np.zeros(0))
     return np.asarray(longest, dtype=np.float64)
 
 

@@ -13,10 +13,12 @@ from .content import EstimatorEntry, Fact, ScenarioEntry
 from .facts import catalogued, estimator_facts, toml_of
 
 if TYPE_CHECKING:
-    from simnav.leaderboard.ranking.board import Ranking
+    from simnav.leaderboard.ranking.board import Ranking, ScenarioRanking
     from simnav.leaderboard.ranking.runs import Runs
 
-__all__ = ["argument_of", "entries"]
+__all__ = ["argument_of", "entries", "run_names"]
+
+_LONG = 40  # characters of the name of a run
 
 
 def entries(
@@ -68,7 +70,7 @@ def _scenario(identity: str, by: Mapping[str, Runs], page: str) -> ScenarioEntry
         facts.append(Fact("Faults", len(scenario.faults)))
     return ScenarioEntry(
         identity, name or identity, page, seeds, argument_of(identity), tuple(facts), scenario.title,
-        scenario.description, scenario.source, toml_of(identity), scenario.group,
+        scenario.description, scenario.source, toml_of(identity), scenario.group, duration=scenario.duration,
     )  # fmt: skip
 
 
@@ -79,3 +81,9 @@ def _slug(text: str, taken: set[str]) -> str:
         plain += "-" + hashlib.blake2b(text.encode(), digest_size=3).hexdigest()
     taken.add(plain)
     return plain
+
+
+def run_names(ranking: ScenarioRanking) -> dict[str, str]:
+    """Short names of the runs whose own one is a sentence: recordings that have no name but what is noted of them."""
+    long = sorted({run for row in ranking.rows for run in row.ratios if len(run) > _LONG})
+    return {run: f"recording {k + 1}" if len(long) > 1 else "recording" for k, run in enumerate(long)}

@@ -19,6 +19,7 @@ from .background import Background
 from .columns import SCORES_SHOWN, Column, column_dicts
 from .content import PLAIN, Fact
 from .datasheets import profile_charts
+from .entries import run_names
 from .losses import losses
 from .rounding import short, shorts
 from .scenario_page import inside_chart, track_from
@@ -78,12 +79,12 @@ def errors_data(label: str, ranking: Ranking, scenarios: Mapping[str, ScenarioEn
     """
     found = {}
     for table, row in _tables(label, ranking):
-        entry = scenarios[table.scenario]
+        entry, names = scenarios[table.scenario], run_names(table)
         found[table.scenario] = {
             "name": entry.name,
             "page": entry.page,
             "argument": entry.argument,
-            "run": list(row.ratios),
+            "run": [names.get(run, run) for run in row.ratios],
             "error": shorts(list(row.ratios.values()), 5),
         }
     return {"label": label, "scenarios": found}
@@ -167,6 +168,7 @@ def estimator_data(
             "title": f"{label} by scenario",
             "columns": column_dicts((*_COLUMNS, *shown)),
             "rows": rows,
+            "sort": "-score",
         },
         "charts": [c.to_dict() for c in (*_profile(label, ranking, scenarios), *profile_charts(label, version))],
         "rows": {label: {"reference": entry.reference}},
@@ -177,7 +179,9 @@ def estimator_data(
             for table in ranking.scenarios
             if label in table.unsuitable
         ],
-        "parameters": [{"name": n, "default": d, "annotation": a} for n, d, a in entry.facts.parameters],
+        "parameters": [
+            {"name": n, "default": d, "annotation": a, "meaning": m} for n, d, a, m in entry.facts.parameters
+        ],
     }
 
 

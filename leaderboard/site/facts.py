@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from functools import lru_cache
 from pathlib import Path
@@ -17,6 +17,7 @@ from simnav.estimator.registry import registered
 from simnav.leaderboard.ranking import tables
 from simnav.leaderboard.results.catalogued import catalogued_scenario
 from simnav.scenario.catalogue import headers
+from simnav.spec import UNITS
 
 from .charts import columns
 
@@ -69,8 +70,8 @@ class EstimatorFacts:
         File with the line, relative to the project.
     code : str
         Its declaration.
-    parameters : tuple of (name, default, annotation)
-        Parameters of the constructor, as text.
+    parameters : tuple of (name, default, annotation, meaning)
+        Parameters of the constructor, as text; the meaning is that of its documentation, with the unit.
     """
 
     family: str = "Other"
@@ -79,7 +80,7 @@ class EstimatorFacts:
     source: str = ""
     file: str = ""
     code: str = ""
-    parameters: tuple[tuple[str, str, str], ...] = field(default_factory=tuple)
+    parameters: tuple[tuple[str, str, str, str], ...] = field(default_factory=tuple)
 
 
 def estimator_facts(label: str) -> EstimatorFacts:
@@ -90,7 +91,9 @@ def estimator_facts(label: str) -> EstimatorFacts:
         found = describe(cls.name)
     except (ValueError, ImportError):
         return EstimatorFacts()
-    text = re.split(r"\n(?:Parameters|Attributes|Notes|References)\n-+\n", inspect.getdoc(cls) or "")[0]
+    documentation = inspect.getdoc(cls) or ""
+    text = re.split(r"\n\S[^\n]*\n-{3,}\n", documentation)[0]  # what stands before the first section
+    meant = meanings(documentation)
     body = " ".join(text.strip().partition("\n\n")[2].split())
     body, _, source = body.partition("Source: ")
     path = Path(found.file)
@@ -104,10 +107,31 @@ def estimator_facts(label: str) -> EstimatorFacts:
         file=f"{place}, line {found.line}",
         code=_code(cls),
         parameters=tuple(
-            (p.name, "" if p.required else "none" if p.default is None else str(p.default), p.annotation.strip("'"))
+            (
+                p.name,
+                "" if p.required else "none" if p.default is None else str(p.default),
+                p.annotation.strip("'"),
+                meant.get(p.name, ""),
+            )
             for p in found.parameters
         ),
     )
+
+
+def meanings(documentation: str) -> dict[str, str]:
+    """What numpydoc says of each parameter, by name.
+
+    >>> meanings("Title.\\n\\nParameters\\n----------\\ngain, bias : float\\n    Of the filter [m].\\n    Small.")
+    {'gain': 'Of the filter [m]. Small.', 'bias': 'Of the filter [m]. Small.'}
+    """
+    section = re.search(r"(?:^|\n)Parameters\n-+\n(.*?)(?=\n\S[^\n]*\n-{3,}\n|\Z)", documentation, re.DOTALL)
+    found: dict[str, str] = {}
+    for heading, text in re.findall(
+        r"^(\S[^\n]*)\n((?:[ \t]+[^\n]*\n?|\n)*)", section[1] if section else "", re.MULTILINE
+    ):
+        names = heading.partition(" : ")[0]
+        found |= dict.fromkeys(map(str.strip, names.split(",")), " ".join(text.split()))
+    return found
 
 
 def _code(cls: type) -> str:
@@ -190,11 +214,35 @@ def _table(values: Mapping[str, Any], skip: Iterable[str] = ()) -> str:
     for key, value in values.items():
         if key in skip or value is None or (isinstance(value, str) and not value) or not np.any(value):
             continue
+        name, unit = worded(key)
         if isinstance(value, Mapping):
             if inner := _table(value):
-                found.append(f"{key} ({inner})")
+                found.append(f"{name} ({inner})")
         elif isinstance(value, (list, tuple, np.ndarray)):
-            found.append(f"{key} {', '.join(tables.number(v) for v in value)}")
+            found.append(f"{name} {', '.join(tables.number(v) for v in value)}{unit}")
         else:
-            found.append(f"{key} {tables.number(value)}")
+            found.append(f"{name} {tables.number(value)}{unit}")
     return "; ".join(found)
+
+
+_SIGNS = {"deg": "°", "percent": "%", "ug": "µg", "hz": "Hz", "k": "K", "1": "1", "per": "1"}
+
+
+def worded(key: str) -> tuple[str, str]:
+    """A key of a scenario file as it is read: its name in words, and its unit with a space before it.
+
+    >>> worded("sigma_m"), worded("angle_random_walk_deg_sqrt_h"), worded("max_speed_m_s"), worded("kind")
+    (('sigma', ' m'), ('angle random walk', ' °/√h'), ('max speed', ' m/s'), ('kind', ''))
+    """
+    parts = key.split("_")
+    for k in range(1, len(parts)):
+        if "_".join(parts[k:]) in UNITS:
+            return " ".join(parts[:k]), f" {_unit_in_signs(parts[k:])}"
+    return " ".join(parts), ""
+
+
+def _unit_in_signs(parts: Sequence[str]) -> str:
+    found = _SIGNS.get(parts[0], parts[0])
+    below = " ".join(parts[1:]).replace("sqrt ", "√").split()
+    powers = [re.sub(r"(?<=[a-zA-Z])2$", "²", _SIGNS.get(p, p.replace("√hz", "√Hz"))) for p in below]
+    return "/".join([found, *powers])

@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 from .charts import Chart, Spec, columns, front_colour, front_names
+from .labels import shifts
 from .rounding import short
 
 if TYPE_CHECKING:
@@ -16,6 +17,7 @@ __all__ = ["HONEST", "honesty"]
 
 #: Coverage that an honest covariance has [%].
 HONEST = 95.0
+_HEIGHT = 320.0  # [pixels]
 
 
 def honesty(
@@ -51,11 +53,16 @@ def honesty(
         front([(r.score, abs(HONEST - 100.0 * r.faulty.coverage)) for r in ranked]),
         strict=True,
     ))  # fmt: skip
+    named = [best.get(r.estimator, r.reference) for r in found]
     rows = [
-        (r.estimator, short(r.score), short(100.0 * r.faulty.coverage), r.reference, best.get(r.estimator, r.reference))
-        for r in found
+        (r.estimator, short(r.score), short(100.0 * r.faulty.coverage), r.reference, shown)
+        for r, shown in zip(found, named, strict=True)
     ]
-    data = {"rows": columns(("row", "error", "covered", "reference", "front"), rows)}
+    places = shifts(
+        [r.estimator for r in found], [r.score for r in found], [r.faulty.coverage for r in found], named, _HEIGHT,
+        log=(True, False),
+    )  # fmt: skip
+    data = {"rows": {**columns(("row", "error", "covered", "reference", "front"), rows), **places}}
     error = f"Score ({title})"
     covered = "Epochs under faults inside the 95 % region [%]"
     x: Spec = {
@@ -95,5 +102,5 @@ def honesty(
         "covariance that agrees with its errors. Points in the other colour: no other estimator is both more accurate "
         "and nearer to the line. Open points are told of the faults and are not ranked."
     )
-    spec = {"height": 320, "data": {"name": "rows"}, "layer": layers}
+    spec = {"height": _HEIGHT, "data": {"name": "rows"}, "layer": layers}
     return Chart(f"{track.track}-honesty", "Accuracy against honesty", caption, spec, data)

@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 from simnav.scoring.lagged import seconds_of
 
-from .charts import Chart, dial
+from .charts import Chart
+from .dial_charts import dial
 from .rounding import short
 
 if TYPE_CHECKING:

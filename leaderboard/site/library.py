@@ -1,18 +1,13 @@
-"""The chart library of the site: one copy of Vega, Vega-Lite and Vega-Embed, as the package vl-convert holds them.
-
-And the folder in the user's cache, for what takes seconds to make.
-"""
+"""The chart library of the site: one copy of Vega, Vega-Lite and Vega-Embed, as the package vl-convert holds them."""
 
 from __future__ import annotations
 
 import contextlib
-import os
 from importlib.metadata import version
-from pathlib import Path
 
-from simnav.leaderboard.results.files import write_whole
+from simnav.leaderboard.results.user_cache import keep, user_cache
 
-__all__ = ["VEGA_LITE", "bundle", "cache", "write_cache"]
+__all__ = ["VEGA_LITE", "bundle"]
 
 #: Version of Vega-Lite that the specifications are written for.
 VEGA_LITE = "6.4"
@@ -42,24 +37,11 @@ def bundle() -> str:
 
     Putting it together takes seconds, so it is kept in the user's cache, once for each version.
     """
-    kept = cache() / f"vega-{version('vl-convert-python')}-{VEGA_LITE}.js"
+    kept = user_cache() / f"vega-{version('vl-convert-python')}-{VEGA_LITE}.js"
     with contextlib.suppress(OSError):
         return kept.read_text(encoding="utf-8")
     import vl_convert
 
     made = _LICENCE + vl_convert.javascript_bundle(_SETS, vl_version=VEGA_LITE)
-    write_cache(kept, made)
+    keep(kept, made)
     return made
-
-
-def write_cache(path: Path, content: str) -> None:
-    """Write a file of the cache, if that is possible: a cache that cannot be written costs time only."""
-    with contextlib.suppress(OSError):
-        path.parent.mkdir(parents=True, exist_ok=True)
-        write_whole(path, content)
-
-
-def cache() -> Path:
-    """Folder of simnav in the user's cache; it may not be there yet."""
-    home = os.environ.get("XDG_CACHE_HOME", "")
-    return (Path(home) if os.path.isabs(home) else Path.home() / ".cache") / "simnav"

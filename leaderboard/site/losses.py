@@ -11,6 +11,7 @@ from urllib.parse import quote
 from simnav.leaderboard.ranking.statistics import FAILURE
 
 from .columns import Column, column_dicts
+from .entries import run_names
 from .facts import catalogued
 from .rounding import short
 
@@ -59,6 +60,7 @@ def losses(label: str, other: str, ranking: Ranking, scenarios: Mapping[str, Sce
         by = {row.estimator: row for row in table.rows}
         if label not in by or other not in by:
             continue
+        names = run_names(table)
         for run, ratio in by[label].ratios.items():
             beside = by[other].ratios.get(run, math.nan)
             if not 0.0 < beside < _FAILED:
@@ -67,7 +69,7 @@ def losses(label: str, other: str, ranking: Ranking, scenarios: Mapping[str, Sce
             if ratio >= _FAILED:
                 failed += 1
             elif ratio / beside > LOSS * (1.0 + 1e-9):
-                found.append((ratio / beside, ratio, table.scenario, run))
+                found.append((ratio / beside, ratio, table.scenario, names.get(run, run)))
     if not runs:
         return None
     found.sort(key=lambda f: -f[0])

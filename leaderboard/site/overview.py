@@ -11,11 +11,12 @@ from simnav.leaderboard.ranking.ranking_table import ratio, score_caption, score
 from simnav.leaderboard.ranking.stored_costs import NOT_MEASURED, CostMultiple, cost_of, not_measured
 from simnav.leaderboard.ranking.summary import limits
 
-from .charts import accuracy_and_cost, columns, detection, spread, spread_data
+from .charts import COST_HEIGHT, DETECTION_HEIGHT, accuracy_and_cost, columns, detection, spread, spread_data
 from .columns import Column, column_dicts
 from .datasheets import COLUMN, cells
 from .heatmap import heatmap
 from .honesty import honesty
+from .labels import shifts
 from .rounding import short
 
 if TYPE_CHECKING:
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
 
     from .content import EstimatorEntry, ScenarioEntry
 
-__all__ = ["BOARD_COLUMNS", "bar_scale", "board_columns", "board_row", "overview"]
+__all__ = ["BOARD_COLUMNS", "OVER_SCENARIOS", "bar_scale", "board_columns", "board_row", "overview"]
 
 _WIDEST = 100.0  # largest ratio on the scale of the bars
 _INSIDE = 0.9  # share of the rows whose scores the scale must hold
@@ -53,12 +54,14 @@ _AFTER = (
         "Whether the stated covariance agrees with the errors from the first fault on; optimistic: errors are larger.",
         "badge",
         filter=True,
+        hidden=True,
     ),
     Column(
         "coverage",
         "95 % coverage, faults",
-        "Mean share of the epochs, from the first fault of a run on, with the truth in the stated 95 % ellipse.",
-        "percent",
+        "Mean share of the epochs, from the first fault of a run on, with the truth in the stated 95 % ellipse. The "
+        "line is at 95 %.",
+        "share",
     ),
     Column("clean_badge", "Consistency, no fault", "The same before the first fault of a run.", "badge", hidden=True),
     Column(
@@ -127,6 +130,9 @@ _AFTER = (
     ),
     Column("memory", "Memory", "Largest memory of all runs.", "size", hidden=True),
 )
+
+#: Keys of columns that say something of several scenarios only.
+OVER_SCENARIOS = ("gain_scenarios", "won", "over_scenarios")
 
 #: Columns whose meaning does not depend on the board.
 BOARD_COLUMNS = tuple(c for c in (*_BEFORE, *_AFTER) if c is not _NAME)
@@ -347,15 +353,18 @@ def _charts(
     far = [(r, cost) for r, cost in costed if r.score > end]
     costed = [pair for pair in costed if pair not in far]
     if len(costed) > 1:
+        costs, errors = [c.value for _, c in costed], [r.score for r, _ in costed]
+        names, front = [r.estimator for r, _ in costed], _front(list(zip(costs, errors, strict=True)))
         data = {
             "rows": {
-                "row": [r.estimator for r, _ in costed],
-                "cost": [short(c.value) for _, c in costed],
+                "row": names,
+                "cost": [short(c) for c in costs],
                 "low": [short(c.low) for _, c in costed],
                 "high": [short(c.high) for _, c in costed],
-                "error": [short(r.score) for r, _ in costed],
-                "family": [estimators[r.estimator].facts.family for r, _ in costed],
-                "front": _front([(c.value, r.score) for r, c in costed]),
+                "error": [short(e) for e in errors],
+                "family": [estimators[name].facts.family for name in names],
+                "front": front,
+                **shifts(names, costs, errors, front, COST_HEIGHT),
             }
         }
         plain_name = " or ".join(dict.fromkeys(c.plain for _, c in costed))
@@ -422,4 +431,6 @@ def _detection(
             right, false = (100.0 * sum(values) / len(pairs) for values in zip(*pairs, strict=True))
             found.append((row.estimator, short(right), short(false)))
     front = _front([(false, -right) for _, right, false in found])
-    return {**columns(("row", "found", "false"), found), "front": front}
+    names, right, false = [n for n, *_ in found], [r or 0.0 for _, r, _ in found], [f or 0.0 for *_, f in found]
+    places = shifts(names, false, right, front, DETECTION_HEIGHT, log=(False, False))
+    return {**columns(("row", "found", "false"), found), "front": front, **places}

@@ -25,8 +25,9 @@ _INKS = {
 
 def filled(chart: Chart, rows: Sequence[str], width: int = 620) -> Spec:
     """A specification with its data, in the colours of print, that shows some rows and a legend."""
-    scales = {
+    scales: dict[str, Any] = {
         "$colours": {"domain": list(rows), "range": [_PALETTE[k % 8] for k in range(len(rows))]},
+        "$banded": list(rows)[:3],
         "$dashes": {"domain": list(rows), "range": [DASHES[k // 8 % 4] for k in range(len(rows))]},
     }
 

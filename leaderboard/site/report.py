@@ -7,21 +7,26 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from simnav.leaderboard.ranking import tables
 from simnav.leaderboard.ranking.confinement import confined
 from simnav.leaderboard.ranking.failures import failures
+from simnav.leaderboard.ranking.ranking_table import ranking_tables
+from simnav.leaderboard.ranking.voyages import side_by_side
+from simnav.leaderboard.results.shown import Shown
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from simnav.leaderboard.ranking.agreement import RankCorrelation
     from simnav.leaderboard.ranking.board import Ranking
+    from simnav.leaderboard.ranking.voyages import Voyages
     from simnav.leaderboard.results.result import Result
 
 __all__ = ["SiteReport"]
 
 
-@dataclass(frozen=True, eq=False)
-class SiteReport:
+@dataclass(frozen=True, eq=False, repr=False)
+class SiteReport(Shown):
     """A site and what it was made of.
 
     Attributes
@@ -41,15 +46,29 @@ class SiteReport:
     ranking: Ranking
     correlations: tuple[RankCorrelation, ...] = ()
 
+    def headline(self) -> str:
+        """Where the site is, and how many runs it shows."""
+        return f"{self.index}, {sum(r.tried for r in self.results)} runs"
+
+    def shown(self) -> Sequence[tables.Fitted]:
+        """A table for each track."""
+        return ranking_tables(self.ranking)
+
+    @property
+    def voyages(self) -> list[Voyages]:
+        """The places of rows on simulated and on recorded voyages, side by side."""
+        return side_by_side(self.ranking)
+
     def to_dict(self) -> dict[str, Any]:
         """Plain: what the command prints with ``--json``."""
         return {
             "site": str(self.index),
-            "runs": len(self.results),
+            "runs": sum(r.tried for r in self.results),
             "failed": failures(self.results),
             "ranking": self.ranking.to_dict(),
             "confinement": confined(self.results),
             "correlations": [c.to_dict() for c in self.correlations],
+            "voyages": [v.to_dict() for v in self.voyages],
         }
 
     def to_frame(self) -> Any:

@@ -21,7 +21,7 @@ from .columns import SCORES_SHOWN
 from .content import PLAIN
 from .curves import Curves, Gathered
 from .latency import latency_chart
-from .overview import bar_scale, board_columns, board_row
+from .overview import OVER_SCENARIOS, bar_scale, board_columns, board_row
 from .rounding import short
 from .sweeps import SweepFile
 
@@ -37,6 +37,7 @@ __all__ = ["RUNS_SHOWN", "ScenarioData", "inside_chart", "scenario_data", "seeds
 RUNS_SHOWN = 2
 
 _FIRST = 6  # rows that a chart shows at first
+_BAND = 5  # runs from which on a band is drawn
 _TICKS = 40  # runs of a row that a chart marks
 
 
@@ -121,7 +122,8 @@ def scenario_data(
     rows = [r.estimator for r in ranking.rows]
     by = {n: [gathered.curves[r] for r in runs[n].good if r in gathered.curves] for n in rows}
     drawn = [n for n in rows if by[n]]
-    first = shown_first(ranking, drawn or rows)
+    over_time = [n for n in drawn if any(len(c.time) for c in by[n])]
+    first = shown_first(ranking, over_time or drawn or rows)
     made, inside, files = _over_all_runs(entry, ranking, runs, by, around)
     kinds: dict[str, None] = {}
     for seed in seeds:
@@ -144,6 +146,7 @@ def scenario_data(
             for n in rows
         },
         "drawn": drawn,
+        "timed": len(over_time),
         "first": first,
         "table": _table(ranking, runs, estimators),
         "failures": _failures(ranking, runs),
@@ -192,8 +195,8 @@ def seeds_to_show(ranking: ScenarioRanking, runs: Mapping[str, Runs], seeds: Seq
 def _table(
     ranking: ScenarioRanking, runs: Mapping[str, Runs], estimators: Mapping[str, EstimatorEntry]
 ) -> dict[str, Any]:
-    relative = bool(ranking.reference.estimator)
-    title = "× reference" if relative else "Error [m]"
+    by = ranking.reference
+    title = ("× oracle" if by.bounds and by.paired else "× reference") if by.estimator else "Error [m]"
     scored = [r for r in ranking.rows if r.ranked and math.isfinite(r.score)]
     shown = [
         c
@@ -224,26 +227,35 @@ def _table(
                 else None,
             }
         rows.append(item)
-    explanation = f"Geometric mean over the runs of the error, divided by {ranking.reference.text}."
+    explanation = f"Geometric mean over the runs of the error, divided by {by.text}."
+    columns = board_columns(title, explanation, bar_scale(scored), shown)
     return {
         "name": "main",
         "title": f"{ranking.scenario}: ranking",
-        "columns": board_columns(title, explanation, bar_scale(scored), shown),
+        "columns": [c for c in columns if c["key"] not in OVER_SCENARIOS],
         "rows": rows,
     }
 
 
 def _failures(ranking: ScenarioRanking, runs: Mapping[str, Runs]) -> list[dict[str, Any]]:
-    """How many runs of each row ended how, but for those that ended well, and why the first did."""
-    found = []
+    """How runs ended, but for those that ended well: each status and reason of a first run once, with its rows."""
+    found: dict[tuple[str, str], dict[str, int]] = {}
     for row in ranking.rows:
         for status, count in row.statuses.items():
             if status != "ok":
                 reason = next(r.reason for r in runs[row.estimator].tried if r.ending == status)
                 if status == "inconsistent":
                     reason = "it reports for most of the time that its measurements contradict it; its error counts"
-                found.append({"name": row.estimator, "status": status, "runs": count, "reason": reason})
-    return found
+                found.setdefault((status, reason), {})[row.estimator] = count
+    return [
+        {
+            "names": ", ".join(f"{name} ({count})" for name, count in rows.items()),
+            "status": status,
+            "runs": sum(rows.values()),
+            "reason": reason,
+        }
+        for (status, reason), rows in found.items()
+    ]
 
 
 # -- charts over all runs ----------------------------------------------------------------------------------
@@ -263,10 +275,16 @@ def _over_all_runs(
     made = []
     if around.happening["name"]:
         ends = [t for t in around.happening["end"] if t is not None]
-        duration = max([float(time[-1]) if len(time) else 0.0, *ends])
+        duration = max([entry.duration, float(time[-1]) if len(time) else 0.0, *ends])
         made.append(charts.timeline("timeline", {"events": around.happening}, f"Of seed {first}.", duration))
-    drawn = _counted([len(c) for c in by.values() if c], len(entry.seeds))
-    words = f"Median over {drawn}, and the band from the 5th to the 95th percentile."
+    timed_runs = [count for c in by.values() if (count := sum(bool(len(x.time)) for x in c))]
+    drawn, wide = _counted(timed_runs, len(entry.seeds)), max(timed_runs, default=0) >= _BAND
+    band = (
+        ", and, of the first three rows, the band from the 5th to the 95th percentile"
+        if wide
+        else ", too few for a band"
+    )
+    words = f"Median over {drawn}{band}."
     if faults["start"]:
         words += f" Shaded: faults of seed {first}."
     for key, title, unit, factor in curves.QUANTITIES:
@@ -277,7 +295,8 @@ def _over_all_runs(
         caption = words + (
             " Dashed: the posterior Cramer-Rao bound on the RMS error, faults known." if bound["time"] else ""
         )
-        made.append(charts.over_time(key, title, unit, timed(_over(time, found), faults, bound), caption))
+        data = timed(_over(time, found), faults, bound)
+        made.append(charts.over_time(key, title, unit, data, caption, spread=wide))
     spreads = (
         ("horizontal_rmse", "rmse", "Horizontal RMSE of every run", "Horizontal RMSE [m]", ()),
         ("nees_horizontal", "nees", "Consistency of every run", "NEES by degree of freedom [-]", (0.7, 1.5)),
@@ -287,7 +306,8 @@ def _over_all_runs(
         made.append(late)
     cdf = {n: q for n, c in by.items() if (q := curves.quantiles(c)) is not None}
     if cdf:
-        caption = f"Over all epochs of {drawn}."
+        counted = _counted([len(c) for c in by.values() if c], len(entry.seeds))
+        caption = f"Over all epochs of {counted}."
         made.append(charts.distribution("cdf", "Horizontal error", "m", {"curves": {"rows": cdf}}, caption))
     limit = ALERT_LIMITS[0]
     cells = {n: q for n, c in by.items() if (q := curves.integrity(c, limit)) is not None}
@@ -301,7 +321,7 @@ def _over_all_runs(
         inside.append(
             charts.over_time(
                 f"weight-{instrument}", f"Weight of {instrument}", "-", timed(_over(axis, bands), faults),
-                f"{_MEANING['weight']} {words}", log=False,
+                f"{_MEANING['weight']} {words}", log=False, spread=wide,
             )
         )  # fmt: skip
     files = {f"{entry.data}-{c.name}": dict(c.data) for c in (*made, *inside)}
@@ -413,7 +433,8 @@ def _run_charts(around: Background) -> list[Chart]:
     made = [charts.track("track", "Track", {}, words)]
     words = "Of this run. Shaded: faults." if faulty else "Of this run."
     for key, title, unit, _ in curves.QUANTITIES:
-        made.append(charts.over_time(f"run-{key}", title, unit, {}, words, spread=False))
+        more = " Dashed: three standard deviations that the chosen estimator states." if key == "horizontal" else ""
+        made.append(charts.over_time(f"run-{key}", title, unit, {}, words + more, spread=False))
     return made
 
 
@@ -427,6 +448,9 @@ def _one_run(
     for key, *_ in curves.QUANTITIES:
         found = {n: {"time": one[key]["time"], "middle": one[key]["middle"]} for n, one in single.items() if key in one}
         data[f"run-{key}"] = timed({"rows": found}, faults)
+        if key == "horizontal":  # the page shows that of the estimator that is chosen
+            bounds = {n: one[key] for n, one in single.items() if "bound" in one.get(key, ())}
+            data[f"run-{key}"]["bounds"] = {n: {k: o[k] for k in ("time", "bound")} for n, o in bounds.items()}
     track = {n: one["track"] for n, one in single.items() if "track" in one}
     data["track"] = {"curves": {"rows": track}, **(known.get("track") or track_from(single.values()))}
     mine = [r for n in rows for r in runs[n].results if r.seed == seed]

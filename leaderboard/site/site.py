@@ -31,10 +31,12 @@ from simnav.leaderboard.ranking.ranking_figure import ranking_figure
 from simnav.leaderboard.ranking.runs import group
 from simnav.leaderboard.ranking.statistics import FAILURE
 from simnav.leaderboard.ranking.summary import spread
+from simnav.leaderboard.ranking.voyages import side_by_side
 from simnav.leaderboard.results.citation import citation
 from simnav.leaderboard.results.errors import RequestError
 from simnav.leaderboard.results.export import Document
 from simnav.leaderboard.results.formats import formats, write
+from simnav.leaderboard.results.home import NOWHERE, Home
 from simnav.leaderboard.results.provenance import benchmark_of, distinct
 
 from .background import background_of, prepare
@@ -77,6 +79,8 @@ def build(
     runs_shown: int = RUNS_SHOWN,
     figures: bool = False,
     sweeps: Sequence[SweepFile] = (),
+    seeds: Mapping[str, Sequence[int]] | None = None,
+    home: Home = NOWHERE,
 ) -> Path:
     """Write the site.
 
@@ -104,6 +108,10 @@ def build(
         Write the charts as SVG and PNG, too, for print.
     sweeps : sequence of SweepFile
         Over dials of the scenarios (`simnav.leaderboard.site.sweeps.sweeps_in`).
+    seeds : mapping of str to sequence of int, optional
+        By scenario, the runs that have series, where not all have.
+    home : Home
+        Where the repository and the documentation are (`simnav.leaderboard.results.home.linked_from`).
 
     Returns
     -------
@@ -122,8 +130,8 @@ def build(
     with _in_place_of(output) as draft:
         catalogued.cache_clear()
         report = progress or (lambda *_, **__: None)
-        site = _Site(results, ranking, draft, command or reproduce(results), report, workers, papers, editions)
-        site.write(runs_shown, figures, sweeps)
+        site = _Site(results, ranking, draft, command or reproduce(results), report, workers, papers, editions, home)
+        site.write(runs_shown, figures, sweeps, seeds or {})
     return output / "index.html"
 
 
@@ -221,11 +229,11 @@ class _Plan:
 
 def _with_series(ordered: Sequence[tuple[Result, float]], gathered: Gathered) -> tuple[Result, float] | None:
     """The first of these runs that has series. They are nearly always those of the first, which are gathered."""
-    for result, ratio in ordered:
-        if result not in gathered.single:
-            gathered.single.update(gather((), [result]).single)
-        if result in gathered.single:
-            return result, ratio
+    for pair in ordered:
+        if pair[0] not in gathered.single:
+            gathered.single.update(gather((), [pair[0]]).single)
+        if pair[0] in gathered.single:
+            return pair
     return None
 
 
@@ -244,17 +252,19 @@ class _Site:
         workers: int,
         papers: Sequence[ExtraPage],
         editions: Sequence[ExtraPage],
+        home: Home,
     ):
         self.results = sorted(results, key=lambda r: (r.scenario, r.estimator, r.seed))
         self.ranking, self.folder, self.progress, self.workers = ranking, folder, progress, workers
         self.runs = group(self.results)
         self.pages = environment()
         self.estimators, self.scenarios = entries(self.runs, ranking)
-        provenances = [r.provenance for r in self.results]
+        provenances, tried = [r.provenance for r in self.results], [r.provenance for r in self.results if r.tried]
         self.facts = SiteFacts(
             version=version("simnav"),
             generated=datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
             total=len(self.results),
+            runs=len(tried),
             scenarios=list(self.scenarios.values()),
             estimators=list(self.estimators.values()),
             papers=papers,
@@ -262,16 +272,19 @@ class _Site:
             command=command,
             benchmark=benchmark_of(provenances),
             provenance=distinct(provenances),
-            citation=citation(provenances),
+            citation=citation(tried),
+            home=home,
         )
 
-    def write(self, runs_shown: int, figures: bool, sweeps: Sequence[SweepFile]) -> None:
+    def write(
+        self, runs_shown: int, figures: bool, sweeps: Sequence[SweepFile], kept: Mapping[str, Sequence[int]]
+    ) -> None:
         """Write all pages and data."""
         (self.folder / "data").mkdir()
         if figures:
             (self.folder / "figures").mkdir()
         seeds = {
-            s: seeds_to_show(self.ranking.scenario(s), self.runs[s], entry.seeds, runs_shown)
+            s: seeds_to_show(self.ranking.scenario(s), self.runs[s], kept.get(s) or entry.seeds, runs_shown)
             for s, entry in self.scenarios.items()
         }
         ordered = {label: worst_runs(label, self.ranking, self.runs) for label in self.estimators}
@@ -281,7 +294,7 @@ class _Site:
             worst = {label: _with_series(found, gathered) for label, found in ordered.items()}
             self.plan = _Plan(seeds, gathered, figures, sweeps)
             with _beside(self, "scenario", list(self.scenarios)) as written:
-                self._other_pages(worst)
+                self._other_pages(worst, {label: found[0] for label, found in ordered.items() if found})
                 steps = len(self.scenarios) + 1
                 self.progress(0, steps)
                 for k, (scenario, _) in enumerate(zip(self.scenarios.values(), written, strict=True)):
@@ -289,14 +302,18 @@ class _Site:
             list(exported)
         self.progress(steps, steps)
 
-    def _other_pages(self, worst: Mapping[str, tuple[Result, float] | None]) -> None:
-        """The pages of estimators, with their worst runs, and those of the whole board."""
+    def _other_pages(
+        self, worst: Mapping[str, tuple[Result, float] | None], first: Mapping[str, tuple[Result, float]]
+    ) -> None:
+        """The pages of estimators, with the worst runs that have series and the worst of all; those of the board."""
         for label, entry in self.estimators.items():
             self._data(entry.data, errors_data(label, self.ranking, self.scenarios))
             self._data(entry.runs, runs_data(label, self.ranking, self.runs))
             last = worst[label]
             shown = None if last is None else one_run(self.plan.gathered.single[last[0]])
             data = estimator_data(entry, self.ranking, self.runs, self.scenarios, self.estimators, last, shown)
+            if data["worst"] is not None:
+                data["worst"]["of_all"] = last is first[label]
             parameters = [runs[label].results[0].parameters for runs in self.runs.values() if label in runs]
             self._page("estimator.html", entry.page, data, estimator=entry, facts=facts_of(label, self.ranking),
                        data=data, parameters=tables.parameters(parameters[0]) if parameters else "")  # fmt: skip
@@ -308,7 +325,9 @@ class _Site:
         for later in tracks[1:]:  # read when its tab is opened
             self._data(f"track-{later['key']}", later)
         index = {"kind": "index", "tracks": headers}
-        self._page("index.html", "index.html", index, tracks=tracks, facts=self._counts())
+        self._page(
+            "index.html", "index.html", index, tracks=tracks, facts=self._counts(), voyages=side_by_side(self.ranking)
+        )
         rows = {label: {"data": e.data, "page": e.page} for label, e in self.estimators.items()}
         compared: dict[str, Any] = {"kind": "compare", "rows": rows, "wins": self._wins()}
         self._page("compare.html", "compare.html", compared)

@@ -20,7 +20,7 @@ from simnav.leaderboard.results.errors import RequestError
 from simnav.leaderboard.results.provenance import distinct
 from simnav.leaderboard.results.result import Result
 
-__all__ = ["BEGIN", "END", "MAP", "PICTURE", "draw", "marked", "replaced", "tables"]
+__all__ = ["BEGIN", "END", "MAP", "PICTURE", "draw", "findings", "marked", "replaced", "tables"]
 
 #: Picture of the board, from the folder of the README.
 PICTURE = "docs/figures/board.png"
@@ -52,9 +52,11 @@ def tables(ranking: Ranking, results: Sequence[Result], of: int | None = None) -
     parts = [f"**Preliminary: {len(results)} of {of} results.**"] if preliminary else []
     main = _main(ranking)
     if main is not None:
-        parts.append(f"{sentence(main)} {limits(main)}".strip())
+        if said := findings(main):
+            parts.append("\n".join(f"- {text}" for text in said))
         if beside_plain(main, main.rows):
             parts.append(f"![Error of the best rows beside the plain row's on each scenario]({MAP})")
+        parts.append(f"{sentence(main)} {limits(main)}".strip())
     if others := [f"- {sentence(t)}" for t in tracks if t is not main and t.track in _FINDINGS]:
         parts.append("\n".join(others))
     parts.append(
@@ -90,17 +92,50 @@ def tables(ranking: Ranking, results: Sequence[Result], of: int | None = None) -
     return "\n\n".join(parts)
 
 
+def findings(track: TrackRanking) -> list[str]:
+    """What a reader should know first of a track, in plain sentences that are made from its rows.
+
+    Parameters
+    ----------
+    track : TrackRanking
+        Ranking of the track.
+
+    Returns
+    -------
+    list of str
+        Empty where the rows cannot be ordered.
+    """
+    best, ranked = best_rows(track), [r for r in track.rows if r.ranked]
+    gained = [r for r in best if r.gain is not None and r.estimator != track.plain]
+    if track.insufficient or not gained:
+        return []
+    one = len(best) == 1
+    who = f"`{best[0].estimator}` is the best" if one else f"{len(best)} of {len(ranked)} estimators may be the best"
+    chance = "" if one else "; the difference between them may be chance"
+    where = f"on {len(track.scenarios)} scenarios of the track {track.title}"
+    said = [f"**Who is best?** {who[0].upper()}{who[1:]} {where}{chance}."]
+    text = f"**What is gained?** Their errors are {gain_text(gained)} than those of the plain filter `{track.plain}`"
+    if track.reference == "oracle":
+        text += (
+            f", and still {spread((r.score for r in best), '{:.1f}')} times those of an oracle that knows all faults"
+        )
+    said.append(f"{text}.")
+    covered = [100.0 * r.faulty.coverage for r in best if math.isfinite(r.faulty.coverage)]
+    if covered:
+        said.append(
+            "**Do they know it?** Once something is wrong, the truth lies inside the 95 % region that they state "
+            f"{spread(covered)} % of the time."
+        )
+    return said
+
+
 def _origin(results: Sequence[Result]) -> str:
-    """Benchmark, commits and days of results, as a sentence."""
+    """Benchmark and days of results, as a sentence; commits are where results are cited."""
     known = distinct(r.provenance for r in results)
-    commits = (
-        ", ".join(sorted({f"`{p.commit[:12]}`{' with changes' if p.dirty else ''}" for p in known if p.commit}))
-        or "a version without a commit"
-    )
     days = sorted({p.date for p in known if p.date})
     when = f", from {days[0]} to {days[-1]}" if len(days) > 1 else f", on {days[0]}" if days else ""
     benchmark = max((p.benchmark for p in known), default="") or "a benchmark without a version"
-    return f"Computed with {benchmark}, commit {commits}{when}."
+    return f"Computed with {benchmark}{when}. `leaderboard/standard/results/provenance` names commits and machines."
 
 
 def _won(row: TrackRow) -> str:

@@ -16,17 +16,20 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from simnav.leaderboard.figures.style import Style
+from simnav.leaderboard.ranking import tables
 from simnav.leaderboard.ranking.plain_row import plain_row
 from simnav.leaderboard.ranking.statistics import FAILURE
 from simnav.leaderboard.ranking.stored_robustness import Profile, ProfilePoint
 from simnav.leaderboard.results.errors import RequestError
 from simnav.leaderboard.results.frame import frame
+from simnav.leaderboard.results.shown import Shown
 from simnav.scenario import Scenario
 from simnav.sensors.imu import TriadSpec
 from simnav.sensors.instrument import AidSpec, figures_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+    from rich.table import Table
 
     from simnav.leaderboard.campaign.campaign import Summary
     from simnav.leaderboard.results.result import Result
@@ -65,8 +68,8 @@ class DatasheetSetting:
     scenario: Scenario
 
 
-@dataclass(frozen=True, eq=False)
-class Robustness:
+@dataclass(frozen=True, eq=False, repr=False)
+class Robustness(Shown):
     """Robustness profiles.
 
     Attributes
@@ -85,6 +88,32 @@ class Robustness:
     unsuitable: tuple[str, ...]
     summary: Summary
     file: str = ""
+
+    def headline(self) -> str:
+        """Whose profiles."""
+        names = ", ".join(dict.fromkeys(row.estimator for row in self.rows)) or "none"
+        return f"robustness profiles of {names}"
+
+    def shown(self) -> Sequence[Table]:
+        """A row an estimator and plain row: the ratio with true datasheets, and the worst for each instrument."""
+        names = list(dict.fromkeys(p.instrument for row in self.rows for p in row.points))
+        rows = []
+        for row in self.rows:
+            true = next((p.ratio for p in row.points if p.factor == 1.0), None)
+            cells = []
+            for name in names:
+                wrong = [p for p in row.points if p.instrument == name and p.factor != 1.0]
+                worst = max(wrong, key=lambda p: p.ratio, default=None)
+                cells.append("" if worst is None else f"{tables.number(worst.ratio)} at {worst.factor:.3g}")
+            failed = sum(p.failed for p in row.points if p.factor != 1.0)
+            rows.append([row.estimator, row.plain, tables.number(true), *cells, str(failed) if failed else ""])
+        return [tables.table(
+            "Error over that of the plain row; for each instrument the worst ratio, and datasheet over truth there",
+            ["estimator", "plain row", "true datasheets", *names, "failed"],
+            rows,
+            numeric=("true datasheets", *names, "failed"),
+            caption="Geometric mean over the seeds. The plain row is told the same wrong datasheet.",
+        )]  # fmt: skip
 
     def to_dict(self) -> dict[str, Any]:
         """What ``simnav robustness --json`` prints."""

@@ -11,8 +11,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from simnav.leaderboard.figures.sweep_figure import Line, Map, error_against_dial, error_maps
+from simnav.leaderboard.ranking import tables
+from simnav.leaderboard.ranking.ranking_table import between
 from simnav.leaderboard.ranking.statistics import Interval, median
 from simnav.leaderboard.results.frame import frame
+from simnav.leaderboard.results.shown import Shown
 from simnav.scenario import Dial
 from simnav.scoring import SCORES
 
@@ -54,7 +57,7 @@ class SweepPoint:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Sweep:
+class Sweep(Shown):
     """Errors against a dial, or two.
 
     Attributes
@@ -89,9 +92,57 @@ class Sweep:
     settings: tuple[Setting, ...]
     summary: Summary
 
-    def __repr__(self) -> str:
+    def headline(self) -> str:
+        """What was varied, and who took part."""
         dials = " and ".join(axis_label(d) for d in self.dials)
-        return f"<Sweep: {self.scenario} over {dials}, {len(self.settings)} settings, {', '.join(self.estimators)}>"
+        return f"{self.scenario} over {dials}, {len(self.settings)} settings, {', '.join(self.estimators)}"
+
+    def shown(self) -> Sequence[tables.Fitted]:
+        """The errors at each setting, and where each estimator breaks."""
+        return self._error_table(), self._breaking_table()
+
+    def _error_table(self) -> tables.Fitted:
+        """A row an estimator and setting."""
+        at = {(p.estimator, p.values): p for p in self.points}
+        rows = []
+        for e in self.estimators:
+            for setting in self.settings:
+                p = at[e, setting.values]
+                failed = f"{p.failed} of {p.runs}" if p.failed else ""
+                error = "failed" if math.isinf(p.error.value) else tables.number(p.error.value)
+                dials = [f"{v:g}" for v in setting.values]
+                rows.append([e, *dials, error, between(p.error.low, p.error.high), failed])
+        score, dials = SCORES[self.score], [axis_label(d) for d in self.dials]
+        columns = ["estimator", *dials, f"error [{score.unit}]", "95 % interval", "failed"]
+        return tables.Fitted(
+            f"{self.scenario}: {score.title}, median of the runs",
+            columns,
+            rows,
+            columns,
+            always=2 + len(dials),
+            numeric=[*dials, f"error [{score.unit}]"],
+        )
+
+    def _breaking_table(self) -> tables.Fitted:
+        """Where each estimator breaks."""
+        beyond = f"beyond {self.values[0][-1]:g}"
+
+        def figure(x: float) -> str:
+            return "–" if math.isnan(x) else beyond if math.isinf(x) else f"{x:.3g}"
+
+        rows = []
+        for b in self.breaking_points:
+            words = "twice its clean error" if b.criterion == "twice-clean" else "the limit"
+            interval = f"{figure(b.value.low)} to {figure(b.value.high)}" if not math.isnan(b.value.low) else ""
+            passes = f"{words}, {tables.number(b.threshold)}"
+            rows.append(
+                [b.estimator, *([] if b.at is None else [f"{b.at:g}"]), passes, figure(b.value.value), interval]
+            )
+        second = [axis_label(self.dials[1])] if len(self.dials) == 2 else []
+        at = f"at: {axis_label(self.dials[0])}"
+        columns = ["estimator", *second, "passes", at, "95 % interval"]
+        value = ["estimator", at, *second, "95 % interval", "passes"]
+        return tables.Fitted("Breaking points", columns, rows, value, always=2 + len(second), numeric=[*second, at])
 
     @cached_property
     def _errors(self) -> dict[tuple[str, tuple[float, ...]], dict[int, float]]:

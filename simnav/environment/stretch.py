@@ -268,7 +268,7 @@ def pack(block: Block, begin: float, most: Mapping[str, int]) -> Stretch:
         if s.has_clock:
             aids[name] = s = replace(s.rows(order), time=s.stamps[order])
         parts[name] = np.searchsorted(step, np.arange(n), side="right"), {"time": s.time, "value": s.value}
-        if s.side.shape[1]:
+        if s.channels and s.side.shape[1]:
             parts[name][1]["side"] = s.side
     for name, (last, arrays) in parts.items():
         cuts[name] = cut = np.concatenate(([0], last))

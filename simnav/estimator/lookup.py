@@ -6,7 +6,7 @@ import contextlib
 import inspect
 import re
 import typing
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -29,7 +29,10 @@ from simnav.estimator.registry import aliases_of, own_class, registered
 from simnav.plugins import place_of
 from simnav.spec import closest
 
-__all__ = ["Description", "describe", "find", "former_names_of", "make"]
+__all__ = ["LOOSE", "Description", "describe", "find", "former_names_of", "make"]
+
+#: The parameter of a row that makes it loosely coupled (`simnav.estimators.models.coupling`).
+LOOSE = "loose"
 
 
 @dataclass(frozen=True)
@@ -125,6 +128,18 @@ def former_names_of(name: str) -> Mapping[str, str]:
     return {} if cls is None else former_names(cls)
 
 
+def _is_loose(given: Any) -> bool:
+    """The value of a parameter ``loose``."""
+    value = converted(given, bool, False, f"parameter {LOOSE!r}")
+    if not isinstance(value, bool):
+        raise EstimatorError(f"parameter {LOOSE!r} is true or false, not {given!r}")
+    return value
+
+
+#: Parameters of every row, which are set after it is made: what reads the value.
+_OF_ROWS: Mapping[str, Callable[[Any], Any]] = {LATE: manner_of, LOOSE: _is_loose}
+
+
 def make(name_or_path: str, **parameters: Any) -> Estimator:
     """Make an estimator.
 
@@ -136,7 +151,8 @@ def make(name_or_path: str, **parameters: Any) -> Estimator:
         Of its constructor; former names are read, too (`Estimator.formerly`). A string is converted to what the
         annotation, or else the default, asks for: numbers, ``true``/``false``, ``none``, a choice, or several values
         parted by commas. Every estimator also takes ``lags`` (`simnav.estimator.looking_back`), and every row ``late``
-        (`simnav.estimator.late_arrivals`).
+        (`simnav.estimator.late_arrivals`) and ``loose`` (true: it uses a receiver in place of the raw observations that
+        this solves, `simnav.estimators.models.coupling`).
 
     Raises
     ------
@@ -148,12 +164,13 @@ def make(name_or_path: str, **parameters: Any) -> Estimator:
     if LAGS in parameters and LAGS not in known:
         lags = lags_of(parameters[LAGS])
         return LookingBack(make(name_or_path, **{k: v for k, v in parameters.items() if k != LAGS}), lags)
-    if LATE in parameters and LATE not in known:
-        made = make(name_or_path, **{k: v for k, v in parameters.items() if k != LATE})
-        if not hasattr(made, LATE):
-            raise EstimatorError(f"estimator {cls.name!r} is not composed of pieces; it has no parameter {LATE!r}")
-        setattr(made, LATE, manner_of(parameters[LATE]))
-        return made
+    for key, value_of in _OF_ROWS.items():
+        if key in parameters and key not in known:
+            made = make(name_or_path, **{k: v for k, v in parameters.items() if k != key})
+            if not hasattr(made, key):
+                raise EstimatorError(f"estimator {cls.name!r} is not composed of pieces; it has no parameter {key!r}")
+            setattr(made, key, value_of(parameters[key]))
+            return made
     hints: dict[str, Any] = {}
     constructors = constructors_of(cls)
     for constructor in reversed(constructors):

@@ -112,7 +112,9 @@ def registered(name: str) -> type[Estimator]:
         discover()
         known = _aliases.get(name, name)
     if known not in _classes:
-        raise EstimatorError(f"unknown estimator {name!r}{closest(name, [*_classes, *_aliases])}")
+        near = closest(name, [*_classes, *_aliases])
+        hint = near if "did you mean" in near else "; 'simnav list estimators' shows those that are known here"
+        raise EstimatorError(f"unknown estimator {name!r}{hint}")
     return _classes[known]
 
 

@@ -1,4 +1,4 @@
-"""Delays, lever arms and noise of the instruments of a log, by comparison with its reference.
+"""Delays, lever arms, mounting and noise of the instruments of a log, by comparison with its reference.
 
 For each instrument the difference from the reference is minimised over its delay; for each delay the lever arm (or the
 constant offset, and the scale of a speed) follows by least squares, with less weight on outliers. The sigma of a result
@@ -8,7 +8,7 @@ sum of squares. Residuals of an instrument are correlated, so that its sigmas ar
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -18,6 +18,8 @@ from simnav.geometry.earth import relative_position
 from simnav.geometry.rotation import dcm_from_rpy, wrap_angle
 from simnav.kinds import BODY_VELOCITY, DEPTH, HEADING, HORIZONTAL_POSITION, POSITION, VELOCITY, WATER_SPEED
 from simnav.log.channel import Series, list_recordings, read_channel
+from simnav.log.imu_alignment import imu_alignment
+from simnav.log.imu_series import ImuSeries, read_imu
 from simnav.log.source import LogSource
 from simnav.types import KINDS, Array, NavigationStates
 
@@ -61,6 +63,8 @@ class Alignment:
         The sigma of the scenario, likewise.
     remark : str
         What could not be found.
+    curve : tuple of (float, float)
+        Delays that were tried [s], and the mean square of what is left with each, over its smallest value.
     """
 
     recording: str
@@ -72,6 +76,7 @@ class Alignment:
     residual: dict[str, float]
     datasheet: dict[str, float]
     remark: str = ""
+    curve: tuple[tuple[float, float], ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
         """Plain."""
@@ -95,7 +100,7 @@ def align(scenario: Scenario, seed: int = 0) -> list[Alignment]:
     Returns
     -------
     list of Alignment
-        One for each instrument that is measured.
+        One for each instrument that is measured, and for the IMU where the reference has an attitude.
 
     Raises
     ------
@@ -114,7 +119,14 @@ def align(scenario: Scenario, seed: int = 0) -> list[Alignment]:
             continue
         series = read_channel(log, where.channel(), spec.kind, recording)
         found.append(_aligned(recording, name, spec.kind, series, source))
+    if log.imu is not None and log.reference.attitude is not None:
+        found.append(_aligned_imu(recording, source, read_imu(log, log.imu, recording)))
     return found
+
+
+def _aligned_imu(recording: str, source: LogSource, imu: ImuSeries) -> Alignment:
+    delay, sigma, mounting, remark, costs = imu_alignment(source, imu)
+    return Alignment(recording, "imu", len(imu.mean), delay, sigma, mounting, {}, {}, remark, relative_costs(costs))
 
 
 def _aligned(recording: str, name: str, kind: str, series: Series, source: LogSource) -> Alignment:
@@ -161,7 +173,25 @@ def _aligned(recording: str, name: str, kind: str, series: Series, source: LogSo
     if any(n.startswith("lever_arm") and e > _KNOWN for n, (_, e) in told.items()):
         told = {n: v for n, v in told.items() if not n.startswith("lever_arm")}
         remark = "; ".join(filter(None, [remark, "the vessel turns too little to tell a lever arm"]))
-    return Alignment(recording, name, len(time), delay, sigma, told, scatter, sigmas, remark)
+    return Alignment(
+        recording,
+        name,
+        len(time),
+        delay,
+        sigma,
+        told,
+        scatter,
+        sigmas,
+        remark,
+        relative_costs({d: a[0] for d, a in attempts.items()}),
+    )
+
+
+def relative_costs(costs: Mapping[float, float]) -> tuple[tuple[float, float], ...]:
+    """Delays in ascending order, with the cost of each over the smallest one; those without a cost are left out."""
+    known = {d: c for d, c in costs.items() if np.isfinite(c)}
+    least = max(min(known.values(), default=1.0), 1e-300)
+    return tuple((float(d), float(known[d] / least)) for d in sorted(known))
 
 
 def _with(blank: Alignment, remark: str) -> Alignment:

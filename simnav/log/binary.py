@@ -19,7 +19,7 @@ _SIGNATURES: tuple[tuple[bytes, str, str], ...] = (
     (b"\x89MCAP0\r\n", "an MCAP file", "mcap"),
     (b"SQLite format 3\0", "an SQLite database, such as a ROS 2 bag", "rosbag"),
     (b"\x7f\x7f", "a Teledyne PD0 file", "pd0"),
-    (b"\xb5\x62", "a u-blox UBX file", ""),
+    (b"\xb5\x62", "a u-blox UBX file", "ubx"),
     (b"ULog", "a PX4 ULog file", ""),
     (b"\xa3\x95", "an ArduPilot log", ""),
     (b"\xa5\x05", "a Nortek file", ""),

@@ -70,12 +70,16 @@ class Series:
         The measurements.
     line : (n,) int array
         Line in the file.
+    sigma : (n, d) array or None
+        Standard deviations that the rows state, in the units of the error; NaN where a row states none. None: the
+        channel has no columns of them.
     """
 
     source: str
     time: Array
     value: Array
     line: NDArray[np.int64]
+    sigma: Array | None = None
 
 
 def _root(folder: str) -> Path:
@@ -250,9 +254,9 @@ def read_channel(spec: RecordedSpec, channel: ChannelSpec, what: str, recording:
     names = kind.values
     table, time, rows = open_file(spec, channel.file, recording, channel.sentence, channel.talker, channel.where)
     time = time + channel.offset
-    rows = rows[:: channel.every]
+    rows = rows[channel.first :: channel.every] if channel.hold_out is None else rows[:: channel.every]
     if channel.hold_out is not None:
-        rows = np.delete(rows, np.s_[:: channel.hold_out])
+        rows = np.delete(rows, np.s_[channel.first :: channel.hold_out])
     columns = _columns(channel, kind, table)
     if len(columns) != len(names):
         raise LogError(
@@ -299,7 +303,40 @@ def read_channel(spec: RecordedSpec, channel: ChannelSpec, what: str, recording:
     for i, component in enumerate(kind.components):
         if component.cyclic and not (kind.geodetic and i < 2):
             value[:, i] = wrap_angle(value[:, i])
-    return Series(table.source, time[rows], value, table.line[rows])
+    sigma = _sigma(channel, kind, table, rows, what) if channel.sigma else None
+    return Series(table.source, time[rows], value, table.line[rows], sigma)
+
+
+def _sigma(channel: ChannelSpec, kind: Kind, table: Table, rows: NDArray[np.int64], what: str) -> Array:
+    """(n, d) standard deviations that the rows state; NaN where they state none."""
+    d = len(kind.components)
+    if len(channel.sigma) not in (1, d):
+        raise LogError(
+            f"{table.source}: sigma of {what} has {len(channel.sigma)} columns; give one, or {d} "
+            f"({', '.join(kind.errors)})"
+        )
+    units, times = channel.sigma_units or "1", channel.sigma_times
+    found = np.empty((len(rows), d))
+    for i, component in enumerate(kind.components):
+        k = i if len(channel.sigma) > 1 else 0
+        unit = units if isinstance(units, str) else units[k]
+        wanted = dimension(component.error_unit)
+        if unit.rpartition(" ")[2] != "1" and dimension(unit) != wanted:
+            raise LogError(f"{table.source}, column {channel.sigma[k]!r}: sigma of {component.error} in {unit!r}; "
+                           f"a unit of {wanted} is wanted")  # fmt: skip
+        values = table.column(channel.sigma[k])[1][rows]
+        found[:, i] = values * factor(unit) * (times[k] if isinstance(times, tuple) else times)
+    none = ~(np.isfinite(found) & (found > 0.0)).all(axis=1)
+    if none.all():
+        raise LogError(f"{table.source}: no row of {what} has a standard deviation above 0 in {channel.sigma}")
+    if none.any():
+        message = (
+            f"{table.source}: {none.sum()} of {len(rows)} rows of {what} state no standard deviation above 0 and have "
+            f"that of the datasheet, the first is line {table.line[rows[none][0]]}"
+        )
+        warnings.warn(message, LogWarning, 3)
+        found[none] = np.nan
+    return found
 
 
 def _columns(channel: ChannelSpec, kind: Kind, table: Table) -> tuple[Column, ...]:

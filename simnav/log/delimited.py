@@ -7,10 +7,11 @@ import io
 import os
 import re
 import warnings
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from datetime import UTC, datetime
 from functools import lru_cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +27,9 @@ __all__ = ["date_and_time", "read_csv", "rows_of"]
 
 _DELIMITERS = (",", ";", "\t", " ")
 _MISSING = ["", "nan", "NaN", "NAN", "NA", "null"]
+_SOMETHING = re.compile(rb"\S")
+#: Arrow's words for a cell that does not fit the type of its column: the number of the column, and the type.
+_NOT_OF_TYPE = re.compile(r"In CSV column #(\d+): .*?conversion error to (\w+)", re.DOTALL)
 
 
 @register_reader("csv", title="a table")
@@ -139,7 +143,6 @@ def read_csv(path: Path, comment: str = "") -> Table:
 @lru_cache(maxsize=64)
 def _read_csv(path: Path, comment: str, _mtime: int, _size: int) -> Table:
     import pyarrow as pa
-    from pyarrow import csv
 
     refuse_binary(path, "csv")
     content, mark = _utf8(path), comment.encode()
@@ -160,21 +163,21 @@ def _read_csv(path: Path, comment: str, _mtime: int, _size: int) -> Table:
     if len(set(names)) != len(names):
         raise LogError(f"{path}, line {blank + 1}: two columns share a name: {', '.join(names)}")
     begin = blank + int(header)  # lines before the data
-    text = _without_cut_row(b"".join(content.split(b"\n", begin)[begin:]), path, delimiter, len(names), mark)
-    if not text.strip():
+    start = 0
+    for _ in range(begin):
+        start = content.find(b"\n", start) + 1 or len(content)
+    end = _end_of_rows(content, start, path, delimiter, len(names), mark)
+    if not _SOMETHING.search(content, start, end):
         raise LogError(f"{path}: there are no rows of data")
     numbers: NDArray[np.int64] | None = None
+    rows = pa.py_buffer(content).slice(start, end - start)
     if blanks or comment:  # columns may be lined up with any number of blanks
-        kept = [(n, line) for n, line in enumerate(text.split(b"\n"), begin + 1) if not _marked(line, mark)]
-        text = b"\n".join(b" ".join(line.split()) if blanks else line for _, line in kept)
+        lines = enumerate(content[start:end].split(b"\n"), begin + 1)
+        kept = [(n, line) for n, line in lines if not _marked(line, mark)]
+        rows = pa.py_buffer(b"\n".join(b" ".join(line.split()) if blanks else line for _, line in kept))
         numbers = np.array([n for n, _ in kept], dtype=np.int64)
     try:
-        data = csv.read_csv(
-            io.BytesIO(text),
-            read_options=csv.ReadOptions(column_names=names, use_threads=False),
-            parse_options=csv.ParseOptions(delimiter=delimiter, ignore_empty_lines=False),
-            convert_options=csv.ConvertOptions(null_values=_MISSING, strings_can_be_null=True),
-        )
+        data = _parsed(rows, names, delimiter)
     except (pa.ArrowInvalid, pa.ArrowKeyError) as error:
         lines = enumerate(content.split(b"\n")[begin:], begin + 1)
         kept = [(n, line) for n, line in lines if not _marked(line, mark)]
@@ -183,35 +186,69 @@ def _read_csv(path: Path, comment: str, _mtime: int, _size: int) -> Table:
             _ragged(path, kept, delimiter, len(names))
             or f"{path}: {what} (is there a quotation mark that is not closed?)"
         ) from None
+    del content, rows
     while data.num_rows and all(c[-1].as_py() is None for c in data.columns):  # empty lines at the end
         data = data.slice(0, data.num_rows - 1)
     columns: dict[str, NDArray[np.float64] | NDArray[np.object_]] = {}
+    count = data.num_rows
     for name in names:
         column = data.column(name)
+        data = data.drop_columns([name])  # so that no more than one is there twice
         if pa.types.is_integer(column.type) or pa.types.is_floating(column.type) or pa.types.is_null(column.type):
             columns[name] = np.asarray(column.cast(pa.float64()).to_numpy(), dtype=np.float64)
         else:
             columns[name] = np.array([None if c is None else str(c) for c in column.to_pylist()], dtype=object)
-    if data.num_rows == 0:
+    if count == 0:
         raise LogError(f"{path}: there are no rows of data")
     if numbers is None:
-        numbers = np.arange(begin + 1, begin + 1 + data.num_rows)
-    return Table(str(path), columns, numbers[: data.num_rows])
+        numbers = np.arange(begin + 1, begin + 1 + count)
+    return Table(str(path), columns, numbers[:count])
 
 
-def _without_cut_row(text: bytes, path: Path, delimiter: str, width: int, mark: bytes) -> bytes:
-    """The rows without the last one if it has too few cells: the logger was switched off while it wrote it."""
-    whole = text.rstrip(b"\r\n")
-    before, _, last = whole.rpartition(b"\n")
+def _parsed(rows: Any, names: Sequence[str], delimiter: str) -> Any:
+    """The columns of a buffer of rows, as a table of pyarrow.
+
+    Arrow takes the type of a column from its first megabyte. Where a later cell does not fit, the column is read again
+    as numbers with a fraction, and then as text.
+    """
+    import pyarrow as pa
+    from pyarrow import csv
+
+    types: dict[str, Any] = {}
+    while True:
+        try:
+            return csv.read_csv(
+                pa.BufferReader(rows),
+                read_options=csv.ReadOptions(column_names=list(names), use_threads=False),
+                parse_options=csv.ParseOptions(delimiter=delimiter, ignore_empty_lines=False),
+                convert_options=csv.ConvertOptions(
+                    null_values=_MISSING, strings_can_be_null=True, column_types=types or None
+                ),
+            )
+        except pa.ArrowInvalid as error:
+            found = _NOT_OF_TYPE.search(str(error))
+            if found is None or types.get(name := names[int(found[1])]) == pa.string():
+                raise
+            types[name] = pa.float64() if found[2] in ("int64", "null") and name not in types else pa.string()
+
+
+def _end_of_rows(content: bytes, start: int, path: Path, delimiter: str, width: int, mark: bytes) -> int:
+    """Where the rows end: before the last one if it has too few cells, since the logger was switched off meanwhile."""
+    end = len(content)
+    while end > start and content[end - 1] in b"\r\n":
+        end -= 1
+    cut = content.rfind(b"\n", start, end)
+    last = content[cut + 1 : end]
     cells = len(last.split()) if delimiter == " " else last.count(delimiter.encode()) + 1
-    if not before.strip() or not last.strip() or _marked(last, mark) or cells >= width:
-        return text
+    alone = cut < start or not _SOMETHING.search(content, start, cut)
+    if alone or not last.strip() or _marked(last, mark) or cells >= width:
+        return len(content)
     warnings.warn(
         f"{path}: the last row has {cells} cells where the first line has {width}; it is incomplete, and left out",
         LogWarning,
         4,
     )
-    return before + b"\n"
+    return cut + 1
 
 
 def _is_number(cell: str) -> bool:
@@ -230,6 +267,8 @@ def _marked(line: bytes, mark: bytes) -> bool:
 def _utf8(path: Path) -> bytes:
     """The content of a text file in UTF-8, which may have been in UTF-16 or in Latin-1."""
     content = path.read_bytes()
+    if content.isascii():
+        return content
     if content.startswith((b"\xff\xfe", b"\xfe\xff")):
         with contextlib.suppress(UnicodeDecodeError):
             return content.decode("utf-16").encode()

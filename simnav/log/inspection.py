@@ -11,22 +11,27 @@ from typing import Any
 
 import numpy as np
 
+from simnav.geometry.earth import relative_position
 from simnav.log.binary import signature
 from simnav.log.check import described
 from simnav.log.delimited import read_csv
 from simnav.log.files import FileSpec
 from simnav.log.formats.bags import topics_of
+from simnav.log.formats.n2k import read_n2k
+from simnav.log.formats.rinex import read_rinex
+from simnav.log.formats.ubx import read_ubx
 from simnav.log.nmea import read_nmea
 from simnav.log.reader import READERS
 from simnav.log.table import LogError, Table, utc_seconds
 from simnav.types import Array
 
-__all__ = ["Stream", "inspect_log", "streams_of"]
+__all__ = ["Stream", "inspect_log", "streams_of", "track_of"]
 
 #: Ending of a file -> its format, where its content says nothing.
 _ENDINGS = {
     ".pos": "rtklib", ".tum": "tum", ".nmea": "nmea", ".sbet": "sbet", ".out": "sbet", ".pd0": "pd0", ".mat": "mat",
     ".h5": "hdf5", ".hdf5": "hdf5", ".parquet": "parquet", ".mcap": "mcap", ".bag": "rosbag", ".db3": "rosbag",
+    ".ubx": "ubx",
 }  # fmt: skip
 _TIME = re.compile(r"^#?\s*(time|times|timestamp|stamp|t|utc|sec|secs|seconds|epoch|gpstime|datetime)(?![a-z])", re.I)
 _DATE = re.compile(r"^\s*(date|day|%?\s*ymd)\b", re.I)
@@ -35,6 +40,13 @@ _LARGE = ((1e17, "ns"), (1e14, "us"), (1e11, "ms"))
 #: Columns of an IMU.
 _INERTIAL = re.compile(r"^(a|g|w|acc|gyr|gyro|accel|omega)[_ .]?[xyz]\b", re.I)
 _LINES = 40
+#: What the lines of a text format look like.
+_LINES_OF = {
+    "n2k": re.compile(r"\d{4}-\d\d-\d\d[T-][\d:.]+Z?,\d+,\d{5,6},\d+,\d+,\d+,[0-9a-f]{2}", re.I),
+    "pd6": re.compile(r"\s*:(SA|TS|W[ISED]|B[ISED]),"),
+}
+#: Formats whose files have several tables, besides NMEA and bags.
+_OF_SENTENCES = {"n2k": read_n2k, "rinex": read_rinex, "ubx": read_ubx}
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,8 +164,11 @@ def _format(path: Path) -> str:
         return found[1]
     by_ending = _ENDINGS.get(path.suffix.lower())
     if found is not None:
-        if by_ending in ("sbet", "pd0", "mat"):
+        if by_ending in ("sbet", "pd0", "mat", "ubx"):
             return by_ending
+        with open(path, "rb") as stream:
+            if b"\xb5\x62\x01" in stream.read(1 << 16):  # a message of UBX after sentences of NMEA
+                return "ubx"
         raise LogError(f"{path}: it is {found[0]}; say its format in a scenario: {', '.join(sorted(READERS.items()))}")
     with open(path, encoding="latin-1") as text:
         head = [line for _, line in zip(range(_LINES), text, strict=False)]
@@ -161,6 +176,11 @@ def _format(path: Path) -> str:
         return "nmea"
     if any(re.match(r"%\s+(GPST|UTC|JST)\s", line) for line in head):
         return "rtklib"
+    if head and head[0][60:].startswith("RINEX VERSION / TYPE") and head[0][20:21] == "O":
+        return "rinex"
+    for form, pattern in _LINES_OF.items():
+        if sum(bool(pattern.match(line)) for line in head) > 0.3 * len(head):
+            return form
     return by_ending if by_ending in ("tum", "rtklib", "nmea") else "csv"
 
 
@@ -172,6 +192,11 @@ def _streams(path: Path, form: str) -> Iterator[Stream]:
         for (talker, sentence), table in tables.items():
             own = None if talker == "P" else talker
             yield Stream(path, form, sentence, own, table, _known(table.column(clock)[1]), {"clock": clock})
+        return
+    if form in _OF_SENTENCES:
+        for (talker, sentence), table in _OF_SENTENCES[form](path).tables.items():
+            time = table.column("logger" if form == "n2k" else "time")[1]
+            yield Stream(path, form, sentence, talker or None, table, _known(time))
         return
     if form in ("mcap", "rosbag"):
         for topic in topics_of(path, form):
@@ -185,6 +210,24 @@ def _streams(path: Path, form: str) -> Iterator[Stream]:
     assert reader is not None
     rows = reader.read(path, FileSpec(path=path.name, format=form, **keys))
     yield Stream(path, form, None, None, rows.table, _known(rows.time), keys)
+
+
+def track_of(stream: Stream) -> Array | None:
+    """(n, 2) east and north of the first position [m] of a stream that has latitudes and longitudes; None without."""
+    found = []
+    for names in (("latitude", "lat"), ("longitude", "lon", "lng", "long")):
+        name = next((n for n in stream.table.names if re.split(r"[./]", n.lower())[-1] in names), None)
+        if name is None or stream.table.columns[name].dtype == object:
+            return None
+        found.append(stream.table.columns[name].astype(np.float64))
+    place = np.stack([*found, np.zeros(len(stream.table))], axis=-1)
+    place = place[np.isfinite(place).all(axis=1)]
+    if not len(place):
+        return None
+    if stream.form not in ("nmea", "n2k", "ubx", "sbet"):  # those are in radians already
+        place[:, :2] = np.radians(place[:, :2])
+    place = place[(np.abs(place[:, 0]) <= 0.5 * np.pi) & (np.abs(place[:, 1]) <= 2.0 * np.pi)]
+    return relative_position(place, place[0])[:, [1, 0]] if len(place) else None
 
 
 def _known(time: Array) -> Array:

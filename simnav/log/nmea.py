@@ -17,16 +17,20 @@ from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from simnav.log.binary import refuse_binary
 from simnav.log.files import FileSpec
+from simnav.log.growing import GrowingTable
 from simnav.log.nmea_sentences import SENTENCES, InvalidError, Row
+from simnav.log.progress import tell
 from simnav.log.reader import Rows, register_reader
 from simnav.log.table import LogError, LogWarning, Table, utc_seconds
 from simnav.spec import closest
 
-__all__ = ["SENTENCES", "NmeaFile", "read_nmea"]
+__all__ = ["SENTENCES", "NmeaFile", "read_nmea", "take_variation"]
+
+#: After so many lines it is told how far the file has been read.
+_TOLD = 10_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,12 +39,13 @@ class NmeaFile:
 
     Each table has the columns of its sentence, and ``logger`` and ``sentence``: UTC seconds since 1970 (or since
     midnight where the file has no stamps). ``invalid`` are the numbers of the lines of each (talker, sentence) that say
-    that they are invalid.
+    that they are invalid, and ``known`` the sentences that its reader understands.
     """
 
     path: str
     tables: Mapping[tuple[str, str], Table]
     invalid: Mapping[tuple[str, str], Sequence[int]]
+    known: Sequence[str] = tuple(SENTENCES)
 
     def table(self, sentence: str, talker: str | None = None) -> Table:
         """The table of a sentence.
@@ -62,7 +67,7 @@ class NmeaFile:
                     f"{self.path}: none of {len(lines)} sentences {want!r} holds a measurement: each says that it is "
                     f"invalid (quality, status or mode), the first is line {min(lines)}"
                 )
-            known = "" if sentence in SENTENCES else f" (sentences that are understood: {', '.join(SENTENCES)})"
+            known = "" if sentence in self.known else f" (sentences that are understood: {', '.join(self.known)})"
             raise LogError(f"{self.path}: there is no sentence {want!r}{closest(want, have)}{known}")
         if len(found) > 1:
             talkers = ", ".join(sorted(t for t, _ in found))
@@ -120,7 +125,7 @@ def _near(tod: float, about: float) -> float:
     return about + (tod - about + 43200.0) % 86400.0 - 43200.0
 
 
-def _take_variation(row: Row, last: float) -> float:
+def take_variation(row: Row, last: float) -> float:
     """Complete a magnetic heading by the variation, in place; return the last known variation."""
     own = row.get("variation")
     if isinstance(own, float) and not math.isnan(own):
@@ -134,16 +139,20 @@ def _take_variation(row: Row, last: float) -> float:
 
 
 @lru_cache(maxsize=64)
-def _read_nmea(path: Path, _mtime: int, _size: int) -> NmeaFile:
+def _read_nmea(path: Path, _mtime: int, size: int) -> NmeaFile:
     refuse_binary(path, "nmea")
-    rows: dict[tuple[str, str], list[tuple[int, float, float, Row]]] = {}
+    rows: dict[tuple[str, str], GrowingTable] = {}
     without: dict[tuple[str, str], list[int]] = {}
     bad_sum: list[int] = []
     bad_line: list[int] = []
     variation = math.nan  # the last that a sentence gave
     epoch = math.nan  # the last time of day that a sentence gave, as a moment
+    read = 0
     with open(path, encoding="latin-1") as lines:
         for number, line in enumerate(lines, 1):
+            read += len(line)
+            if number % _TOLD == 0:
+                tell(path, read, size)
             at = line.find("$")
             if at < 0:
                 if line.strip() and "!" not in line:  # "!" begins the sentences of AIS
@@ -179,8 +188,11 @@ def _read_nmea(path: Path, _mtime: int, _size: int) -> NmeaFile:
                 epoch = tod if math.isnan(about) else _near(tod, about)
             if row is None:
                 continue
-            variation = _take_variation(row, variation)
-            rows.setdefault((talker, sentence), []).append((number, stamp, epoch, row))
+            variation = take_variation(row, variation)
+            table = rows.get((talker, sentence))
+            if table is None:
+                table = rows[talker, sentence] = GrowingTable()
+            table.add({"logger": stamp, "sentence": epoch, **row}, number)
     for bad, what in ((bad_sum, "have a bad checksum"), (bad_line, "are not understood")):
         if bad:
             warnings.warn(
@@ -188,15 +200,8 @@ def _read_nmea(path: Path, _mtime: int, _size: int) -> NmeaFile:
             )
     if not rows and not without:
         raise LogError(f"{path}: there is no NMEA sentence that is understood ({', '.join(SENTENCES)})")
-    tables = {}
-    for (talker, sentence), entries in rows.items():
-        columns: dict[str, NDArray[np.float64] | NDArray[np.object_]] = {
-            "logger": np.array([e[1] for e in entries]),
-            "sentence": np.array([e[2] for e in entries]),
-        }
-        for key in entries[0][3]:
-            values = [e[3][key] for e in entries]
-            columns[key] = np.array(values, dtype=object if isinstance(values[0], str) else np.float64)
-        source = f"{path} ({sentence if talker == 'P' else talker + sentence})"
-        tables[talker, sentence] = Table(source, columns, np.array([e[0] for e in entries]), numbered=False)
+    tables = {
+        (talker, sentence): table.table(f"{path} ({sentence if talker == 'P' else talker + sentence})")
+        for (talker, sentence), table in rows.items()
+    }
     return NmeaFile(str(path), tables, without)

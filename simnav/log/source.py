@@ -18,11 +18,13 @@ from simnav.geometry.earth import gravity
 from simnav.kinds import HEADING
 from simnav.log.channel import Series, list_recordings, read_channel, skip_of
 from simnav.log.imu_series import ImuSeries, read_imu
+from simnav.log.quality import Quality, graded
 from simnav.log.reference import Reference
 from simnav.log.table import LogError, LogWarning
 from simnav.recording import AidStream, Block, ImuLabels
 from simnav.sensors import build_layers, labels
-from simnav.types import KINDS, Array, ImuSamples, NavigationStates, TapStates
+from simnav.streams import stream as random_stream
+from simnav.types import KINDS, Array, ImuSamples, NavigationStates, ReferenceStates, TapStates
 from simnav.world.initial_state import draw_start
 
 if TYPE_CHECKING:
@@ -152,18 +154,22 @@ class LogSource:
         log = scenario.log
         if log is None:
             raise LogError(f"the scenario {scenario.id!r} has no [log]; it is simulated")
+        if log.rows_by_seed:
+            log = log.with_rows(int(random_stream(root, "rows of a log").integers(1 << 30)))
         names = list_recordings(log)
         self.recording = names[seed % len(names)]
         self.instruments = scenario.instruments_sheet()
         self.step = float(scenario.step)
         imu = None if log.imu is None else read_imu(log, log.imu, self.recording)
-        reference = _reference(log, self.recording, imu)
+        reference, self._quality = _reference(log, self.recording, imu)
         begin = _begin(log, self.recording, reference, imu)
         end = min(reference.time[-1], math.inf if imu is None else imu.edge[-1])
         self.duration = self._length(scenario.duration, float(end - begin))
         self._reference, self._begin, self._now = reference, begin, 0.0
         self._imu = None
         notes = [f"recording {self.recording!r}"] if self.recording else []
+        if self._quality is not None and self._quality.sentence:
+            notes.append(self._quality.sentence)
         if imu is not None and log.imu is not None:
             self._imu, resampled = _regrid(imu, begin, self.instruments.imu.rate, self.duration)  # type: ignore[union-attr]
             notes.append(f"IMU samples were {log.imu.samples}" + (", resampled" if resampled else ""))
@@ -209,7 +215,11 @@ class LogSource:
         return replace(self._reference.taps(self._begin + time), time=time)
 
     def _states(self, time: Array) -> NavigationStates:
-        return replace(self._reference.states(self._begin + time), time=time)
+        found = replace(self._reference.states(self._begin + time), time=time)
+        if self._quality is None:
+            return found
+        sigma, solution = self._quality.at(self._begin + time)
+        return ReferenceStates(found.time, found.position, found.velocity, found.attitude, sigma, solution)
 
     def reference_states(self, time: Array) -> NavigationStates:
         """The reference at n times on the clock of the log [s]; NaN where it has nothing to say."""
@@ -252,10 +262,12 @@ class LogSource:
                 )
             value = series.value[inside]
             sigma = np.tile(sheet.sigma, (len(value), 1))
+            if series.sigma is not None:
+                stated = series.sigma[inside]
+                sigma = np.where(np.isfinite(stated), stated, sigma)
             nothing = np.zeros(len(value), np.uint32)
-            streams[name] = AidStream(
-                name, spec.kind, time[inside], value, nothing, np.zeros_like(sigma), sigma, np.empty(0)
-            )
+            stream = AidStream(name, spec.kind, time[inside], value, nothing, np.zeros_like(sigma), sigma, np.empty(0))
+            streams[name] = stream if series.sigma is None else replace(stream, side=sigma.copy())
         return streams
 
     def advance(self, until: float) -> Block:
@@ -283,7 +295,7 @@ def _cut(s: AidStream, begin: float, until: float) -> AidStream:
     return replace(s.rows(slice(a, b)), dropped=s.dropped[c:d])
 
 
-def _reference(log: RecordedSpec, recording: str, imu: ImuSeries | None) -> Reference:
+def _reference(log: RecordedSpec, recording: str, imu: ImuSeries | None) -> tuple[Reference, Quality | None]:
     spec = log.reference
 
     def series(name: str) -> Series | None:
@@ -292,7 +304,9 @@ def _reference(log: RecordedSpec, recording: str, imu: ImuSeries | None) -> Refe
 
     position = series("position")
     assert position is not None
-    return Reference(position, series("velocity"), series("attitude"), spec.max_gap, spec.lever_arm, imu)
+    position, quality = graded(log, recording, position)
+    found = Reference(position, series("velocity"), series("attitude"), spec.max_gap, spec.lever_arm, imu)
+    return found, quality
 
 
 def _begin(log: RecordedSpec, recording: str, reference: Reference, imu: ImuSeries | None) -> float:
@@ -348,9 +362,9 @@ def _regrid(imu: ImuSeries, begin: float, rate: float, duration: float) -> tuple
 
 def _measured_heading(aids: Mapping[str, AidStream]) -> tuple[float, str] | None:
     """The first heading that an instrument measured in the first minute, and its name."""
-    for name, stream in aids.items():
-        if KINDS[stream.kind].equation == HEADING and len(stream) and stream.time[0] <= _EARLY:
-            return float(stream.value[0, 0]), name
+    for name, aid in aids.items():
+        if KINDS[aid.kind].equation == HEADING and len(aid) and aid.time[0] <= _EARLY:
+            return float(aid.value[0, 0]), name
     return None
 
 

@@ -49,6 +49,10 @@ _OF_CHANNELS: Mapping[str, Any] = {
     "drop_repeated": False,
     "variation": None,
     "variation_model": None,
+    "first": 0,
+    "sigma": (),
+    "sigma_units": (),
+    "sigma_times": 1.0,
 }
 
 
@@ -86,6 +90,15 @@ class ChannelSpec(_Grown):
         Magnetic variation that is added to a magnetic heading [rad], positive east. None: that of the sentences.
     variation_model : str or None
         ``wmm``: the variation is that of the World Magnetic Model at the place and time of the reference.
+    first : int
+        With ``every`` and ``hold_out``: the first of the rows that are taken, or left out.
+    sigma : tuple
+        Columns with the standard deviation of each reading (``sdn``, ``fom``, ``hdop``): one for all components, or one
+        each. A row that has none, or none above 0, has that of the datasheet.
+    sigma_units : str or tuple of str
+        Their units, like ``units``; of a figure without a unit, such as HDOP, leave it out.
+    sigma_times : float or tuple of float
+        Multiplies them: of HDOP the sigma at HDOP 1 [SI units].
     """
 
     later: ClassVar[Mapping[str, Any]] = _OF_CHANNELS
@@ -104,6 +117,10 @@ class ChannelSpec(_Grown):
     drop_repeated: bool = False
     variation: float | None = quantity("deg", None)
     variation_model: Literal["wmm"] | None = None
+    first: Annotated[int, Field(ge=0)] = 0
+    sigma: tuple[Column, ...] = ()
+    sigma_units: str | tuple[str, ...] = ()
+    sigma_times: Positive | tuple[Positive, ...] = 1.0
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -112,6 +129,14 @@ class ChannelSpec(_Grown):
         if self.variation is not None and self.variation_model is not None:
             raise ValueError("variation_deg and variation_model exclude each other; give one")
         check_units((self.units,) if isinstance(self.units, str) else self.units)
+        check_units((self.sigma_units,) if isinstance(self.sigma_units, str) else self.sigma_units)
+        for key, given in (("sigma_units", self.sigma_units), ("sigma_times", self.sigma_times)):
+            if given not in ((), 1.0) and not self.sigma:
+                raise ValueError(f"{key} needs 'sigma', the columns of the standard deviations")
+            if isinstance(given, tuple) and len(given) not in (0, len(self.sigma)):
+                raise ValueError(
+                    f"{key} has {len(given)} values for {len(self.sigma)} columns of sigma; give one or each"
+                )
         if isinstance(self.units, tuple) and len(self.units) not in (0, len(self.columns)):
             raise ValueError(
                 f"{len(self.units)} units for {len(self.columns)} columns; give one unit, or one for each column"
@@ -127,7 +152,7 @@ class LogInstrumentSpec(_Grown):
     source : {"file", "reference"}
         ``reference``: simulated from the reference with the instrument's own error model.
     file, sentence, talker, columns, units, frame, every, hold_out, offset, where, mounting, drop_repeated, variation,
-    variation_model
+    variation_model, first, sigma, sigma_units, sigma_times
         As in `ChannelSpec`, for ``source = "file"``.
     """
 
@@ -148,6 +173,10 @@ class LogInstrumentSpec(_Grown):
     drop_repeated: bool = False
     variation: float | None = quantity("deg", None)
     variation_model: Literal["wmm"] | None = None
+    first: Annotated[int, Field(ge=0)] = 0
+    sigma: tuple[Column, ...] = ()
+    sigma_units: str | tuple[str, ...] = ()
+    sigma_times: Positive | tuple[Positive, ...] = 1.0
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -231,7 +260,7 @@ class OriginSpec(Spec):
     height: float = quantity("m", 0.0)
 
 
-class ReferenceSpec(Spec):
+class ReferenceSpec(_Grown):
     """The reference trajectory that estimates are scored against, for want of the truth.
 
     Attributes
@@ -246,13 +275,42 @@ class ReferenceSpec(Spec):
         position and velocity are brought back to the IMU with it.
     max_gap : float or None
         The reference is interpolated across holes up to this long [s]; default one and a half times its usual spacing.
+    quality : int, str or None
+        Column of the file of the position that says how good each fix is.
+    fixed, floating : tuple of float
+        Its values for fixed and for float solutions; epochs between rows with other values are not scored. By default
+        those of RTKLIB.
+    fixed_sigma, floating_sigma : (float, float, float) or None
+        Standard deviation of such a position, north-east-down [m], where the position has no ``sigma`` of its own.
     """
+
+    later: ClassVar[Mapping[str, Any]] = {
+        "quality": None,
+        "fixed": (1.0,),
+        "floating": (2.0,),
+        "fixed_sigma": None,
+        "floating_sigma": None,
+    }
 
     position: ChannelSpec
     velocity: ChannelSpec | None = None
     attitude: ChannelSpec | None = None
     lever_arm: Vector = quantity("m", (0.0, 0.0, 0.0))
     max_gap: Positive | None = quantity("s", None)
+    quality: Column | None = None
+    fixed: tuple[float, ...] = (1.0,)
+    floating: tuple[float, ...] = (2.0,)
+    fixed_sigma: Vector | None = quantity("m", None)
+    floating_sigma: Vector | None = quantity("m", None)
+
+    @model_validator(mode="after")
+    def _check_quality(self) -> Self:
+        if self.quality is None and (self.fixed_sigma is not None or self.floating_sigma is not None):
+            raise ValueError("fixed_sigma_m and floating_sigma_m need 'quality', the column that tells such fixes")
+        both = set(self.fixed) & set(self.floating)
+        if both:
+            raise ValueError(f"fixed and floating have {sorted(both)} in common")
+        return self
 
 
 class RecordedSpec(_Grown):
@@ -281,9 +339,12 @@ class RecordedSpec(_Grown):
     begin : {"first", "moving"}
         The run begins at the first epoch of the reference, or at the first one at which the vessel moves by at least
         1 m/s: then its course gives the heading of a reference without attitude.
+    rows_by_seed : bool
+        The seed draws with which row ``every`` and ``hold_out`` begin, so that each run of a recording gets other fixes
+        and is scored against others.
     """
 
-    later: ClassVar[Mapping[str, Any]] = {"begin": "first"}
+    later: ClassVar[Mapping[str, Any]] = {"begin": "first", "rows_by_seed": False}
 
     folder: str = ""
     recordings: str | tuple[str, ...] = "*"
@@ -294,6 +355,7 @@ class RecordedSpec(_Grown):
     origin: OriginSpec | None = None
     skip: NonNegative | tuple[NonNegative, ...] = quantity("s", 0.0)
     begin: Literal["first", "moving"] = "first"
+    rows_by_seed: bool = False
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -339,6 +401,36 @@ class RecordedSpec(_Grown):
         if not isinstance(self.recordings, str) and not self.recordings:
             raise ValueError("recordings = [] is empty; name at least one, or leave it out")
         return self
+
+    @property
+    def stated(self) -> tuple[str, ...]:
+        """The instruments whose readings state their standard deviations."""
+        return tuple(n for n, i in self.instruments.items() if i.sigma)
+
+    def with_rows(self, number: int) -> Self:
+        """The same log, whose channels begin at another row if ``rows_by_seed``.
+
+        Parameters
+        ----------
+        number : int
+            A drawn number; a channel begins at row ``number`` modulo its ``every`` or ``hold_out``.
+        """
+        if not self.rows_by_seed:
+            return self
+
+        def moved(channel: Any) -> Any:
+            period = channel.hold_out or channel.every
+            return channel.model_copy(update={"first": (channel.first + number) % period})
+
+        reference = {
+            n: moved(c) for n in ("position", "velocity", "attitude") if (c := getattr(self.reference, n)) is not None
+        }
+        return self.model_copy(
+            update={
+                "instruments": {n: moved(i) for n, i in self.instruments.items()},
+                "reference": self.reference.model_copy(update=reference),
+            }
+        )
 
 
 def _near(name: str, spec: RecordedSpec) -> str:

@@ -132,7 +132,7 @@ def check_ascending(time: Array, table: Table, column: str) -> None:
 def utc_seconds(text: str) -> float:
     """Seconds since 1970 of a date like ``2014-08-01T00:00:00.124Z`` or ``2014/08/01 00:00:00.124``.
 
-    UTC where it names no zone.
+    UTC where it names no zone. Some loggers of ships give year and day of the year: ``14+213:00:00:00.124``.
 
     Raises
     ------
@@ -140,6 +140,8 @@ def utc_seconds(text: str) -> float:
         If it is not one.
     """
     text = text.strip()
+    if text[2:3] == "+":
+        return datetime.strptime(text, "%y+%j:%H:%M:%S.%f").replace(tzinfo=UTC).timestamp()
     if text[4:5] == "/" and text[7:8] == "/":
         text = text[:10].replace("/", "-") + text[10:]
     moment = datetime.fromisoformat(text)

@@ -59,6 +59,9 @@ class Header:
         Path of the TOML file.
     recorded : bool
         Whether the measurements come from a log.
+    channels : bool
+        Whether an instrument has channels, such as satellites; learning tasks take none. That a kind of instrument of a
+        plug-in has channels is not known from the head of a file.
     """
 
     name: str
@@ -71,6 +74,7 @@ class Header:
     training: bool
     path: Path
     recorded: bool = False
+    channels: bool = False
 
     @property
     def id(self) -> str:
@@ -183,6 +187,7 @@ def _read(path: Path) -> Header | None:
         training=table.get("training") is True,
         path=path,
         recorded=re.search(r"^\[log[\].]", text, re.MULTILINE) is not None,
+        channels=re.search(r"^[^#\n]*\bkind *= *[\"']gnss_raw[\"']", text, re.MULTILINE) is not None,
     )
 
 

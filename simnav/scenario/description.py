@@ -195,9 +195,10 @@ class Description(Spec):
 
     def instruments_sheet(self) -> Instruments:
         """The datasheets that an estimator receives."""
-        imu = self.imu
+        imu, stated = self.imu, () if self.log is None else self.log.stated
+        sheets = [spec.datasheet(name) for name, spec in self.aids.items()]
         return Instruments(
-            [spec.datasheet(name) for name, spec in self.aids.items()],
+            [replace(sheet, stated=True) if sheet.name in stated else sheet for sheet in sheets],
             imu=None if imu is None else imu.datasheet(),
             step=self.step,
         )

@@ -35,6 +35,9 @@ class Scenario(Description):
     _declared: dict[str, Any] = PrivateAttr(default_factory=dict)
     _draws: Draws = PrivateAttr(default_factory=dict)
 
+    def __repr__(self) -> str:
+        return f"<Scenario: {self.id}, {self.title or 'without a title'}, {self.duration:g} s>"
+
     @classmethod
     def from_toml(cls, table: Mapping[str, Any], *, source: str = "<toml>", path: str = "") -> Self:
         """See `Spec.from_toml`. With distributions, the result is the scenario in the middle of their ranges.

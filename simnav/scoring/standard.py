@@ -9,6 +9,7 @@ from simnav.scoring import consistency
 from simnav.scoring import integrity
 from simnav.scoring import detection
 from simnav.scoring import noise_estimation
+from simnav.scoring import beyond_reference
 from simnav.scoring import smoothed
 from simnav.scoring import cost
 from simnav.scoring import lagged
@@ -17,6 +18,7 @@ from simnav.scoring import lagged
 
 __all__ = [
     "accuracy",
+    "beyond_reference",
     "consistency",
     "cost",
     "detection",

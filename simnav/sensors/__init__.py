@@ -16,12 +16,15 @@ from simnav.sensors.compass import Gyrocompass, MagneticCompass
 from simnav.sensors.depth import Depth
 from simnav.sensors.derived import DerivedInstrument
 from simnav.sensors.dvl import Dvl
+from simnav.sensors.dvl_beams import DvlBeams
+from simnav.sensors.dvl_solution import DvlSolution
 from simnav.sensors.faults import AnyFault, FaultLayer, FaultSpec, build_layers, fault_specs, labels, register_fault
 from simnav.sensors.gnss import GnssPosition, GnssVelocity
 from simnav.sensors.gnss_raw import GnssRaw
 from simnav.sensors.gnss_receiver import GnssReceiver, GnssReceiverVelocity
 from simnav.sensors.imu import Imu, ImuSpec
 from simnav.sensors.instrument import AidSpec, Instrument, register_instrument
+from simnav.sensors.magnetic_field import MagneticField
 from simnav.sensors.speed_log import SpeedLog
 from simnav.sensors.terrain import TerrainFix
 from simnav.spec import OneOf
@@ -34,6 +37,8 @@ __all__ = [
     "Depth",
     "DerivedInstrument",
     "Dvl",
+    "DvlBeams",
+    "DvlSolution",
     "FaultLayer",
     "FaultSpec",
     "GnssPosition",
@@ -46,6 +51,7 @@ __all__ = [
     "ImuSpec",
     "Instrument",
     "MagneticCompass",
+    "MagneticField",
     "SpeedLog",
     "TerrainFix",
     "build_layers",

@@ -122,6 +122,11 @@ class ChannelInstrument(Instrument):
         """
         return None
 
+    def own_labels(self, duration: float) -> tuple[FaultLabel, ...]:
+        """All labels of its own, `own_label` first; their bits follow each other, from `bit` on."""
+        own = self.own_label(duration)
+        return () if own is None else (own,)
+
     def ahead(self, time: Array) -> tuple[Array, Array]:
         """See `Instrument.ahead`; both arrays are (n, c, d)."""
         error = self.bias[None].repeat(len(time), axis=0)

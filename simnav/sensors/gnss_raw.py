@@ -43,9 +43,10 @@ from pydantic import (
 from simnav.blocks import StateBlock
 from simnav.geometry.earth import displace
 from simnav.kinds import Component, Kind
-from simnav.recording import REFLECTION, AidStream, FaultLabel
+from simnav.recording import CLOCK_JUMP, REFLECTION, AidStream, FaultLabel
 from simnav.satellites.ephemeris import Ephemerides
 from simnav.satellites.multipath import multipath_error, sea_reflection, strength_change
+from simnav.satellites.orbit import SPEED_OF_LIGHT
 from simnav.satellites.receiver_clock import Grade, clock_block
 from simnav.satellites.rinex_navigation import read_navigation
 from simnav.satellites.signal_errors import amplification, density_ratio, range_error
@@ -58,7 +59,7 @@ from simnav.spec import NonNegative, Positive, SpecError, Vector, closest, quant
 from simnav.types import NO_SIDE, Array, TapStates
 from simnav.world.obstacles import Paths
 
-__all__ = ["SHIPPED", "SHIPPED_EPOCH", "SYSTEMS", "GnssRaw", "RawReceiver"]
+__all__ = ["SHIPPED", "SHIPPED_EPOCH", "SYSTEMS", "GnssRaw", "RawReceiver", "ephemerides_of"]
 
 #: Letters of the systems in names of satellites, as RINEX has them.
 SYSTEMS: Mapping[str, str] = {"gps": "G", "galileo": "E", "beidou": "C"}
@@ -67,6 +68,8 @@ SHIPPED = Path(__file__).parent.parent / "satellites" / "data" / "2023-03-12-noo
 SHIPPED_EPOCH = "2023-03-12T12:00:00"
 #: Errors by reflections that are larger have a label: of ranges [m], and of rates [m/s].
 _LABELLED = (0.1, 0.01)
+#: Least step of a clock [s], 3 km: a smaller one could not be told from errors of the readings.
+_LEAST_STEP = 1e-5
 #: How often the sky is looked at when the satellites of a place are chosen [s].
 _GLANCE = 60.0
 
@@ -82,6 +85,22 @@ def _epoch(text: str) -> datetime:
 def _read(path: Path, modified: int, size: int) -> Ephemerides:
     """The file of a path; read again if it was changed."""
     return read_navigation(path)
+
+
+def ephemerides_of(navigation: str) -> Ephemerides:
+    """The ephemerides of a RINEX navigation file; of an empty name those that come with simnav.
+
+    Raises
+    ------
+    SpecError
+        If the file cannot be read.
+    """
+    path = Path(navigation).expanduser() if navigation else SHIPPED
+    try:
+        state = path.stat()
+    except OSError as error:
+        raise SpecError(f"navigation = {navigation!r}: cannot be read: {error.strerror}") from None
+    return _read(path, state.st_mtime_ns, state.st_size)
 
 
 @lru_cache(maxsize=64)
@@ -110,7 +129,7 @@ _Texts = tuple[Annotated[str, StringConstraints(min_length=1)], ...]
         role="range",
         components=(Component("pseudorange", "m", limit=1e8), Component("range_rate", "m_s", limit=1e5)),
         equation=observe,
-        datasheet=("signal_error", "multipath", "frequencies"),
+        datasheet=("signal_error", "multipath", "frequencies", "clock_step"),
         side=SIDE,
         reading_sigma=reading_sigma,
         observations=observe_all,
@@ -170,6 +189,9 @@ class GnssRaw(AidSpec):
         Its figures are so many times those of its grade.
     clock_bias : float
         One sigma of the clock's error at the begin of a run [m].
+    clock_step : float
+        The receiver steps its clock by so much whenever its error exceeds half of it [s]; many do so by a millisecond.
+        The first readings after a step have a label. 0: the clock runs freely.
 
     Examples
     --------
@@ -186,7 +208,7 @@ class GnssRaw(AidSpec):
         "clock_bias",
     )  # fmt: skip
 
-    later: ClassVar[Mapping[str, Any]] = {**AidSpec.later, "sea_reflection": 0.0}
+    later: ClassVar[Mapping[str, Any]] = {**AidSpec.later, "sea_reflection": 0.0, "clock_step": 0.0}
 
     kind: Literal["gnss_raw"] = "gnss_raw"
     navigation: str = ""
@@ -215,6 +237,7 @@ class GnssRaw(AidSpec):
     oscillator: Grade = "tcxo"
     oscillator_factor: NonNegative = 1.0
     clock_bias: NonNegative = quantity("m", 300.0)
+    clock_step: NonNegative = quantity("s", 0.0)
     lever_arm: Vector = quantity("m", ZERO)
 
     @field_validator("epoch")
@@ -225,6 +248,13 @@ class GnssRaw(AidSpec):
         except ValueError:
             raise ValueError(f"epoch = {text!r} should be a GPS time from 1980 on, like '{SHIPPED_EPOCH}'") from None
         return text
+
+    @field_validator("clock_step")
+    @classmethod
+    def _apart(cls, step: float) -> float:
+        if 0.0 < step < _LEAST_STEP:
+            raise ValueError(f"clock_step_s = {step:g} should be 0, or at least {_LEAST_STEP:g}; receivers have 0.001")
+        return step
 
     @model_validator(mode="after")
     def _chosen(self) -> Self:
@@ -249,12 +279,11 @@ class GnssRaw(AidSpec):
 
     def ephemerides(self) -> Ephemerides:
         """The broadcast ephemerides."""
-        path = Path(self.navigation).expanduser() if self.navigation else SHIPPED
-        try:
-            state = path.stat()
-        except OSError as error:
-            raise SpecError(f"navigation = {self.navigation!r}: cannot be read: {error.strerror}") from None
-        return _read(path, state.st_mtime_ns, state.st_size)
+        return ephemerides_of(self.navigation)
+
+    def origin(self) -> Mapping[str, str]:
+        """See `AidSpec.origin`: the epoch, and the navigation file."""
+        return {"epoch": self.epoch, "navigation": self.navigation}
 
     def channels(self) -> tuple[str, ...]:
         """The satellites."""
@@ -303,6 +332,8 @@ class RawReceiver(ChannelInstrument):
         self.spec, self._sheet = spec, spec.datasheet(name)
         self.sky = Sky(spec.ephemerides(), self.channels, _epoch(spec.epoch))
         self._last: tuple[TapStates, Sight, Paths | None] | None = None
+        #: Number of steps of the clock at the last reading.
+        self._steps: float | None = None
 
     def _seen(self, tap: TapStates) -> tuple[Sight, Paths | None]:
         """The satellites from the antenna at n times, and the ways of their signals; None: nothing is in the way."""
@@ -339,16 +370,37 @@ class RawReceiver(ChannelInstrument):
 
     def sense(self, tap: TapStates) -> AidStream:
         """See `ChannelInstrument.sense`. Reflections are labelled, with their errors."""
-        stream = super().sense(tap)
+        stream = self._with_jumps(super().sense(tap), tap)
         if self.own_label(1.0) is None:
             return stream
         row = np.searchsorted(tap.time, stream.time)
         error = np.stack(self.detour(tap), axis=2)[row, stream.channel]
         touched: NDArray[np.bool_] = np.any(abs(error) > _LABELLED, axis=1)
         return replace(
-            stream, faults=np.where(touched, np.uint32(1 << self.bit), np.uint32(0)),
+            stream, faults=stream.faults | np.where(touched, np.uint32(1 << self.bit), np.uint32(0)),
             fault_error=np.where(touched[:, None], error, 0.0),
         )  # fmt: skip
+
+    def own_labels(self, duration: float) -> tuple[FaultLabel, ...]:
+        """See `ChannelInstrument.own_labels`: also that of the steps of the clock."""
+        own = super().own_labels(duration)
+        return (*own, FaultLabel(CLOCK_JUMP, (self.name,), 0.0, duration)) if self.spec.clock_step else own
+
+    def _steps_at(self, time: Array) -> Array:
+        """(n,) how many steps the clock was set back by."""
+        step = SPEED_OF_LIGHT * self.spec.clock_step
+        return np.asarray(np.round(self.block("clock", time)[:, 0] / step))
+
+    def _with_jumps(self, stream: AidStream, tap: TapStates) -> AidStream:
+        """The readings with a label on the first ones after each step of the clock; they have no error by it."""
+        if not self.spec.clock_step or not len(tap.time):
+            return stream
+        steps = self._steps_at(tap.time)
+        before = np.append(steps[0] if self._steps is None else self._steps, steps[:-1])
+        self._steps = float(steps[-1])
+        jumped = (steps != before)[np.searchsorted(tap.time, stream.time)]
+        bit = self.bit + len(super().own_labels(1.0))
+        return replace(stream, faults=stream.faults | np.where(jumped, np.uint32(1 << bit), np.uint32(0)))
 
     def from_sea(self, tap: TapStates) -> tuple[Array, Array]:
         """(n, c) excess paths [m] and amplitudes of the signals that the sea reflects."""
@@ -396,6 +448,8 @@ class RawReceiver(ChannelInstrument):
         """See `ChannelInstrument.observe`."""
         seen, clock = self.sight(tap), self.block("clock", tap.time)
         pseudorange = seen.range + clock[:, :1] + seen.troposphere + self.lasting(tap)
+        if self.spec.clock_step:
+            pseudorange -= SPEED_OF_LIGHT * self.spec.clock_step * self._steps_at(tap.time)[:, None]
         if self.spec.frequencies == 1:
             pseudorange += seen.ionosphere
         further, faster = self.detour(tap)

@@ -27,7 +27,7 @@ from simnav.sensors.instrument import ZERO, AidSpec, Instrument, SigmaTriple, re
 from simnav.spec import Vector, quantity
 from simnav.types import Array, Datasheet
 
-__all__ = ["GnssReceiver", "GnssReceiverVelocity"]
+__all__ = ["GnssReceiver", "GnssReceiverVelocity", "corrected_ranges"]
 
 #: Times closer than this are one and the same [s].
 _SAME = 1e-6
@@ -112,7 +112,7 @@ class _Receiver(DerivedInstrument):
         last = np.searchsorted(source.time, time + _SAME)
         kept, lost, rows = [], [], []
         for t, i, j in zip(time, first, last, strict=True):
-            found = monitored(_ranges(source, slice(i, j), sheet), self.spec.false_alarm)
+            found = monitored(corrected_ranges(source, slice(i, j), sheet), self.spec.false_alarm)
             if found is None:
                 lost.append(t)
                 continue
@@ -130,7 +130,7 @@ class _Receiver(DerivedInstrument):
         faults = int(np.bitwise_or.reduce(source.faults[rows][found.used]))
         if not source.fault_error[rows][found.used].any():
             return faults, np.zeros(3)
-        healthy = solve(_ranges(source, rows, sheet, without_faults=True).only(found.used))
+        healthy = solve(corrected_ranges(source, rows, sheet, without_faults=True).only(found.used))
         return faults, np.zeros(3) if healthy is None else self.definition.difference(value, self.answer(healthy)[0])
 
 
@@ -144,8 +144,20 @@ class _Velocity(_Receiver):
         return solution.velocity, np.sqrt(np.diag(solution.velocity_covariance))
 
 
-def _ranges(source: AidStream, rows: slice, sheet: Datasheet, *, without_faults: bool = False) -> Ranges:
-    """The corrected observations of some rows of a stream, with sigmas by the datasheet."""
+def corrected_ranges(source: AidStream, rows: slice, sheet: Datasheet, *, without_faults: bool = False) -> Ranges:
+    """The corrected observations of one epoch, with sigmas by the datasheet.
+
+    Parameters
+    ----------
+    source : AidStream
+        Of an instrument of the kind ``gnss_raw``.
+    rows : slice
+        Its readings of one time.
+    sheet : Datasheet
+        Its datasheet.
+    without_faults : bool
+        Whether the errors of faults are taken away.
+    """
     value, side = source.value[rows], source.side[rows]
     if without_faults:
         value = value - source.fault_error[rows]

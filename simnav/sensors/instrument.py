@@ -208,6 +208,10 @@ class AidSpec(Spec):
         """
         return {}
 
+    def origin(self) -> Mapping[str, str]:
+        """What an export needs beyond the datasheet, such as the date (`Recording.origins`); nothing by default."""
+        return {}
+
     @model_validator(mode="after")
     def _proper_channels(self) -> Self:
         channels = self.channels()

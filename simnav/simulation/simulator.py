@@ -135,9 +135,9 @@ class Simulator:
         kinds = {name: spec.kind for name, spec in scenario.aids.items()}
         self.faults = labels(scenario.faults, scenario.duration, kinds)
         for instrument in self.aids.values():
-            if isinstance(instrument, ChannelInstrument) and (own := instrument.own_label(scenario.duration)):
+            if isinstance(instrument, ChannelInstrument) and (own := instrument.own_labels(scenario.duration)):
                 instrument.bit = len(self.faults)
-                self.faults = (*self.faults, own)
+                self.faults = (*self.faults, *own)
         self.layers = build_layers(scenario.faults, root)
         self._label_imu = any("imu" in f.instruments for f in scenario.faults)
 
@@ -225,6 +225,7 @@ def _recording(simulator: Simulator) -> Recording:
         draws=simulator.draws,
         actual=simulator.scenario.actual_sheet(),
         actual_covariance=simulator.scenario.initial_error.actual_covariance(),
+        origins={name: origin for name, spec in simulator.scenario.aids.items() if (origin := spec.origin())},
     )
 
 

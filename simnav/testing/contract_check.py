@@ -95,7 +95,7 @@ class Finding:
     sentence: str
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Report:
     """All findings about one estimator.
 
@@ -120,6 +120,10 @@ class Report:
             "passed": self.passed,
             "findings": [{"name": f.name, "ok": f.ok, "sentence": f.sentence} for f in self.findings],
         }
+
+    def __repr__(self) -> str:
+        bad = ", ".join(f.name for f in self.findings if not f.ok)
+        return f"<Report: {self.estimator} {'passes' if self.passed else f'fails: {bad}'}>"
 
     def __str__(self) -> str:
         lines = [f"{'ok  ' if f.ok else 'FAIL'}  {f.name}: {f.sentence}" for f in self.findings]

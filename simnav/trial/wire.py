@@ -142,7 +142,7 @@ class PacketEncoder:
 def _numbers(stream: AidStream) -> Array:
     """What a packet holds of each reading of a stream, beside instrument and time."""
     if not stream.channels:
-        return stream.value
+        return np.hstack([stream.value, stream.side]) if stream.states_sigma else stream.value
     return np.hstack([stream.value, stream.channel[:, None].astype(np.float64), stream.side])
 
 
@@ -186,6 +186,9 @@ class PacketDecoder:
                 side = values[i + 1 : i + 1 + sides]
                 aids.append(Measurement(time, name, kind, value, channels[int(values[i])], side))
                 i += 1 + sides
+            elif sides:  # what the reading states of its noise
+                aids.append(Measurement(time, name, kind, value, side=values[i : i + sides]))
+                i += sides
             else:
                 aids.append(Measurement(time, name, kind, value))
         return Measurements(start, end, imu, aids)

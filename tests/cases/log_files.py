@@ -100,6 +100,80 @@ def _pd0(path: Path) -> None:
     path.write_bytes(content)
 
 
+def _n2k() -> str:
+    """Heading (magnetic, variation 0.0698 rad), water speed 3.24 m/s, position and, in frames of the bus, a fix."""
+    fix = struct.pack("<BHIqqqBBBhhi", 7, 16297, 684005000, round(60.0051 * 1e16), round(23.5391 * 1e16), 2_430_000,
+                      0x10, 0xFC, 11, 80, 160, 1500) + b"\x00"  # fmt: skip
+    frames = [bytes([0xA0, len(fix)]) + fix[:6]]
+    frames += [bytes([0xA0 + 1 + i // 7]) + fix[6 + i : 13 + i].ljust(7, b"\xff") for i in range(0, len(fix) - 6, 7)]
+    lines = ["# made by hand"]
+    for k in range(N):
+        stamp = f"2014-08-15T19:00:{k:02d}.042Z"
+        heading = struct.pack("<BHhhB", 255, 24294, 0x7FFF, 698, 0xFD)
+        place = struct.pack("<ii", round(LATITUDE[k] * 1e7), round(LONGITUDE[k] * 1e7))
+        speed = struct.pack("<BHHBH", 0, 324, 0xFFFF, 0, 0xFFFF)
+        messages = [("127250", 36, heading), ("129025", 160, place), ("128259", 115, speed)]
+        for pgn, source, data in [*messages, *(("129029", 160, f) for f in frames)]:
+            lines.append(f"{stamp},2,{pgn},{source},255,{len(data)},{data.hex(',')}")
+    return "\n".join(lines) + "\n"
+
+
+def _pd6() -> str:
+    rows = []
+    for k in range(N):
+        rows += [
+            ":SA, -1.50, +2.50, 45.00",
+            f":TS,240501100000{k:02d},35.0,+12.3,  12.3,1500.0,  0",
+            ":BI,    +10,    -20,     +5,     +1,A",
+            f":BS,   -100,  +1500,    +20,{'A' if k else 'V'}",
+            ":BE,   +300,  +1200,    -30,A",
+            ":BD,       +1.00,      +2.00,       +0.10,  20.50,  0.00",
+        ]
+    return "\n".join(rows) + "\n"
+
+
+def ubx(group: int, number: int, content: bytes) -> bytes:
+    """A message of UBX, with its checksum."""
+    body = struct.pack("<BBH", group, number, len(content)) + content
+    a = b = 0
+    for byte in body:
+        a = (a + byte) & 255
+        b = (b + a) & 255
+    return b"\xb5\x62" + body + bytes((a, b))
+
+
+def _ubx(path: Path) -> None:
+    content = b"$GNGGA,,,,,,0,,,,,,,,*56\r\n"
+    for k in range(N):
+        tow = 295218000 + 1000 * k
+        head = struct.pack("<IH5BBIi", tow, 2024, 5, 1, 10, 0, k, 7, 25, 500_000_000)
+        place = struct.pack("<4B4i", 3, 0x81, 0, 14, round(LONGITUDE[k] * 1e7), round(LATITUDE[k] * 1e7), 47_100, 3_100)
+        motion = struct.pack("<2I5i2IH", 14, 22, 1500, -300, 20, 1530, 34_869_000, 50, 100_000, 152)
+        content += ubx(1, 7, head + place + motion + bytes(14))
+        content += ubx(1, 5, struct.pack("<I4x3i3I", tow + 500, 150_000, -50_000, 9_000_000, 1000, 1000, 20_000))
+    path.write_bytes(content)
+
+
+def _rinex() -> str:
+    def header(text: str, label: str) -> str:
+        return f"{text:<60}{label}"
+
+    lines = [
+        header("     3.04           OBSERVATION DATA    M", "RINEX VERSION / TYPE"),
+        header("G    3 C1C L1C S1C", "SYS / # / OBS TYPES"),
+        header("E    1 C1C", "SYS / # / OBS TYPES"),
+        header("  2024     5     1    10     0    0.5000000     GPS", "TIME OF FIRST OBS"),
+        header("", "END OF HEADER"),
+    ]
+    for k in range(N):
+        lines += [
+            f"> 2024 05 01 10 00 {k:02d}.5000000  0  2",
+            f"G05{22000000.125 + k:14.3f} 7{115000000.25:14.3f}18" + (f"{45.5:14.3f}" if k else ""),
+            f"E11{24000000.5 + k:14.3f}",
+        ]
+    return "\n".join(lines) + "\n"
+
+
 def _mat(path: Path) -> None:
     from scipy.io import savemat
 
@@ -168,6 +242,10 @@ CASES: Mapping[str, Case] = {
     "kf_gins": Case(".txt", _text(_rows(T, *[_ZERO] * 5, _ZERO - 9.8))),
     "sbet": Case(".out", _sbet),
     "pd0": Case(".pd0", _pd0),
+    "pd6": Case(".txt", _text(_pd6())),
+    "n2k": Case(".raw", _text(_n2k()), sentence="129025"),
+    "ubx": Case(".ubx", _ubx, sentence="NAV-PVT"),
+    "rinex": Case(".obs", _text(_rinex()), sentence="G05"),
     "mat": Case(".mat", _mat, {"time": "imu.t"}),
     "hdf5": Case(".h5", _hdf5, {"time": "imu/t"}),
     "parquet": Case(".parquet", _parquet, {"time": "stamp"}),

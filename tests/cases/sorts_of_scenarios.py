@@ -21,6 +21,7 @@ OF_EVERY_SORT = (
     "gnss-spoofing",
     "gyrocompass-at-sea",
     "late-aids",
+    "lawnmower-beams",
     "open-sea",
     "random-harbours",
     "satellites-fjord",

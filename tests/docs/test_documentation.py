@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import importlib.util
+import json
+import math
 import os
 import re
 import runpy
@@ -15,6 +17,7 @@ from typing import Any
 import pytest
 
 from simnav.estimator import make
+from simnav.geometry import earth
 from simnav.scenario import load
 from simnav.testing.contract_check import check
 
@@ -44,6 +47,20 @@ def simnav(folder: Path, line: str, *more: str) -> str:
     return done.stdout
 
 
+def test_the_contract_states_the_earth_of_the_simulator():
+    page = text("reference/estimator-contract.md")
+    names = ("SEMI_MAJOR_AXIS", "EQUATORIAL_GRAVITY", "SOMIGLIANA", "ROTATION_RATE", "GRAVITATIONAL_CONSTANT")
+    stated = {float(x) for x in re.findall(r"\d+\.?\d*(?:e[+-]?\d+)?", page)}
+    assert [name for name in names if getattr(earth, name) not in stated] == []
+    assert f"1/{1.0 / earth.FLATTENING:.9f}" in page
+    # the formula as it is written there, at 60 degrees and 3 km below the surface
+    s2, h, f, a = 0.75, -3000.0, 1.0 / 298.257223563, 6378137.0
+    surface = 9.7803253359 * (1 + 0.00193185265241 * s2) / (1 - (2 * f - f * f) * s2) ** 0.5
+    m = 7.292115e-5**2 * a**2 * a * (1 - f) / 3.986004418e14
+    written = surface * (1 - 2 / a * (1 + f + m - 2 * f * s2) * h + 3 * h**2 / a**2)
+    assert written == pytest.approx(float(earth.gravity(math.radians(60.0), h)), rel=1e-14)
+
+
 # -- the site ------------------------------------------------------------------------------------------------
 
 
@@ -64,6 +81,12 @@ def test_the_site_builds_without_warnings(tmp_path):
     assert (tmp_path / "tutorials" / "first-estimator.ipynb").is_file()
     assert "first-estimator.ipynb" in (tmp_path / "tutorials" / "first-estimator.html").read_text()
     assert "until_decided" in (tmp_path / "reference" / "python.html").read_text()
+    index = (tmp_path / "search" / "search_index.js").read_text(encoding="utf-8")  # a page from disk searches in it
+    found = json.loads(index.removeprefix("var __index = ").rstrip().removesuffix(";"))
+    assert any("record-of-repairs" in page["location"] for page in found["docs"])
+    assert "importScripts" in (tmp_path / "search" / "from_disk.js").read_text(encoding="utf-8")  # the theme's worker
+    home = (tmp_path / "index.html").read_text(encoding="utf-8")
+    assert home.index("search/from_disk.js") < home.index("assets/javascripts/bundle")
 
 
 def test_every_page_is_in_the_navigation():
@@ -128,7 +151,7 @@ def test_the_first_estimator_as_a_notebook(tmp_path, monkeypatch):
     _, checked, ran, evaluated, called = [
         "".join(o.get("text", "") for o in c.outputs) for c in found.cells if c.cell_type == "code"
     ]
-    assert "alpha-beta passes" in checked
+    assert "alpha_beta passes" in checked
     assert "ship-ekf" in ran
     assert (tmp_path / "run.png").stat().st_size > 10_000
     assert "alpha_beta" in evaluated

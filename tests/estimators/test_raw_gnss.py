@@ -12,9 +12,12 @@ from simnav.estimator import make
 from simnav.estimators.adaptations.truth import TrueNoise
 from simnav.geometry.earth import relative_position
 from simnav.recording import Recording
+from simnav.satellites.orbit import SPEED_OF_LIGHT
 from simnav.scenario import Scenario
-from simnav.simulation.simulator import ideal
+from simnav.sensors.gnss_raw import GnssRaw
+from simnav.simulation.simulator import Simulator, ideal
 from simnav.source import record
+from simnav.spec import SpecError
 from simnav.trial import Trial, run_trial
 from simnav.types import Instruments
 from tests.cases.raw_gnss import raw_gnss
@@ -151,3 +154,49 @@ def test_an_oracle_knows_the_map():
     perfect, free = ideal(scenario, 1).data.aids["gnss"], ideal(raw_gnss(12.0), 1).data.aids["gnss"]
     same = free.places(perfect.time, perfect.channel)
     assert abs(perfect.value - free.value[same])[:, 0].max() < 0.11  # what has no label
+
+
+def stepping(duration: float) -> Scenario:
+    scenario = raw_gnss(duration)
+    gnss = scenario.aids["gnss"].model_copy(update={"clock_step": 1e-5})
+    return scenario.model_copy(update={"instruments": {**scenario.instruments, "gnss": gnss}})
+
+
+@pytest.mark.parametrize("name", ["ekf", "gated-ekf", "gnc-fgo", "ukf", "oracle"])
+def test_estimates_survive_steps_of_the_receivers_clock(name):
+    """Beside the same run with a clock that runs freely: nothing but rounding, on ranges of 20 000 km."""
+    free, stepped = record(raw_gnss(25.0), 2), record(stepping(25.0), 2)
+    away = stepped.data.aids["gnss"].value - free.data.aids["gnss"].value
+    steps = away[:, 0] / (SPEED_OF_LIGHT * 1e-5)
+    np.testing.assert_allclose(steps, np.round(steps), rtol=0, atol=1e-9)
+    assert len(np.unique(np.round(steps))) > 1
+    assert not away[:, 1].any()
+    ours, theirs = (run_trial(make(name), recording) for recording in (stepped, free))
+    assert abs(error(ours, stepped) - error(theirs, free)).max() < 1e-5
+    assert ours.flagged == theirs.flagged
+
+
+def test_steps_of_the_receivers_clock_have_a_label():
+    """On all first readings after a step, whether the run is made at one time or in blocks."""
+    recording = record(stepping(60.0), 2)
+    stream = recording.data.aids["gnss"]
+    assert [(label.kind, label.instruments) for label in recording.faults] == [("clock_jump", ("gnss",))]
+    rows = stream.channel == stream.channel[0]
+    time, value = stream.time[rows], stream.value[rows]
+    # What its rate does not explain of the change of a range from one epoch to the next.
+    change = np.diff(value[:, 0]) - 0.5 * (value[1:, 1] + value[:-1, 1]) * np.diff(time)
+    jumped = np.append(False, abs(change) > 0.5 * SPEED_OF_LIGHT * 1e-5)
+    assert jumped.sum() >= 2
+    np.testing.assert_array_equal(stream.faults[rows] != 0, jumped)
+    assert not stream.fault_error.any()
+    simulator = Simulator(stepping(60.0), 2)
+    blocks = [simulator.advance(until) for until in (7.0, 21.0, 40.0, 60.0)]
+    again = np.concatenate([block.aids["gnss"].faults for block in blocks])
+    np.testing.assert_array_equal(again, stream.faults)
+
+
+def test_a_step_that_no_receiver_makes_is_refused():
+    with pytest.raises(SpecError, match=r"clock_step_s = 1e-06 should be 0, or at least 1e-05; receivers have 0\.001"):
+        GnssRaw.from_toml(
+            {"satellites": ["G11"], "sigma_pseudorange_m": 0.3, "sigma_range_rate_m_s": 0.05, "clock_step_s": 1e-6}
+        )

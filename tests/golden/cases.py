@@ -130,6 +130,12 @@ CASES = {
         "rate_hz": 2.0, "sigma_m_s": 0.01, "scale_percent": 0.2,
         "timing": {"latency_s": 0.2, "latency_random_s": 0.3, "offset_s": 0.05, "drift_ppm": 20.0, "jitter_s": 0.002},
     }}),
+    "beams of a dvl, two away, one wrong, some false": Case("lawnmower-beams", 14.0, (
+        _fault("outage", "beams", 4.0, 8.0, channels=["1", "2"]),
+        _fault("bias_step", "beams", 7.0, 11.0, channels=["3"], offset_m_s=0.2),
+    ), instruments={"beams": {
+        "kind": "dvl_beams", "rate_hz": 2.0, "mounting_deg": 0.1, "false_beams": 0.03, "lever_arm_m": [0.8, 0.0, 0.2],
+    }}),
     "under water without imu": Case("glider-dive", 60.0, (
         _fault("gross_error", "speed_log", 10.0, 40.0, probability=0.3, size_m_s=[0.5, 1.5]),
         _fault("outage", "gnss", 20.0, 60.0),

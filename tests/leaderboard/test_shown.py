@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 import simnav
+from simnav.estimators.bound import Bound
+from simnav.leaderboard.ranking.bounds import BoundReport
+from simnav.testing.contract_check import Finding, Report
 
 
 @pytest.fixture(scope="module")
@@ -37,3 +41,16 @@ def test_an_evaluation_shows_its_verdict() -> None:
     assert repr(made).startswith("<EvaluationReport: gnss-only may be 1 to 2 of 2 on ship-straight-v1")
     assert "may be 1 to 2 of 2" in made._repr_html_()
     assert repr(made.ranking).startswith("<Ranking: 1 scenarios in the tracks ")
+
+
+def test_a_bound_shows_a_dozen_epochs() -> None:
+    time = np.arange(1.0, 901.0)
+    made = BoundReport("pond-v1", 3, False, (Bound("pond-v1", "clean", 3, time, np.tile(np.eye(9), (900, 1, 1))),))
+    assert repr(made) == "<BoundReport: pond-v1: bound on the RMS horizontal error [m], 3 seeds>"
+    assert made._repr_html_().count("1.41") == 13  # the last line is the whole run
+
+
+def test_a_contract_test_shows_its_verdict() -> None:
+    found = (Finding("units", False, "the first yaw is 69 degrees off"), Finding("reset", True, "it is as new"))
+    assert repr(Report("mine", found, False)) == "<Report: mine fails: units>"
+    assert repr(Report("mine", found[1:], True)) == "<Report: mine passes>"

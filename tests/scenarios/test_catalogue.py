@@ -71,6 +71,7 @@ def test_every_scenario_tells_its_reader_what_it_is(header: Header):
         "robustness",
         "coloured",
         "satellites",
+        "acoustic",
     }
     assert scenario.track in tracks | {"training"}
     assert scenario.training == header.training == (scenario.track == "training")
@@ -235,7 +236,11 @@ def test_the_catalogue_is_packaged():
     """The wheel takes the files that pyproject.toml names."""
     with (FOLDER.parent / "pyproject.toml").open("rb") as file:
         project = tomllib.load(file)
-    assert project["tool"]["setuptools"]["package-data"]["simnav.scenarios"] == ["*.toml", "families/*.toml"]
+    assert project["tool"]["setuptools"]["package-data"]["simnav.scenarios"] == [
+        "*.toml",
+        "families/*.toml",
+        "recordings/*.toml",
+    ]
     assert project["project"]["entry-points"]["simnav.scenarios"] == {"simnav": "simnav.scenarios"}
 
 
@@ -250,6 +255,7 @@ def test_the_catalogue_is_packaged():
         "generalisation-no-imu",
         "robustness",
         "satellites",
+        "acoustic",
     ],
 )
 def test_a_track_has_an_estimator_that_suits_all_of_it(track: str):

@@ -210,3 +210,25 @@ def test_a_kernel_in_a_closure_and_its_pickle() -> None:
     assert make(at_module_level, 3.0)(3.0) == 12.0
     assert make(at_module_level, 2.0).fingerprint() != make(at_module_level, 3.0).fingerprint()
     assert pickle.loads(pickle.dumps(at_module_level)) is at_module_level
+
+
+def test_the_first_kernel_that_the_cache_lacks_is_announced(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(compiled.Kernel, "_jit", lambda self, directory: self.function)
+    monkeypatch.setattr(compiled.Kernel, "directory", lambda self: tmp_path / self.signature)
+    (tmp_path / "f8(f8)" / "there").mkdir(parents=True)
+    (tmp_path / "f8(f8)" / "there" / "one.nbi").touch()
+    said: list[str] = []
+    with compiled.announced(lambda: said.append("compiling")):
+        compiled.Kernel(surroundings, "f8(f8)", False).compile()
+        assert said == []
+        for signature in ("f8()", "f4()"):
+            compiled.Kernel(surroundings, signature, False).compile()
+        assert said == ["compiling"]
+    compiled.Kernel(surroundings, "i8()", False).compile()
+    assert said == ["compiling"]
+
+
+def test_a_helper_that_python_calls_is_not_compiled_for_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A confined estimator could not write what is compiled at its first epoch."""
+    monkeypatch.setattr(compiled.Kernel, "compile", lambda self: pytest.fail(f"{self} was compiled"))
+    assert compiled.Kernel(lambda x: 2.0 * x, None, False)(3.0) == 6.0

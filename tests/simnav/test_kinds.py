@@ -120,3 +120,11 @@ def test_datasheets_are_chosen_by_role_and_by_equation():
 def test_an_unknown_kind_is_refused_with_the_list_of_those_that_there_are():
     with pytest.raises(ValueError, match=r"unknown kind of instrument 'radar'; there are: .*gnss_position"):
         sheet("a", "radar")
+
+
+def test_kinds_are_printed_with_the_units_of_arrays():
+    lines = dict(line.split(": ", 1) for line in repr(KINDS).splitlines()[1:])
+    assert lines["gyrocompass"] == "heading [rad]"
+    assert lines["terrain_fix"] == "latitude [rad] (error: north [m]), longitude [rad] (error: east [m])"
+    assert lines["dvl"].startswith("forward [m/s]")
+    assert "deg" not in repr(KINDS["gnss_position"])

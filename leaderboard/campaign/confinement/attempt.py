@@ -113,21 +113,24 @@ def chosen_confinement(asked: str = "auto") -> str:
 
 
 def prepare(confinement: str, hidden: Sequence[Path], *, loaded: bool = True, sealed: bool = False) -> EstimatorServer:
-    """The server of this process: the one that is there, or a new one that begins to load its kernels.
+    """The server of this process: the one that is there, or a new one.
 
     Parameters
     ----------
     confinement, hidden, loaded, sealed
-        As of `EstimatorServer`. Kernels are not needed to inspect estimators.
+        As of `EstimatorServer`. Kernels are not needed to inspect estimators; a server that has none begins to load
+        them where they are wanted.
     """
     global _server, _owner
     if _server is not None and _owner != os.getpid():
         _server = None  # this is a fork of the worker
-    if _server is not None and not _server.fits(confinement, hidden, loaded):
+    if _server is not None and not _server.fits(confinement, hidden):
         _server.close()
         _server = None
     if _server is None:
-        _server, _owner = EstimatorServer(confinement, hidden, loaded=loaded), os.getpid()
+        _server, _owner = EstimatorServer(confinement, hidden, loaded=False), os.getpid()
+    if loaded:
+        _server.load()
     _server.hidden, _server.sealed = tuple(hidden), sealed
     return _server
 
@@ -230,11 +233,12 @@ def try_estimator(
             try:
                 if sealed and _server is not None and _server.used:  # its server has had no other estimator
                     close_server()
+                asked: dict[str, Any] = {"loaded": entrant.kernels, "sealed": sealed}
                 try:
-                    found = attempt(prepare(confinement, hidden, sealed=sealed), entrant, recording, limits)
+                    found = attempt(prepare(confinement, hidden, **asked), entrant, recording, limits)
                 except NoAnswerError:  # the estimator was not there yet, so this is not a result of it
                     close_server()
-                    found = attempt(prepare(confinement, hidden, sealed=sealed), entrant, recording, limits)
+                    found = attempt(prepare(confinement, hidden, **asked), entrant, recording, limits)
             finally:
                 if sealed:
                     close_server()
@@ -258,7 +262,8 @@ def describe(server: EstimatorServer, entrant: Entrant, limits: Limits) -> dict[
     Returns
     -------
     dict
-        ``reference``, ``source`` (a digest), and ``learned_from`` as it was told, not checked.
+        ``reference``, ``source`` (a digest), ``version``, whether it may call ``kernels`` of simnav, and
+        ``learned_from`` as it was told, not checked.
 
     Raises
     ------
@@ -278,5 +283,5 @@ def describe(server: EstimatorServer, entrant: Entrant, limits: Limits) -> dict[
         raise ValueError("it says nothing of itself that can be read")
     return {
         "reference": facts.get("reference") is True, "source": source, "learned_from": facts.get("learned_from", []),
-        "version": version,
+        "version": version, "kernels": facts.get("kernels") is not False,
     }  # fmt: skip

@@ -1,10 +1,11 @@
-"""The server of a worker: kernels loaded, nothing secret, forks an estimator process for each run.
+"""The server of a worker: nothing secret, forks an estimator process for each run.
 
-It is started as ``python -m simnav.leaderboard.campaign.confinement.server DESCRIPTOR [kernels]``, where the descriptor
-is a Unix socket to the worker. It is asked, in JSON, to fork (descriptors of the pipes come with it, and of a control
-group where there is one), to finish with the process that it forked, and to import libraries before the next fork. It
-watches what the process takes with all that it starts, kills all that is left of it, and is gone when the worker is. If
-its own limits or priority were changed, it ends before the next fork, and the worker starts another one.
+It is started as ``python -m simnav.leaderboard.campaign.confinement.server DESCRIPTOR``, where the descriptor is a Unix
+socket to the worker. It is asked, in JSON, to load the kernels, to fork (descriptors of the pipes come with it, and of
+a control group where there is one), to finish with the process that it forked, and to import libraries before the next
+fork. Kernels are loaded before the first estimator that may call them, and not in the time of any. The server watches
+what the process takes with all that it starts, kills all that is left of it, and is gone when the worker is. If its own
+limits or priority were changed, it ends before the next fork, and the worker starts another one.
 """
 
 from __future__ import annotations
@@ -66,12 +67,13 @@ def main() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     become_reaper()
     keep_freed_memory()
-    _load_kernels()
+    copied_from = os.environ.pop(COPY_FROM, "")
+    _import_estimators()
     with scratch("estimator") as own:
-        _serve(control, own)
+        _serve(control, own, copied_from)
 
 
-def _serve(control: socket.socket, own: Path) -> None:
+def _serve(control: socket.socket, own: Path, copied_from: str) -> None:
     """Do what the worker asks for, until it is gone."""
     hidden: list[str] = []
     unreadable = Unreadable(hidden)
@@ -82,6 +84,9 @@ def _serve(control: socket.socket, own: Path) -> None:
             request, descriptors = _receive(control)
             if request is None or ("fork" in request and own_settings() != settings):
                 return
+            if "load" in request:
+                _load_kernels(copied_from)
+                control.sendall(json.dumps({"ready": True}).encode())
             if "fork" in request:
                 if hidden != request["fork"]["hidden"]:
                     hidden = request["fork"]["hidden"]
@@ -95,9 +100,8 @@ def _serve(control: socket.socket, own: Path) -> None:
         _remove(own)
 
 
-def _load_kernels() -> None:
-    """simnav's own estimators and all their kernels; plug-ins of others are loaded in their own processes only."""
-    from simnav.compiled import cache_directory, kernels
+def _import_estimators() -> None:
+    """simnav's own estimators; plug-ins of others are loaded in their own processes only."""
     from simnav.estimator.registry import discover_own
 
     discover_own()
@@ -105,17 +109,30 @@ def _load_kernels() -> None:
     importlib.import_module("numpy.random")
     if all(point.value == INSTRUMENTS.home for point in entry_points(INSTRUMENTS.group)):  # no code of others
         INSTRUMENTS.discover()  # to look for them takes 7 ms
-    source, target = os.environ.pop(COPY_FROM, ""), cache_directory()
-    if source and target is not None and "kernels" in sys.argv[2:]:
+    _settle_memory()
+
+
+def _load_kernels(copied_from: str) -> None:
+    """All kernels of simnav's own estimators, from a folder that cannot be written to if there is one."""
+    from simnav.compiled import cache_directory, kernels
+
+    target = cache_directory()
+    if copied_from and target is not None:
+        shutil.rmtree(target, ignore_errors=True)  # nothing that an estimator may have put there is loaded
         for part in {k.fingerprint() for kernel in kernels() for k in kernel.tree()}:
             with contextlib.suppress(OSError):
-                shutil.copytree(Path(source) / part, target / part)
-    for kernel in kernels() if "kernels" in sys.argv[2:] else ():
+                shutil.copytree(Path(copied_from) / part, target / part)
+    for kernel in kernels():
         kernel.compile()
-    if source and target is not None:
+    if copied_from and target is not None:
         shutil.rmtree(target, ignore_errors=True)
+    _settle_memory()
+
+
+def _settle_memory() -> None:
+    """Share what is loaded with the forked processes: a collection in one of them does not copy it."""
     gc.collect()
-    gc.freeze()  # so that a collection in a forked process does not copy all of this
+    gc.freeze()
     use_huge_pages()
 
 

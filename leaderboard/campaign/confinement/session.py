@@ -111,7 +111,7 @@ class EstimatorServer:
     hidden : sequence of Path
         What estimators must not read: the folder of the results, and the file of a secret key.
     loaded : bool
-        Load all kernels.
+        Load all kernels at once; without it they are loaded before the first estimator that may call them.
     sealed : bool
         Keep nothing that estimators write from one campaign to the next.
 
@@ -137,13 +137,11 @@ class EstimatorServer:
         self._landlock = landlock.available()
         self.confinement = confinement if confinement != "process" or not self._landlock else "landlock"
         self.hidden, self.sealed, self.used = tuple(hidden), sealed, False
-        self._loaded = loaded
         ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         environment = {name: os.environ[name] for name in _ENVIRONMENT if name in os.environ}
         environment |= dict.fromkeys(_THREADS, "1")
         environment["PYTHONPATH"] = os.pathsep.join(p for p in sys.path if p)  # as this process finds simnav
         command_line = [sys.executable, "-P", "-m", f"{__package__}.server", str(theirs.fileno())]
-        command_line += ["kernels"] if loaded else []
         if confinement == "bubblewrap":
             command_line = bubblewrap.wrapped(command_line, environment, self.hidden, writable=self._caches())
         try:
@@ -156,8 +154,10 @@ class EstimatorServer:
         finally:
             theirs.close()
         self._control = ours
-        self._ready = False
+        self._awaited, self._started, self._loaded = 1, False, False
         self._group = MemoryGroup()
+        if loaded:
+            self.load()
 
     @property
     def process_id(self) -> int:
@@ -195,29 +195,40 @@ class EstimatorServer:
         caches = None if self.sealed else self._caches()
         return name if caches is None else str(caches / name)
 
-    def fits(self, confinement: str, hidden: Sequence[Path], loaded: bool) -> bool:
+    def fits(self, confinement: str, hidden: Sequence[Path]) -> bool:
         """Whether it serves what is asked for, and is there."""
-        if loaded and not self._loaded:
-            return False
         same = self.confinement == confinement or (confinement == "process" and self.confinement == "landlock")
         return same and (confinement != "bubblewrap" or tuple(hidden) == self.hidden) and self._process.poll() is None
 
+    def load(self) -> None:
+        """Ask for all kernels, once; it begins at once, and `wait_until_ready` waits for the end."""
+        if not self._loaded:
+            self._loaded = True
+            with contextlib.suppress(OSError):  # it is gone: whoever waits for it is told
+                self._control.sendall(json.dumps({"load": True}).encode())
+            self._awaited += 1
+
     def wait_until_ready(self) -> None:
-        """Wait until kernels are loaded.
+        """Wait until it has started, and has loaded what it was asked for.
 
         Raises
         ------
         ServerError
+            If it does not start.
+        NoAnswerError
+            If it had started, and is gone.
         """
-        if not self._ready:
+        while self._awaited:
             facts = self._receive(_START)
             if facts is None or not facts.get("ready"):
                 self._process.kill()
+                if self._started:
+                    raise NoAnswerError("the process for estimators did not answer")
                 words = (self._process.stderr.read() if self._process.stderr else b"").decode(errors="replace")
                 last = words.strip().splitlines()[-1:] or ["it ended, or was silent for 15 minutes"]
                 self.close()
                 raise ServerError(f"the process for estimators does not start: {last[0][:300]}")
-            self._ready = True
+            self._awaited, self._started = self._awaited - 1, True
 
     def close(self) -> None:
         """End it, and all that it started."""

@@ -63,6 +63,7 @@
     const words = { $ink: ink, $grey: grey, $grid: grid, $shade: shade, $strong: palettes[theme()][0], $second: palettes[theme()][1], $scheme: theme() === "dark" ? "tealblues" : "blues" };
     const scales = {
       $colours: () => ({ domain: rows, range: rows.map((r) => style(r, rows).colour) }),
+      $banded: () => rows.slice(0, 3),
       $dashes: () => ({ domain: rows, range: rows.map((r) => style(r, rows).dash) }),
     };
     if (typeof item === "string") return item in words ? words[item] : item in scales ? scales[item]() : item;

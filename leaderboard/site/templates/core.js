@@ -64,6 +64,7 @@ simnav.size = (bytes) => {
 simnav.write = {
   number: simnav.number,
   integer: (x) => (known(x) ? String(x) : missing),
+  share: (x) => (known(x) ? `${(100 * x).toFixed(1)} %` : missing),
   percent: (x) => (known(x) ? `${(100 * x).toFixed(1)} %` : missing),
   duration: simnav.duration,
   size: simnav.size,

@@ -108,11 +108,28 @@
       host.after(make("details", {}, make("summary", {}, "Weights of the measurements"), charts));
       for (const chart of page.inside) simnav.chart(charts, chart);
     }
-    document.querySelectorAll("[data-sweep]").forEach((place, k) => {
-      // Rows of a sweep that have no result here cannot be switched: they are shown always.
-      for (const chart of page.sweeps[k].charts) simnav.chart(place, { ...chart, always: page.sweeps[k].rows });
-    });
+    document.querySelectorAll("[data-sweep]").forEach((place, k) => explore(place, page.sweeps[k]));
     oneRun(at("run"));
+  };
+
+  /** A sweep: its charts, and a slider over the values of its dial. Rows without a result here cannot be switched. */
+  const explore = (place, { charts, values, rows, dial }) => {
+    const drawn = charts.map((chart) => simnav.chart(place, { ...chart, always: rows }));
+    if (values.length < 2) return;
+    const curves = charts[0].data.curves.rows, last = values.length - 1;
+    const slider = make("input", { type: "range", min: "0", max: String(last), step: "1", value: String(last), "aria-label": dial.title, "data-slider": true });
+    const said = make("output");
+    const show = () => {
+      const k = Number(slider.value), words = `${values[k]}${dial.unit ? ` ${dial.unit}` : ""}`;
+      said.textContent = words;
+      slider.setAttribute("aria-valuetext", words);
+      const steps = rows.map((row) => ({ row, ...Object.fromEntries(["middle", "low", "high", "failed"].map((n) => [n, curves[row]?.[n][curves[row].value.indexOf(values[k])] ?? null])) }));
+      drawn[0].show({ data: { ...charts[0].data, at: { value: [values[k]] } } });
+      drawn[1].show({ data: { steps } });
+    };
+    slider.addEventListener("input", show);
+    place.before(make("p", { class: "tools slider" }, make("label", {}, `${dial.title[0].toUpperCase()}${dial.title.slice(1)} `, slider), said));
+    show();
   };
 
   const oneRun = (host) => {
@@ -150,8 +167,12 @@
       drawn.hidden = !read.draws.length;
       const values = read.draws.map(([key, value]) => make("tr", {}, make("th", { scope: "row" }, key), make("td", { class: "wrap" }, value)));
       drawn.replaceChildren(make("summary", {}, `Drawn for this run: ${read.draws.length} values`), make("div", { class: "scroll", tabindex: "0", role: "region", "aria-label": "Drawn for this run" }, make("table", {}, make("tbody", {}, values))));
-      if (!made) made = page.runs.charts.map((chart) => simnav.chart(charts, { ...chart, data: read.charts[chart.name] }));
-      else for (const chart of made) chart.show({ data: read.charts[chart.given.name] });
+      const shown = (name) => { // three standard deviations are those of the estimator that is chosen
+        const { bounds, ...given } = read.charts[name];
+        return bounds?.[row] ? { ...given, bound: bounds[row] } : given;
+      };
+      if (!made) made = page.runs.charts.map((chart) => simnav.chart(charts, { ...chart, data: shown(chart.name) }));
+      else for (const chart of made) chart.show({ data: shown(chart.given.name) });
       await showInside();
     };
     const drawRuns = (target, all) => {

@@ -32,9 +32,13 @@
     return make("div", { class: "bar", role: "img", "aria-label": words, "data-help": words, style: { "--light": row.light ?? "#66707d", "--dark": row.dark ?? "#9aa5b1" } }, children);
   };
 
+  /** A share as a bar from 0 to 1, with a line where 95 % would be. */
+  const share = (value) => make("div", { class: "share" }, make("i", { style: { width: `${Math.min(100, Math.max(0, 100 * value))}%` } }), make("b"), make("span", {}, write.share(value)));
+
   const content = (column, row) => {
     const value = row[column.key];
     if (column.kind === "bar") return bar(column, row);
+    if (column.kind === "share" && typeof value === "number") return share(value);
     if (column.kind === "badge") return value ? make("span", { class: `badge ${String(value).split(" ")[0]}` }, String(value)) : write.text(null);
     const words = text(column, row);
     const link = value !== null && typeof value === "object" ? value.page : null;
@@ -134,7 +138,7 @@
     }
 
     classes(column) {
-      const right = ["number", "integer", "percent", "duration", "size", "ratio", "p"].includes(column.kind);
+      const right = ["number", "integer", "percent", "share", "duration", "size", "ratio", "p"].includes(column.kind);
       return [right ? "n" : "", column.kind === "name" ? "name" : "", column.kind === "words" ? "wrap" : ""].join(" ").trim() || null;
     }
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from simnav.log.delimited import read_csv
-from simnav.log.formats import bags, euroc, hdf5, kf_gins, mat, parquet, pd0, rtklib, sbet, tum
+from simnav.log.formats import bags, euroc, hdf5, kf_gins, mat, n2k, parquet, pd0, pd6, rinex, rtklib, sbet, tum, ubx
 from simnav.log.nmea import read_nmea
 
 __all__ = [
@@ -12,11 +12,15 @@ __all__ = [
     "hdf5",
     "kf_gins",
     "mat",
+    "n2k",
     "parquet",
     "pd0",
+    "pd6",
     "read_csv",
     "read_nmea",
+    "rinex",
     "rtklib",
     "sbet",
     "tum",
+    "ubx",
 ]

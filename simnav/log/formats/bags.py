@@ -8,7 +8,7 @@ recorded (``clock = "logger"``) or those in their header (``clock = "sentence"``
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -16,6 +16,8 @@ from typing import Any
 import numpy as np
 
 from simnav.log.files import FileSpec
+from simnav.log.growing import GrowingTable
+from simnav.log.progress import tell
 from simnav.log.reader import Rows, register_reader
 from simnav.log.table import LogError, Table
 from simnav.spec import closest
@@ -25,6 +27,8 @@ __all__ = ["topics_of"]
 #: Longer arrays in a message (images, point clouds) are left out.
 _LONGEST = 64
 _DEEPEST = 8
+#: After so many messages it is told how far the file has been read.
+_TOLD = 2000
 
 
 @register_reader("rosbag", title="a bag")
@@ -54,15 +58,17 @@ def _rows(path: Path, file: FileSpec, sentence: str | None, form: str) -> Rows:
 @lru_cache(maxsize=16)
 def _table(path: Path, form: str, topic: str | None, _mtime: int, _size: int) -> Table:
     messages = _mcap(path, topic) if form == "mcap" else _bag(path, topic)
-    rows: list[dict[str, float]] = []
+    rows = GrowingTable()
     try:
         for stamp, message in messages:
-            row = {"recorded": 1e-9 * stamp, **dict(_numbers("", message, 0))}
+            row: dict[str, float] = {"recorded": 1e-9 * stamp, **dict(_numbers("", message, 0))}
             if "header.stamp.sec" in row:
                 row["header"] = row["header.stamp.sec"] + 1e-9 * row.get("header.stamp.nanosec", 0.0)
             elif "timestamp.sec" in row:
                 row["header"] = row["timestamp.sec"] + 1e-9 * row.get("timestamp.nsec", 0.0)
-            rows.append(row)
+            elif "timestamp.seconds" in row:
+                row["header"] = row["timestamp.seconds"] + 1e-9 * row.get("timestamp.nanos", 0.0)
+            rows.add(row, len(rows) + 1)
     except (LogError, FileNotFoundError):
         raise
     except (MemoryError, Exception) as error:
@@ -73,9 +79,7 @@ def _table(path: Path, form: str, topic: str | None, _mtime: int, _size: int) ->
         ) from None
     if not rows:
         raise LogError(f"{path}: the topic {topic!r} has no messages")
-    names = list(dict.fromkeys(name for row in rows for name in row))
-    columns = {name: np.array([row.get(name, np.nan) for row in rows]) for name in names}
-    return Table(f"{path} ({topic})", dict(columns), np.arange(1, len(rows) + 1), numbered=False)
+    return rows.table(f"{path} ({topic})")
 
 
 def topics_of(path: Path, form: str) -> list[str]:
@@ -121,7 +125,10 @@ def _bag(path: Path, topic: str | None) -> Iterator[tuple[int, Any]]:
     with AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader:
         chosen = _choose(path, topic, sorted({c.topic for c in reader.connections}))
         connections = [c for c in reader.connections if c.topic == chosen]
-        for connection, stamp, raw in reader.messages(connections=connections):
+        total = sum(c.msgcount for c in connections)
+        for number, (connection, stamp, raw) in enumerate(reader.messages(connections=connections), 1):
+            if number % _TOLD == 0:
+                tell(path, number, total)
             yield stamp, reader.deserialize(raw, connection.msgtype)
 
 
@@ -136,7 +143,12 @@ def _mcap(path: Path, topic: str | None) -> Iterator[tuple[int, Any]]:
         summary = reader.get_summary()
         topics = sorted({c.topic for c in summary.channels.values()}) if summary else []
         chosen = _choose(path, topic, topics) if topics else topic
-        for schema, channel, message in reader.iter_messages(topics=None if chosen is None else [chosen]):
+        counts = summary.statistics.channel_message_counts if summary and summary.statistics else {}
+        total = sum(counts.get(c.id, 0) for c in summary.channels.values() if c.topic == chosen) if summary else 0
+        messages = reader.iter_messages(topics=None if chosen is None else [chosen])
+        for number, (schema, channel, message) in enumerate(messages, 1):
+            if number % _TOLD == 0:
+                tell(path, number, total)
             if channel.id not in decode:
                 decode[channel.id] = _decoder(path, channel, schema)
             yield message.log_time, decode[channel.id](message.data)
@@ -157,10 +169,40 @@ def _decoder(path: Path, channel: Any, schema: Any) -> Any:
             text = schema.data.decode().split("=" * 80)[0]
             store.register(get_types_from_msg(text, name))
         return lambda raw: store.deserialize_cdr(raw, name)
+    if channel.message_encoding == "protobuf" and schema is not None and schema.encoding == "protobuf":
+        return _of_protobuf(path, schema)
     raise LogError(
-        f"{path}: messages of the topic {channel.topic!r} are encoded as {channel.message_encoding!r}; read are 'json' "
-        "and 'cdr' (ROS 2)"
+        f"{path}: messages of the topic {channel.topic!r} are encoded as {channel.message_encoding!r}; read are "
+        "'json', 'cdr' (ROS 2) and 'protobuf'"
     )
+
+
+def _of_protobuf(path: Path, schema: Any) -> Callable[[bytes], dict[str, Any]]:
+    """A function from the bytes of a message to its fields; the schema is a set of file descriptors."""
+    try:
+        from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
+    except ImportError:
+        raise LogError(f"{path}: messages of protobuf need the library protobuf: pip install 'simnav[logs]'") from None
+    pool = descriptor_pool.DescriptorPool()
+    for file in descriptor_pb2.FileDescriptorSet.FromString(schema.data).file:
+        pool.Add(file)
+    made = message_factory.GetMessageClass(pool.FindMessageTypeByName(schema.name))
+    return lambda raw: _fields(made.FromString(raw))
+
+
+def _fields(message: Any) -> dict[str, Any]:
+    """The fields of a message of protobuf, those with default values too; text and bytes stay as they are."""
+    found: dict[str, Any] = {}
+    for field in message.DESCRIPTOR.fields:
+        value = getattr(message, field.name)
+        repeated = isinstance(value, Sequence) and not isinstance(value, (str, bytes))
+        if field.message_type is None:
+            found[field.name] = list(value) if repeated else value
+        elif hasattr(value, "DESCRIPTOR"):
+            found[field.name] = _fields(value) if message.HasField(field.name) else {}
+        elif hasattr(value, "__len__") and len(value) <= _LONGEST:
+            found[field.name] = [_fields(one) if hasattr(one, "DESCRIPTOR") else one for one in value]
+    return found
 
 
 def _numbers(name: str, value: Any, depth: int) -> Iterator[tuple[str, float]]:

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import pytest
 
-from simnav.estimator import UnsuitableScenario, lacking, make
+from simnav.estimator import EstimatorError, UnsuitableScenario, lacking, make
 from simnav.estimators.models.coupling import by_source
 from simnav.estimators.models.inertial import InertialModel
 from simnav.estimators.models.nine_state import NineStateModel
+from simnav.estimators.models.ship import ShipModel
+from simnav.scenario import load
 from simnav.source import record
 from simnav.trial import run_trial
 from tests.cases.raw_gnss import raw_gnss
@@ -55,15 +57,35 @@ def test_a_row_reports_of_one_of_them_only(recording, name, used):
     assert told == ({"gnss"} if used == "gnss" else {"fix", "doppler"})
 
 
+@pytest.mark.parametrize(
+    ("model", "used"), [(InertialModel(), {"beams"}), (ShipModel(), {"solution"}), (NineStateModel(), {"solution"})]
+)
+def test_a_model_takes_the_beams_of_a_dvl_or_what_they_give(model, used):
+    instruments = load("lawnmower-beams").instruments_sheet()
+    assert {name.partition(":")[0] for name in by_source(instruments, model, "row")} & {"beams", "solution"} == used
+    # Without the solution the beams are taken, as far as the model suits them.
+    raw = load("lawnmower-beams").instruments_sheet().without({"solution"})
+    if not isinstance(model, ShipModel):
+        assert "beams:1" in by_source(raw, model, "row")
+
+
 def test_the_receiver_beside_raw_observations_changes_no_bit(recording):
     both = run_trial(make("ekf"), recording)
     alone = run_trial(make("ekf"), record(raw_gnss(4.0), 1))
     assert both.position.tobytes() == alone.position.tobytes()
 
 
+def test_any_row_is_loosely_coupled_on_request(recording):
+    asked, named = (run_trial(made, recording) for made in (make("ekf", loose="true"), make("ekf-loose")))
+    assert asked.position.tobytes() == named.position.tobytes()
+    assert run_trial(make("ekf", loose=False), recording).position.tobytes() != named.position.tobytes()
+    with pytest.raises(EstimatorError, match="parameter 'loose' is true or false, not 2"):
+        make("ekf", loose=2)
+
+
 def test_a_loosely_coupled_row_needs_a_receiver():
     instruments = record(raw_gnss(2.0), 1).instruments
-    assert lacking(make("ekf-loose").needs, instruments) == "it needs gnss_receiver; there is none"
+    assert lacking(make("ekf-loose").needs, instruments) == "it needs gnss_receiver or dvl_solution; there is none"
     assert not lacking(make("ekf").needs, instruments)
     with pytest.raises(UnsuitableScenario):
         make("ekf-loose").reset(record(raw_gnss(2.0), 1).start, instruments.without({"gnss"}))

@@ -9,6 +9,8 @@ import pytest
 
 from simnav.blocks import LEVER_ARM
 from simnav.estimator import make
+from simnav.estimators.models.about_truth import AboutTruthModel
+from simnav.estimators.models.channels import by_channel, reading_of
 from simnav.estimators.models.inertial import InertialModel
 from simnav.estimators.models.levered import with_lever_arms
 from simnav.estimators.models.own_observation import OwnObservation
@@ -20,6 +22,7 @@ from simnav.scoring import errors
 from simnav.source import record
 from simnav.trial import Trial, run_trial
 from simnav.types import Instruments
+from tests.cases.raw_gnss import raw_gnss
 
 TEXT = """name = "arms"
 version = 1
@@ -157,3 +160,18 @@ def test_the_row_with_23_states_takes_the_figure_of_the_datasheet(recording: Rec
 def test_without_such_figures_nothing_changes(recording: Recording):
     plain = Instruments([replace(s, blocks=()) for s in recording.instruments.values()], recording.instruments.imu)
     assert with_lever_arms(plain) is plain
+
+
+@pytest.mark.parametrize(("scenario", "source"), [(parse(TEXT), "dvl"), (raw_gnss(), "gnss:E30")], ids=["dvl", "raw"])
+def test_the_oracle_has_the_swing_by_the_bias_of_the_gyroscopes(scenario, source):
+    """Its nominal rate is as measured: a bias of the rate moves the innovation by the Jacobian times the bias."""
+    recording = record(scenario.model_copy(update={"duration": 2.0}), 1)
+    model = AboutTruthModel(recording.data.truth)
+    model.begin(recording.start, by_channel(recording.instruments))
+    stream = recording.data.aids[source.partition(":")[0]]
+    reading = reading_of(next(m for m in stream.measurements() if source.endswith(m.channel)))
+    before, bias = model.measure(reading), np.array([0.01, -0.02, 0.03])
+    model.nominal.raw_rate += bias
+    moved = model.measure(reading).innovation - before.innovation
+    assert abs(moved).max() > 0.01
+    np.testing.assert_allclose(moved, before.jacobian[:, 9:12] @ bias, rtol=1e-6, atol=1e-9)

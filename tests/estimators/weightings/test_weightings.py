@@ -13,6 +13,7 @@ from scipy.integrate import quad
 from scipy.optimize import minimize_scalar
 from scipy.stats import chi, multivariate_normal
 
+from simnav.estimators.models.channels import by_channel
 from simnav.estimators.weightings.base import Factors, Weighting
 from simnav.estimators.weightings.dynamic_covariance_scaling import DynamicCovarianceScaling, covariance_scaling
 from simnav.estimators.weightings.fault_isolation import FaultIsolation
@@ -338,6 +339,38 @@ def test_it_hardens_only_where_there_is_an_outlier(cost: str):
     hard = truncated if cost == "tls" else geman_mcclure
     np.testing.assert_allclose(f.weight, np.maximum(hard(f.norm / constants(hard)[2]), 1e-3), rtol=1e-9)
     assert epoch(factors(np.vstack([calm, along([25.0, 1.0])]))) == 1  # the old outlier begins no new schedule
+
+
+def voted(readings, names, cost="tls"):
+    """Weights of readings of one number at one time, softly held at zero, and whether mu went by steps."""
+    sheets = [Datasheet("gnss", "gnss_raw", 1.0, np.ones(1), channels=tuple("ABCDEF")), SHEETS["compass"]]
+    weighting, f = GraduatedNonConvexity(cost), factors(along(readings), names, range(len(readings)), components=1)
+    weighting.reset(by_channel(Instruments(sheets)))
+    f.time[:] = 0.0
+    schedule = []
+    for k in range(40):
+        x = f.weight @ readings / (f.weight.sum() + 1e-4)
+        f.norm, f.iteration = abs(readings - x), k
+        if weighting.weigh(f) and k > 10:
+            break
+        schedule.append(weighting.diagnostics()["mu"])
+    return f.weight, len(set(schedule)) > 2  # more than the first mu and the last
+
+
+@pytest.mark.parametrize(("wrong", "searched"), [([300.0], False), ([300.0, -80.0], False), ([50.0] * 3, True)])
+def test_channels_tell_which_of_them_is_wrong(wrong, searched):
+    """Fewer than half are left out without a schedule of mu; against three of six there is no majority."""
+    readings = np.array([*(0.3, -0.4, 2.5, 0.1)[: 6 - len(wrong)], *wrong])
+    weight, changed = voted(readings, [f"gnss:{c}" for c in "ABCDEF"[: len(readings)]])
+    assert changed == searched
+    if not searched:
+        np.testing.assert_array_equal(weight, np.where(abs(readings) < 3.0, 1.0, 1e-3))
+
+
+def test_a_measurement_of_another_instrument_is_not_left_out_by_a_vote():
+    readings = np.array([0.3, -0.4, 0.1, 0.2, -30.0])
+    assert voted(readings, ["gnss:A", "gnss:B", "gnss:C", "gnss:D", "compass"])[1]
+    assert not voted(np.append(readings[:4], -30.0), ["gnss:A", "gnss:B", "gnss:C", "gnss:D", "gnss:E"])[1]
 
 
 # Gradient-adaptive

@@ -5,7 +5,9 @@ from __future__ import annotations
 import json
 import os
 import platform
+import signal
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -23,8 +25,10 @@ from simnav.leaderboard.campaign.confinement.attempt import (
     prepare,
     seed_words,
 )
+from simnav.leaderboard.campaign.confinement.limits import resident
 from simnav.leaderboard.campaign.confinement.session import EstimatorServer, Limits, NoAnswerError
 from simnav.leaderboard.campaign.entrant import Entrant
+from simnav.leaderboard.campaign.sources import may_call_kernels
 from simnav.recording import Recording
 from simnav.scenario import load
 from simnav.source import record
@@ -79,6 +83,10 @@ def recording() -> Recording:
 
 def entrant(name: str, **parameters: Any) -> Entrant:
     return Entrant(name, parameters, name, False, "")
+
+
+#: One that loads the few kernels that it calls by itself.
+QUICK = replace(entrant("gnss-only"), kernels=False)
 
 
 def same(a: Trial, b: Trial) -> None:
@@ -231,6 +239,56 @@ def test_how_a_process_ended_is_told(server: EstimatorServer, recording: Recordi
     assert end("") == ("ok", "")  # and the server is as before
 
 
+def test_kernels_are_loaded_when_the_first_one_may_call_them(recording: Recording) -> None:
+    close_server()
+    try:
+        server = prepare("process", (), loaded=False)
+        server.wait_until_ready()
+        before = resident(server.process_id)
+        assert prepare("process", (), loaded=True) is server
+        server.wait_until_ready()
+        assert resident(server.process_id) > 1.2 * before
+        assert prepare("process", (), loaded=False) is server  # and it keeps them
+        assert attempt(server, entrant("ekf"), recording, Limits(60.0, 1 << 30)).status == "ok"
+    finally:
+        close_server()
+
+
+def test_a_server_that_is_gone_before_its_kernels_are_loaded_is_no_failure_of_an_estimator() -> None:
+    server = EstimatorServer("process", loaded=False)
+    server.wait_until_ready()
+    os.kill(server.process_id, signal.SIGKILL)
+    server.load()
+    with pytest.raises(NoAnswerError, match="did not answer"):
+        server.wait_until_ready()
+    server.close()
+
+
+@pytest.mark.parametrize(
+    ("text", "may"),
+    [
+        ("import os, tempfile\nimport numpy as np\nfrom simnav import Estimate, Estimator", False),
+        ("from simnav.types import Instruments\nfrom scipy.linalg import expm", False),
+        ("from beside import nothing", False),
+        ("from beside_too import row", True),
+        ("import simnav", True),
+        ("from simnav import Estimator, make", True),
+        ("from simnav.estimators.rows.kalman import Ekf", True),
+        ("def later():\n    import somebody_elses", True),
+        ("import importlib\nimportlib.import_module('sim' + 'nav')", True),
+    ],
+)
+def test_who_may_call_kernels(text: str, may: bool, tmp_path: Path) -> None:
+    (tmp_path / "beside.py").write_text("import json")
+    (tmp_path / "beside_too.py").write_text("import simnav.estimators")
+    (tmp_path / "mine.py").write_text(text)
+    assert may_call_kernels(str(tmp_path / "mine.py")) == may
+
+
+def test_who_is_in_no_file_may_call_kernels() -> None:
+    assert may_call_kernels("")
+
+
 @pytest.mark.parametrize("losses", [1, 2])
 def test_who_has_not_been_started_has_not_failed(
     recording: Recording, monkeypatch: pytest.MonkeyPatch, losses: int
@@ -239,7 +297,7 @@ def test_who_has_not_been_started_has_not_failed(
     lost: list[EstimatorServer] = []
 
     def losing(*arguments: Any, **more: Any) -> EstimatorServer:
-        server = prepare(*arguments, **more, loaded=len(lost) == losses)  # nobody uses the kernels of the others
+        server = prepare(*arguments, **more)
         server.wait_until_ready()
         if len(lost) < losses:
             lost.append(server)
@@ -250,11 +308,11 @@ def test_who_has_not_been_started_has_not_failed(
     close_server()
     try:
         if losses == 1:
-            found = attempt_module.try_estimator(entrant("gnss-only"), recording, Limits(60.0, 1 << 30), "process")
+            found = attempt_module.try_estimator(QUICK, recording, Limits(60.0, 1 << 30), "process")
             assert (found.status, found.reason) == ("ok", "")
         else:
             with pytest.raises(NoAnswerError, match="did not answer"):
-                attempt_module.try_estimator(entrant("gnss-only"), recording, Limits(60.0, 1 << 30), "process")
+                attempt_module.try_estimator(QUICK, recording, Limits(60.0, 1 << 30), "process")
     finally:
         close_server()
     assert len(lost) == losses
@@ -388,7 +446,7 @@ def test_a_server_whose_limits_were_changed_starts_nobody(recording: Recording) 
         hard = resource.prlimit(server.process_id, resource.RLIMIT_NOFILE)[1]
         resource.prlimit(server.process_id, resource.RLIMIT_NOFILE, (40, hard))
         with pytest.raises(NoAnswerError):
-            attempt(server, entrant("gnss-only"), recording, Limits(60.0, 1 << 30))
+            attempt(server, QUICK, recording, Limits(60.0, 1 << 30))
     finally:
         server.close()
 
@@ -404,7 +462,7 @@ def test_who_was_killed_from_outside_is_tried_once_more(
     monkeypatch.setattr(attempt_module, "prepare", lambda *_, **__: None)
     monkeypatch.setattr(attempt_module, "attempt", lambda *_: answers.pop(0))
     monkeypatch.setattr(attempt_module, "_SETTLE", 0.0)
-    found = attempt_module.try_estimator(entrant("gnss-only"), recording, Limits(60.0, 1 << 30), "process")
+    found = attempt_module.try_estimator(QUICK, recording, Limits(60.0, 1 << 30), "process")
     assert (found.status, found.reason) == (("ok", "") if times == 1 else ("error", reason))
 
 
@@ -413,12 +471,10 @@ def test_a_sealed_run_has_a_server_of_its_own(recording: Recording) -> None:
     servers = set()
     close_server()
     for _ in range(2):
-        made = attempt_module.try_estimator(
-            entrant("gnss-only"), recording, Limits(60.0, 1 << 30), "process", sealed=True
-        )
+        made = attempt_module.try_estimator(QUICK, recording, Limits(60.0, 1 << 30), "process", sealed=True)
         assert made.status == "ok"
         assert attempt_module._server is None
-        servers.add(prepare("process", (), sealed=True).process_id)
+        servers.add(prepare("process", (), loaded=False, sealed=True).process_id)
     close_server()
     assert len(servers) == 2
 

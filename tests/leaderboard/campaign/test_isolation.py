@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import ctypes
+import mmap
 import os
 import signal
 import subprocess
@@ -129,8 +130,6 @@ def test_memory_error_swallowed_for_ever() -> None:
 @pytest.mark.skipif(sys.platform != "linux", reason="/proc")
 def test_the_watchdog_sees_memory_that_no_resource_limit_counts() -> None:
     def shared() -> None:
-        import mmap
-
         block = mmap.mmap(-1, 1500 * MIB)  # shared: not private data
         for i in range(0, len(block), 4096):
             block[i] = 1
@@ -155,8 +154,10 @@ def test_memory_error_kept_alive_on_an_object_is_still_told() -> None:
 def test_peak_memory_is_that_of_the_call() -> None:
     ballast = np.ones(50 * MIB // 8)  # ours, not the call's
 
-    def use(megabytes: int) -> float:
-        return float(np.ones(megabytes * MIB // 8).sum() + ballast[0])
+    def use(megabytes: int) -> float:  # pages of its own: what other tests have freed may still be with this process
+        pages = np.frombuffer(mmap.mmap(-1, megabytes * MIB, flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS), dtype=float)
+        pages[:] = 1.0
+        return float(pages.sum() + ballast[0])
 
     small, large = run(use, 1).peak_memory, run(use, 100).peak_memory
     assert small < 40 * MIB

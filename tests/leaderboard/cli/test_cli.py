@@ -124,6 +124,14 @@ def test_a_list_has_one_line_for_each_and_the_whole_name_first(topic, width, mon
     assert max(map(len, lines)) <= int(width)
 
 
+@pytest.mark.parametrize(("width", "track"), [("80", False), ("120", True)])
+def test_a_narrow_list_leaves_out_the_track_so_that_titles_can_be_read(width, track, monkeypatch):
+    monkeypatch.setenv("COLUMNS", width)
+    shown = call("list", "scenarios").stdout
+    assert "Open sea on a clean day" in shown
+    assert ("aided-ins" in shown) is track
+
+
 @pytest.mark.parametrize(
     ("name", "said"),
     [
@@ -143,6 +151,14 @@ def test_show_tells_all_about_a_name(name, said):
 
 def test_show_of_an_unknown_name_names_those_that_are_near():
     assert "called 'sw-fog'; did you mean sw-fgo" in complaint_of(call("show", "sw-fog", code=2))
+
+
+def test_show_takes_a_file_as_all_commands_do(here):
+    assert "Keeps the last fix." in call("show", "mine.py").stdout
+    assert document("show", "mine.py")["estimator"]["parameters"] == {"gain": 1.0, "choice": ""}
+    shown = document("show", "pond.toml")["scenario"]
+    assert (shown["duration"], shown["file"]) == (60.0, "pond.toml")
+    assert "there is no estimator file 'nobody.py'" in complaint("show", "nobody.py")
 
 
 def test_every_command_stands_under_one_heading_of_the_help():

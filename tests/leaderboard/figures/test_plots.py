@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 
 from simnav.leaderboard.figures import plots as figures
+from simnav.leaderboard.figures.panels import Bar, bars
 from simnav.leaderboard.figures.plots import Band, Curve, Dot, Track
 from simnav.leaderboard.figures.ratio_map import ratio_map
-from simnav.leaderboard.figures.style import PALETTE, Style, save
+from simnav.leaderboard.figures.style import PALETTE, WIDTH, Style, fitted, save, save_as
 
 TIME = np.linspace(1.0, 1200.0, 240)
 LABELS = ["ekf", "dead-reckoning", "oracle"]
@@ -218,3 +219,31 @@ def test_the_same_figure_is_the_same_file(style, tmp_path):
 def test_a_label_in_the_manner_of_tex_is_shown_as_it_is(tmp_path):
     fig = figures.error_cdf([band("$x_$", 1.0)], Style(["$x_$"]), label="Error [m]")
     assert save(fig, tmp_path / "x", formats=("svg", "pdf"))[1].read_bytes()[:4] == b"%PDF"
+
+
+def _bar_figure():
+    return bars({"Median time [ms]": [Bar("ekf", 1.0), Bar("sw-fgo", 3.0)]}, Style(["ekf", "sw-fgo"]), title="costs")
+
+
+def test_a_figure_is_made_for_the_column_of_a_journal(tmp_path):
+    before = _bar_figure()
+    token = WIDTH.set(120.0)
+    try:
+        written = save_as(_bar_figure(), tmp_path / "narrow.svg")
+    finally:
+        WIDTH.reset(token)
+    width = float(re.search(r'width="([\d.]+)pt"', written.read_text())[1])
+    assert width / 72.0 * 25.4 == pytest.approx(120.0)
+    assert before.get_size_inches()[0] * 25.4 > 130.0
+    sizes = {float(x) for x in re.findall(r"font[^;:]*: (?:\w+ )?([\d.]+)px", written.read_text())}
+    assert sizes
+    assert max(sizes) < 9.5
+    assert min(sizes) > 6.0
+
+
+def test_a_figure_whose_panels_need_more_stays_wider():
+    fig = _bar_figure()
+    wide = fig.get_size_inches()[0]
+    with pytest.warns(UserWarning, match="mm wide: its panels need that"):
+        fitted(fig, 10.0)
+    assert fig.get_size_inches()[0] == pytest.approx(0.44 * wide)

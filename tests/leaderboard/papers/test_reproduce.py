@@ -17,6 +17,7 @@ import pytest
 from typer.testing import CliRunner
 
 import simnav
+from simnav.estimator import make
 from simnav.leaderboard.cli import app
 from simnav.leaderboard.figures.panels import Bar, bars, broken
 from simnav.leaderboard.figures.style import Style
@@ -46,6 +47,8 @@ from simnav.leaderboard.results.provenance import Provenance
 from simnav.leaderboard.results.result import Result
 from simnav.scenario import load
 from simnav.scoring import SCORES
+from simnav.source import record
+from simnav.trial import run_trial
 from tests.cases import ship
 
 ROOT = Path(__file__).parents[3]
@@ -162,6 +165,27 @@ def test_size_of_a_gain_is_on_the_scale_of_ratios():
     assert edge == pytest.approx((0.1974, 0.3904), abs=1e-3)
     for gain, word in ((edge[0] + 0.01, "agrees"), (edge[0] - 0.01, "differs"), (edge[1] + 0.01, "differs")):
         assert judge_gain(exactly(1.0 - gain, 1e-6), 0.719).word == word
+
+
+def test_gross_errors_of_zhan_are_on_pseudoranges_as_printed():
+    """From 1 to 60 m with either sign on half of the readings; the receiver's fixes have what follows from them."""
+    scenario = papers.paper_of("zhan-2026").scenario("uuv-lake-pseudoranges")
+    drift, gross, _ = scenario.faults
+    gross = gross.model_copy(update={"start": 10.0})
+    recording = record(scenario.model_copy(update={"duration": 30.0, "faults": (drift, gross)}), 500)
+    ranges, fixes = recording.data.aids["satellites"], recording.data.aids["gnss"]
+    error, after = ranges.fault_error, ranges.time > 9.5
+    assert not error[~after].any()
+    hit = error[after, 0] != 0.0
+    assert hit.mean() == pytest.approx(0.5, abs=0.1)
+    assert (abs(error[after][hit, 0]) >= 1.0).all()
+    assert (abs(error[after][hit, 0]) <= 60.0).all()
+    assert not error[:, 1].any()
+    spread = np.sqrt(np.mean(fixes.fault_error**2, axis=1))
+    assert spread[fixes.time > 9.5].mean() > 2.0 * spread[fixes.time < 9.5].mean()
+    trial = run_trial(make("ekf-23", loose=True), recording)
+    assert trial.status == "ok", trial.reason
+    assert not any(label.startswith("nis.satellites") for label in trial.diagnostics)
 
 
 # -- rows ----------------------------------------------------------------------------------------------------

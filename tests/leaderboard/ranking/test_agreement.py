@@ -9,6 +9,7 @@ from rich.console import Console
 
 from simnav.leaderboard.ranking.agreement import LEADING, correlation_table, rank_correlations
 from simnav.leaderboard.ranking.ranking import rank
+from simnav.leaderboard.ranking.voyages import side_by_side, voyage_tables
 from simnav.leaderboard.results.result import Result
 
 
@@ -66,3 +67,25 @@ def test_the_leading_rows_have_a_correlation_of_their_own():
     (found,) = rank_correlations(first, second)
     assert (found.leading, found.leading_value) == (LEADING, pytest.approx(-1.0))
     assert found.value > 0.0
+
+
+def test_simulated_and_recorded_voyages_side_by_side():
+    tracks = {"sea-v1": "no-imu", "log-v1": "recordings", "deep-v1": "underwater"}
+    there = dict(zip("bacdefgh", range(1, 9)))
+    results = [
+        Result(scenario, seed, name, {}, False, "ok", "", {"horizontal_rmse": error * (1.0 + 0.001 * seed)})
+        for scenario, errors in (
+            ("sea-v1", {n: k + 1.0 for k, n in enumerate(NAMES)} | {"only-here": 0.5}),
+            ("log-v1", {n: float(e) for n, e in there.items()}),
+            ("deep-v1", {"a": 1.0, "b": 2.0}),
+        )
+        for name, error in errors.items()
+        for seed in range(3)
+    ]
+    (found,) = side_by_side(rank(results, tracks=tracks))
+    assert (found.simulated, found.recorded) == ("no-imu", "recordings")
+    assert [(r.estimator, r.simulated, r.recorded) for r in found.rows[:3]] == [("a", 1, 2), ("b", 2, 1), ("c", 3, 3)]
+    assert found.correlation.value == pytest.approx(1.0 - 6.0 * 2.0 / (8.0 * 63.0))
+    screen = Console(file=io.StringIO(), width=120)
+    screen.print(*voyage_tables([found]))
+    assert "rank correlation of 8 rows is 0.98" in screen.file.getvalue()

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
 import pytest
 
 from simnav.leaderboard.ranking.runs import group
-from simnav.leaderboard.ranking.standing import Standing, standing
+from simnav.leaderboard.ranking.standing import Standing, standing, standing_table
 from simnav.leaderboard.results.result import Result
 
 #: Factors of thirty seeds, with a geometric mean near 1.
@@ -59,3 +60,17 @@ def test_the_verdict_is_one_sentence(plain: str, said: str) -> None:
 def test_where_it_does_not_suit_there_is_no_place() -> None:
     found = standing(group(runs("ekf", 1.0, SPREAD))["pond-v1"], "mine", "pond-v1")
     assert (found.place, found.last, found.places) == (None, None, "does not suit it")
+
+
+def test_the_error_of_a_smoother_stands_beside_that_in_real_time() -> None:
+    late = [replace(r, scores=dict(r.scores) | {"smoothed_horizontal_rmse": 0.7}) for r in runs("rts", 1.0, SPREAD)]
+    table = standing_table(standing(group([*runs("ekf", 1.2, SPREAD), *late])["pond-v1"], "rts", "pond-v1"))
+    column = table.columns.index("smoothed [m]")
+    assert {row[0]: row[column] for row in table.rows} == {"rts": "0.700", "ekf": "–"}
+    assert "smoothed [m]" not in standing_table(stand(30)).shown(200)
+
+
+def test_a_p_value_that_no_data_could_make_small_is_not_shown() -> None:
+    shown = {n: [row[-1] for row in standing_table(stand(n)).rows if row[-1]] for n in (3, 30)}
+    assert shown[3] == ["–"] * 3
+    assert "–" not in shown[30]

@@ -14,6 +14,7 @@ from simnav.log.files import FileSpec
 from simnav.log.nmea import read_nmea
 from simnav.log.reader import READERS
 from simnav.scenario import parse
+from simnav.scoring import score
 from simnav.source import record
 from simnav.trial.estimate_file import trial_of_file
 
@@ -67,6 +68,43 @@ def test_tum_is_the_truth_for_the_scores(tmp_path, recording):
     np.testing.assert_allclose(np.sin(trial.attitude), np.sin(recording.data.truth.attitude), atol=1e-9)
     with pytest.raises(ValueError, match="write it with --truth"):
         write("recording", "tum", without_truth(recording), tmp_path / "x.tum")
+
+
+def test_parquet_makes_the_round_trip_and_names_units(tmp_path, recording):
+    from pyarrow import parquet
+
+    files = {p.name: p for p in write("recording", "parquet", recording, tmp_path / "run")}
+    assert {"truth.parquet", "imu.parquet", "gnss.parquet", "README.md", "start.json"} <= set(files)
+    schema = parquet.read_schema(files["gnss.parquet"])
+    assert schema.field("latitude_deg").metadata == {b"unit": b"deg"}
+    reader = READERS.get("parquet")
+    rows = reader.read(files["gnss.parquet"], FileSpec(path="x", format="parquet", time="time_s"))
+    gnss = recording.data.aids["gnss"]
+    np.testing.assert_array_equal(rows.time, gnss.time)
+    np.testing.assert_array_equal(rows.table.column("latitude_deg")[1], np.degrees(gnss.value[:, 0]))
+    csv = {p.name: p for p in write("recording", "csv", recording, tmp_path / "csv")}
+    assert read_csv(csv["gnss.csv"]).names == rows.table.names
+
+
+def test_absolute_pose_error_of_evo_is_our_rmse(tmp_path, recording):
+    """Positional APE without alignment (M. Grupp, evo: Python package for the evaluation of odometry and SLAM)."""
+    file_interface = pytest.importorskip("evo.tools.file_interface")
+    from evo.core import metrics, sync
+
+    truth, estimate = tmp_path / "truth.tum", tmp_path / "estimate.tum"
+    write("recording", "tum", recording, truth)
+    rows = np.loadtxt(truth)
+    rng = np.random.default_rng(5)
+    rows[:, 1:4] += np.array([3.0, -2.0, 1.0]) + rng.normal(0.0, 2.0, (len(rows), 3))
+    np.savetxt(estimate, rows, fmt="%.17g")
+    trial = trial_of_file(estimate, recording)
+    ours = score(trial, recording)
+    pair = sync.associate_trajectories(*(file_interface.read_tum_trajectory_file(str(p)) for p in (truth, estimate)))
+    ape = metrics.APE(metrics.PoseRelation.translation_part)
+    ape.process_data(pair)
+    theirs = ape.get_statistic(metrics.StatisticsType.rmse)
+    assert theirs == pytest.approx(np.hypot(ours["horizontal_rmse"], ours["vertical_rmse"]), rel=1e-5)
+    assert theirs > 3.0
 
 
 def test_nmea_makes_the_round_trip(tmp_path, recording):

@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import re
 
+import numpy as np
 import pytest
 
 from simnav.leaderboard.figures import appearance, style
-from simnav.leaderboard.site import charts, print_figures
+from simnav.leaderboard.site import charts, dial_charts, labels, print_figures
 from simnav.leaderboard.site.library import VEGA_LITE
 from simnav.leaderboard.site.pages import TEMPLATES
 from simnav.leaderboard.site.print_figures import filled
 
 FONT = 11
+#: Names of two points that are far from each other.
+AS_USUAL = {"shift": [-4.0, -4.0], "shift_narrow": [-4.0, -4.0]}
 
 
 def names_of(chart: charts.Chart, width: int) -> dict[str, tuple[str, float, float]]:
@@ -27,7 +30,7 @@ def names_of(chart: charts.Chart, width: int) -> dict[str, tuple[str, float, flo
 
 @pytest.mark.parametrize("width", [300, 620])
 def test_names_beside_the_points_stay_within_the_axes(width: int) -> None:
-    front = {"row": ["first-row", "last-row"], "front": [True, True]}
+    front = {"row": ["first-row", "last-row"], "front": [True, True], **AS_USUAL}
     cost = charts.accuracy_and_cost(
         "cost",
         "Score",
@@ -47,8 +50,31 @@ def test_names_beside_the_points_stay_within_the_axes(width: int) -> None:
             assert y > 1.2 * FONT  # the text stands above this line
 
 
+@pytest.mark.parametrize("width", [300, 620])
+def test_names_of_points_at_one_place_stand_apart(width: int) -> None:
+    names = [f"first-row{k}" for k in range(5)] + ["last-row"]
+    costs, errors, shown = [*np.linspace(1.0, 1.02, 5), 30.0], [*np.linspace(2.02, 2.0, 5), 1.0], [True] * 6
+    rows = {"row": names, "front": shown, "cost": costs, "low": costs, "high": costs, "error": errors, "family": names}
+    rows |= labels.shifts(names, costs, errors, shown, charts.COST_HEIGHT)
+    found = names_of(charts.accuracy_and_cost("cost", "Score", "ekf", {"rows": rows}), width)
+    heights = sorted(y for name, (_, _, y) in found.items() if name.startswith("first"))
+    assert len(heights) == 5
+    assert min(np.diff(heights)) > FONT
+    assert min(heights) > FONT
+
+
+def test_a_map_of_two_dials_names_the_cells_that_fail() -> None:
+    cells = {"x": [1.0, 2.0], "y": [0.0, 0.0], "error": [1.5, None], "text": ["1.5", "fails"], "dark": [False, False]}
+    chart = dial_charts.dial_map("map", "Jump [m]", "Outage [s]", "RMSE [m]", {"curves": {"rows": {"ekf": cells}}}, "")
+    import vl_convert
+
+    svg = vl_convert.vegalite_to_svg(filled(chart, ["ekf"]), vl_version=VEGA_LITE)
+    assert {"1.5", "fails"} <= set(re.findall(r">([^<]+)</text>", svg))
+    assert len(re.findall(r'aria-roledescription="rect mark"', svg)) == 2
+
+
 def test_a_long_name_in_the_middle_is_not_cut() -> None:
-    front = {"row": ["first-row", "last-" + "x" * 40], "front": [True, True], "family": ["a", "b"]}
+    front = {"row": ["first-row", "last-" + "x" * 40], "front": [True, True], "family": ["a", "b"], **AS_USUAL}
     chart = charts.accuracy_and_cost(
         "cost",
         "Score",

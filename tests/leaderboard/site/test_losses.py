@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import cast
 
 import pytest
 
+from simnav.leaderboard.ranking.board import ScenarioRanking
 from simnav.leaderboard.ranking.ranking import rank
 from simnav.leaderboard.ranking.runs import group
 from simnav.leaderboard.results.result import Result
-from simnav.leaderboard.site.entries import entries
+from simnav.leaderboard.site.entries import entries, run_names
 from simnav.leaderboard.site.losses import faults_of, losses
 from simnav.scenario import load
 
@@ -55,3 +58,14 @@ def test_faults_are_those_that_were_drawn_for_the_seed() -> None:
     assert "" in words.values()
     assert len(set(words.values())) > 6
     assert faults_of("made-up-one-v1", 1) == ""
+
+
+def test_a_run_whose_name_is_a_sentence_has_a_short_one() -> None:
+    def board(*runs: str) -> ScenarioRanking:
+        row = SimpleNamespace(ratios=dict.fromkeys(runs, 1.0))
+        return cast(ScenarioRanking, SimpleNamespace(rows=[row]))
+
+    note = "samples were means, resampled; start velocity not from the reference"
+    assert run_names(board("0", "17")) == {}
+    assert run_names(board(note)) == {note: "recording"}
+    assert run_names(board("leg 3", "b" + note, "a" + note)) == {"a" + note: "recording 1", "b" + note: "recording 2"}

@@ -22,6 +22,7 @@ from simnav.leaderboard.ranking.runs import group
 from simnav.leaderboard.ranking.stored_costs import cost_of
 from simnav.leaderboard.results.errors import RequestError
 from simnav.leaderboard.results.export import SCHEMA_VERSION
+from simnav.leaderboard.results.home import Home
 from simnav.leaderboard.results.result import Result
 from simnav.leaderboard.site import charts, site, sweeps
 from simnav.leaderboard.site.entries import entries
@@ -41,7 +42,7 @@ def no_charts(monkeypatch):
 
     def nothing(entry, ranking, *_):
         page = {"kind": "scenario", "reference": "", "remarks": [], "unsuitable": [], "failures": [], "instruments": [],
-                "provisional": False, "sweeps": [], "rows": {}, "drawn": []}  # fmt: skip
+                "provisional": False, "sweeps": [], "rows": {}, "drawn": [], "timed": 0}  # fmt: skip
         return ScenarioData(page, {}, (), ())
 
     monkeypatch.setattr(site, "scenario_data", nothing)
@@ -255,7 +256,11 @@ def test_a_scenario_shows_its_sweeps_with_breaking_points(folder, catalogued):
     page, data = Page(folder / f"{catalogued}.html"), data_of(folder / f"{catalogued}.html")
     assert "How large a fault may be: Jump [m]" in page.text
     assert "beyond 4.0" in page.text  # the one that does not break
-    (chart,) = data["sweeps"][0]["charts"]
+    (sweep,) = data["sweeps"]
+    chart, at_value = sweep["charts"]
+    assert (sweep["values"], sweep["dial"]) == ([0.0, 2.0, 4.0], {"title": "Jump", "unit": "m"})  # of the slider
+    low, high = at_value["spec"]["layer"][1]["encoding"]["x"]["scale"]["domain"]
+    assert 0.0 < low < 1.0 < high  # of all values, so that the axis stands still
     assert chart["data"]["curves"]["rows"]["ekf"]["value"] == [0.0, 2.0, 4.0]
     assert chart["data"]["marks"]["rows"] == {"ekf": {"at": [3.0], "threshold": [2.0]}}
 
@@ -273,6 +278,9 @@ def test_a_scenario_from_elsewhere_has_failures_and_who_does_not_suit(folder):
     page, data = Page(folder / f"{SCENARIOS[1]}.html"), data_of(folder / f"{SCENARIOS[1]}.html")
     assert "timeout" in page.text
     assert [u["name"] for u in data["unsuitable"]] == ["inertial"]
+    (late,) = [f for f in data["failures"] if f["status"] == "timeout"]
+    assert late["names"].endswith(f" ({late['runs']})")
+    assert late["runs"] > 0
     row = next(r for r in data["table"]["rows"] if r["name"]["text"] == "ekf")
     assert row["heading_rmse"]["value"] == pytest.approx(2.0)  # in degrees
     assert all(c["name"] != "timeline" for c in data["charts"])
@@ -312,7 +320,11 @@ def test_the_page_of_an_estimator_says_what_it_is(folder):
     page, data = Page(folder / "estimator-sw-fgo.html"), data_of(folder / "estimator-sw-fgo.html")
     assert "Factor graph" in page.text
     assert "estimators/rows/windows.py, line" in page.text
-    assert {p["name"] for p in data["parameters"]} >= {"window", "iterations"}
+    meant = {p["name"]: p["meaning"] for p in data["parameters"]}
+    assert meant["window"].startswith("Number of epochs")
+    assert meant["iterations"]
+    assert page.text.index("Where it is robust") < page.text.index("By scenario")
+    assert data["table"]["sort"] == "-score"
     assert data["plain"]["label"] == "ekf"
     assert data["worst"]["command"].startswith("simnav run ")
     assert [c["name"] for c in data["worst"]["charts"]][-1] == "run-weight-gnss"
@@ -496,4 +508,26 @@ def test_a_scenario_that_fails_in_another_process_ends_the_build(results, tmp_pa
 def test_every_estimator_of_simnav_has_a_family():
     mine = [name for name in names() if comes_with_simnav(find(name))]
     assert len(mine) > 60
-    assert [name for name in mine if estimator_facts(name).family == "Other"] == []
+    facts = [estimator_facts(name) for name in mine]
+    assert [f.summary for f in facts if f.family == "Other"] == []
+    assert [f.summary for f in facts if "---" in f.text + f.source] == []  # no section of a docstring
+
+
+def test_pages_link_to_documentation_and_repository_where_they_are_known(results, tmp_path, no_charts):
+    home = Home("https://example.org/simnav", "../site-docs/index.html")
+    mine = [r for r in results if r.scenario == SCENARIOS[0] and r.seed < 2 and r.status == "ok"]
+    site.build(mine, rank(mine), tmp_path / "site", home=home)
+    for page in pages(tmp_path / "site").values():
+        assert {home.repository, home.documentation} <= set(page.links)
+    docs = Path(__file__).parents[3] / "docs"
+    linked = {link for page in pages(tmp_path / "site").values() for link in page.links if "site-docs" in link}
+    assert "../site-docs/statistics.html" in linked
+    assert [
+        link for link in linked if not (docs / link.removeprefix("../site-docs/")).with_suffix(".md").exists()
+    ] == []
+
+
+def test_the_table_of_a_scenario_has_no_column_over_several(folder):
+    keys = [c["key"] for c in data_of(folder / f"{SCENARIOS[0]}.html")["table"]["columns"]]
+    assert "gain_interval" in keys
+    assert not {"won", "gain_scenarios", "over_scenarios"} & set(keys)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from simnav.geometry.earth import displace
-from simnav.geometry.rotation import dcm_from_rpy
+from simnav.geometry.rotation import dcm_from_rpy, rpy_from_dcm
 from simnav.log.alignment import align
 from simnav.log.noise_figures import noise_figures
 from tests.cases.tiny_log import CLOCK, write_csv
@@ -84,3 +84,19 @@ def test_what_the_motion_does_not_tell_is_said(log):
     found = {a.instrument: a for a in align(log)}
     assert found["dvl"].rows == 39  # a ramp that has nothing to do with the motion
     assert found["dvl"].remark or found["dvl"].residual["forward"] > 0.01
+
+
+def test_the_mounting_and_the_delay_of_an_imu(tiny):
+    wrong = np.radians([2.0, -3.0, 5.0])
+    tiny.replace('samples = "means"', 'samples = "means"\nmounting_deg = [2.0, -3.0, 5.0]')
+    tiny.replace('time_unit = "ms"', 'time_unit = "ms"\noffset_s = 0.2')
+    imu = {a.instrument: a for a in align(tiny.scenario())}["imu"]
+    right = rpy_from_dcm(dcm_from_rpy(wrong).T)
+    assert imu.delay == pytest.approx(0.2, abs=0.03)
+    for name, value in zip(("roll", "pitch", "yaw"), right, strict=True):
+        angle, sigma = imu.parameters[f"mounting_{name}"]
+        assert np.degrees(angle - value) == pytest.approx(0.0, abs=0.5)
+        assert 0.0 < sigma < np.radians(2.0)
+    delays, costs = np.array(imu.curve).T
+    assert costs.min() == 1.0
+    assert delays[np.argmin(costs)] == pytest.approx(0.2, abs=0.03)

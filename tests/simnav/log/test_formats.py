@@ -11,8 +11,9 @@ import pytest
 from simnav.log import LogError, LogWarning
 from simnav.log.files import FileSpec
 from simnav.log.formats.gps_time import leap_seconds
+from simnav.log.inspection import streams_of
 from simnav.log.reader import READERS
-from tests.audit.readers import mutations
+from tests.audit.mutations import mutations
 from tests.cases.log_files import CASES, HEIGHT, LATITUDE, LONGITUDE, N, T, read
 
 _NEEDS = {"hdf5": "h5py", "mcap": "mcap", "rosbag": "rosbags"}
@@ -31,7 +32,7 @@ def form(request):
 
 
 def test_mutated_files_are_read_or_refused(form):
-    """`python -m tests.audit readers` tries 3000 of each."""
+    """`python -m tests.audit mutations` tries 3000 of each."""
     found = mutations(form, 12, seed=1)
     assert set(found) <= {"read", "refused"}, found
 
@@ -123,6 +124,105 @@ def test_pd0(good):
         assert len(read("pd0", path).table) == N - 1
 
 
+def test_pd6(good):
+    rows = good("pd6")
+    assert rows.time[:2] == pytest.approx([1714557600.0, 1714557600.01])
+    table = rows.table
+    assert np.isnan(table.column("ground_forward")[1][0])  # its status is V
+    for name, value in (
+        ("ground_forward", 1.5), ("ground_starboard", -0.1), ("ground_down", -0.02), ("velocity_north", 1.2),
+        ("velocity_east", 0.3), ("velocity_down", 0.03), ("x", 0.01), ("error", 0.001), ("range_to_bottom", 20.5),
+        ("depth", 12.3), ("speed_of_sound", 1500.0), ("heading", np.radians(45.0)), ("pitch", np.radians(-1.5)),
+    ):  # fmt: skip
+        assert table.column(name)[1][1] == pytest.approx(value)
+
+
+def test_n2k(good):
+    place = good("n2k").table
+    assert np.degrees(place.column("latitude")[1]) == pytest.approx(LATITUDE, abs=1e-7)
+    reader, path = READERS.get("n2k"), good.folder / "good.raw"
+
+    def table(pgn, talker=None, **keys):
+        return reader.read(path, FileSpec(path="x", format="n2k", **keys), pgn, talker).table
+
+    heading = table("127250")
+    assert heading.column("heading_magnetic")[1][0] == pytest.approx(2.4294)
+    assert heading.column("heading")[1][0] == pytest.approx(2.4294 + 0.0698)
+    speed = table("128259", "115")
+    assert speed.column("speed")[1][0] == pytest.approx(3.24)
+    assert np.isnan(speed.column("speed_over_ground")[1][0])  # not available
+    fix = table("129029")  # in seven frames
+    assert np.degrees(fix.column("latitude")[1][0]) == pytest.approx(60.0051, abs=1e-12)
+    assert [fix.column(n)[1][0] for n in ("height", "satellites", "hdop", "pdop", "separation")] == pytest.approx(
+        [2.43, 11, 0.8, 1.6, 15.0]
+    )
+    # 2014-08-15 19:00:00.5 by the receiver, in the line of 0.042 s; headings after it have its clock.
+    later = reader.read(path, FileSpec(path="x", format="n2k", clock="sentence"), "127250")
+    assert later.time[later.counts][0] == 1408129201.5
+    assert len(later.counts) == N - 1
+    with pytest.raises(LogError, match=r"there is no sentence '127251'; did you mean '\d*127250'\?"):
+        table("127251")
+    with pytest.raises(LogError, match=r"there is no sentence '60928'.* \(sentences that are understood: 126992"):
+        table("60928")
+
+
+def test_ubx(good):
+    rows = good("ubx")
+    assert rows.time == pytest.approx(1714557600.5 + T)
+    table = rows.table
+    assert np.degrees(table.column("longitude")[1]) == pytest.approx(LONGITUDE, abs=1e-7)
+    for name, value in (("height", 47.1), ("velocity_east", -0.3), ("sigma_horizontal", 0.014), ("carrier", 2.0)):
+        assert table.column(name)[1][3] == pytest.approx(value)
+    path = good.folder / "good.ubx"
+    attitude = READERS.get("ubx").read(path, FileSpec(path="x", format="ubx"), "NAV-ATT")
+    assert attitude.time == pytest.approx(1714557601.0 + T)  # half a second after the other, by the time of the week
+    assert np.degrees(attitude.table.column("heading")[1][0]) == pytest.approx(90.0)
+    content = bytearray(path.read_bytes())
+    content[60] ^= 1
+    path.write_bytes(bytes(content))
+    with pytest.warns(LogWarning, match="1 messages of UBX are damaged or cut off and are left out, the first is at"):
+        assert len(read("ubx", path).table) == N - 1
+
+
+def test_ubx_against_another_reader(good):
+    pyubx2 = pytest.importorskip("pyubx2")
+    table = good("ubx").table
+    with open(good.folder / "good.ubx", "rb") as stream:
+        theirs = [m for _, m in pyubx2.UBXReader(stream, protfilter=2) if m.identity == "NAV-PVT"]
+    assert len(theirs) == N
+    for name, field, scale in (
+        ("latitude", "lat", np.pi / 180.0), ("velocity_north", "velN", 1e-3), ("sigma_height", "vAcc", 1e-3),
+        ("course", "headMot", np.pi / 180.0), ("pdop", "pDOP", 1.0),
+    ):  # fmt: skip
+        assert table.column(name)[1] == pytest.approx([scale * getattr(m, field) for m in theirs])
+
+
+def test_rinex(good):
+    rows = good("rinex")
+    assert rows.time == pytest.approx(1714557600.5 - 18.0 + T)
+    assert rows.table.column("C1C")[1] == pytest.approx(22000000.125 + T)
+    assert np.isnan(rows.table.column("S1C")[1][0])
+    path = good.folder / "good.obs"
+    galileo = READERS.get("rinex").read(path, FileSpec(path="x", format="rinex"), "E11").table
+    assert galileo.names == ("time", "C1C")
+    text = path.read_text()
+    path.write_text(text.replace("     3.04", "     2.11"))
+    with pytest.raises(LogError, match=r"line 1: version '2\.11' of RINEX; 3 and 4 are read"):
+        read("rinex", path)
+    path.write_text(text.replace("END OF HEADER", "COMMENT"))
+    with pytest.raises(LogError, match="it has no END OF HEADER"):
+        read("rinex", path)
+
+
+@pytest.mark.parametrize("form", ["n2k", "pd6", "ubx", "rinex"])
+def test_an_unknown_file_is_recognised(good, form):
+    good(form)
+    path = good.folder / f"good{CASES[form].ending}"
+    streams = streams_of(path.rename(path.with_suffix(".any")))
+    assert {s.form for s in streams} == {form}
+    assert all(len(s.time) for s in streams)
+
+
 def test_named_arrays(good):
     assert good("mat").table.column("imu.acc_3")[1] == pytest.approx(-9.8)
     with pytest.raises(LogError, match=r"name the array of the times, .*; there are: imu.t 12, imu.acc 12x3"):
@@ -153,6 +253,45 @@ def test_bags(good, form):
         READERS.get(form).read(path, FileSpec(path="x"), "/fox")
     with pytest.raises(LogError, match=r"say which topic \(sentence\); there are: /fix"):
         READERS.get(form).read(path, FileSpec(path="x"))
+
+
+def test_mcap_with_protobuf(tmp_path):
+    """A message with a stamp, a number that keeps its default, and a repeated field."""
+    writer_of = pytest.importorskip("mcap.writer").Writer
+    descriptor = pytest.importorskip("google.protobuf.descriptor_pb2")
+    from google.protobuf import descriptor_pool, message_factory, timestamp_pb2
+
+    file = descriptor.FileDescriptorProto(
+        name="fix.proto", package="test", syntax="proto3", dependency=["google/protobuf/timestamp.proto"]
+    )
+    message = file.message_type.add(name="Fix")
+    kinds, repeated = descriptor.FieldDescriptorProto, descriptor.FieldDescriptorProto.LABEL_REPEATED
+    message.field.add(name="timestamp", number=1, type=kinds.TYPE_MESSAGE, type_name=".google.protobuf.Timestamp")
+    message.field.add(name="latitude", number=2, type=kinds.TYPE_DOUBLE)
+    message.field.add(name="height", number=3, type=kinds.TYPE_DOUBLE)
+    message.field.add(name="covariance", number=4, type=kinds.TYPE_DOUBLE, label=repeated)
+    stamp = descriptor.FileDescriptorProto()
+    timestamp_pb2.DESCRIPTOR.CopyToProto(stamp)
+    pool = descriptor_pool.DescriptorPool()
+    for each in (stamp, file):
+        pool.Add(each)
+    fix = message_factory.GetMessageClass(pool.FindMessageTypeByName("test.Fix"))
+    path = tmp_path / "a.mcap"
+    with open(path, "wb") as stream:
+        writer = writer_of(stream)
+        writer.start()
+        data = descriptor.FileDescriptorSet(file=[stamp, file]).SerializeToString()
+        channel = writer.register_channel("/fix", "protobuf", writer.register_schema("test.Fix", "protobuf", data))
+        for k in range(N):
+            one = fix(latitude=LATITUDE[k], covariance=[1.0, 2.0])
+            one.timestamp.seconds, one.timestamp.nanos = k, 500_000_000
+            writer.add_message(channel, 10**9 * k, one.SerializeToString(), 10**9 * k)
+        writer.finish()
+    rows = read("mcap", path)
+    assert rows.time == pytest.approx(T + 0.5)
+    assert rows.table.column("latitude")[1] == pytest.approx(LATITUDE)
+    assert rows.table.column("height")[1].tolist() == [0.0] * N
+    assert rows.table.column("covariance_2")[1].tolist() == [2.0] * N
 
 
 @pytest.mark.parametrize("form", ["mat", "hdf5", "mcap", "rosbag"])

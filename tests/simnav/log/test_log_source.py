@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
 import pytest
 
 from simnav.geometry.earth import displace, relative_position
 from simnav.geometry.rotation import dcm_from_rpy
 from simnav.log import LogError, LogSource, LogWarning
-from simnav.recording import Block
+from simnav.recording import Block, Recording
+from simnav.scoring.beyond_reference import rms_beyond
+from simnav.source import record
 from simnav.strapdown import integrate
 from tests.cases.tiny_log import CLOCK, RATE, write_csv
 
@@ -246,3 +250,73 @@ def test_an_instrument_outside_the_run(tiny):
     tiny.replace("offset_s = 0.25", "offset_s = 500.0")
     with pytest.raises(LogError, match=r"none of the 39 measurements of 'dvl' lies within the run; .* offset_s"):
         LogSource(tiny.scenario(), 0)
+
+
+def test_a_reference_knows_how_good_it_is(tiny):
+    path = tiny.folder / "truth1.csv"
+    lines = path.read_text().splitlines()
+    solution = [5 if k in (8, 20) else 2 if k in (9, 10) else 1 for k in range(len(lines) - 1)]
+    more = ["Q,sdn", *(f"{q},{0.3 if q == 1 else 'nan'}" for q in solution)]
+    path.write_text("\n".join(f"{a},{b}" for a, b in zip(lines, more, strict=True)) + "\n")
+    tiny.replace('units = ["deg", "deg", "m"]\n', 'units = ["deg", "deg", "m"]\nsigma = ["sdn"]\n')
+    tiny.add('[log.reference]\nquality = "Q"\nfloating_sigma_m = [4.0, 4.0, 8.0]\n')
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", LogWarning)
+        recording = record(tiny.scenario(), 0)
+    assert "reference: 90.2% fixed, 4.9% float, 4.9% neither and not scored" in recording.note
+    assert "its own horizontal sigma of 0.424 m is subtracted" in recording.note
+    truth = recording.data.truth
+    begin = round(LogSource(tiny.scenario(), 0)._begin - CLOCK)
+    epoch = {k: k - begin - 1 for k in range(len(solution))}
+    assert np.isnan(truth.position[epoch[20]]).all()  # neither
+    assert truth.quality[[epoch[9], epoch[30]]].tolist() == [2.0, 1.0]
+    np.testing.assert_allclose(truth.sigma[[epoch[10], epoch[30]]], [[4.0, 4.0, 8.0], [0.3, 0.3, 0.3]])
+    # An estimate that is off by 2 m north, where the reference is known to 0.3 m in each direction.
+    known = np.isfinite(truth.position).all(axis=1) & (truth.quality == 1.0)
+    error = np.tile([2.0, 0.0], (int(known.sum()), 1))
+    assert rms_beyond(error, truth.sigma[known][:, :2]) == pytest.approx(np.sqrt(4.0 - 2 * 0.09), rel=0.02)
+    path = tiny.folder.parent / "kept.npz"
+    recording.save(path)
+    np.testing.assert_array_equal(Recording.load(path).data.truth.quality, truth.quality)
+    tiny.replace('quality = "Q"', 'quality = "Q"\nfixed = [7]\nfloating = [8]')
+    with pytest.raises(
+        LogError, match=r"no row has a value of fixed = \[7.0\] or floating = \[8.0\] in the column 'Q'"
+    ):
+        LogSource(tiny.scenario(), 0)
+
+
+HOLD_OUT = """
+[log.instruments.gnss]
+file = "truth"
+columns = ["lat", "lon", "h"]
+units = ["deg", "deg", "m"]
+every = 5
+
+[instruments.gnss]
+kind = "gnss_position"
+rate_hz = 0.2
+sigma_m = [1.0, 1.0, 1.0]
+"""
+
+
+def test_the_seed_chooses_which_fixes_are_held_out(tiny):
+    tiny.replace('folder = "tiny"', 'folder = "tiny"\nrows_by_seed = true')
+    tiny.replace('units = ["deg", "deg", "m"]\n', 'units = ["deg", "deg", "m"]\nhold_out = 5\n')
+    tiny.replace("[log.reference.velocity]", "[log.reference]\nmax_gap_s = 2.5\n\n[log.reference.velocity]").add(
+        HOLD_OUT
+    )
+    firsts = set()
+    for seed in range(8):
+        source = LogSource(tiny.scenario(), seed)
+        log = source.scenario.log
+        gnss = source.advance(source.duration).aids["gnss"]
+        # What an estimator gets is not in the reference that it is scored against.
+        own = set(np.round(source._begin + gnss.time - CLOCK).astype(int))
+        scored = set(np.round(source._reference.time - CLOCK).astype(int))
+        assert own
+        assert not own & scored
+        firsts.add(min(own) % 5)
+        assert log.rows_by_seed
+    assert len(firsts) > 2
+    again = [LogSource(tiny.scenario(), 3).advance(20.0).aids["gnss"].time for _ in range(2)]
+    np.testing.assert_array_equal(*again)

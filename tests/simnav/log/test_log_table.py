@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from simnav.log.delimited import read_csv
-from simnav.log.table import LogError
+from simnav.log.growing import GrowingTable
+from simnav.log.table import LogError, utc_seconds
 
 
 def write(path, text):
@@ -104,3 +105,32 @@ def test_headers_with_letters_of_other_alphabets(tmp_path, encoding):
     assert table.names == ("Zeit", "Kurs [°]")
     with pytest.raises(LogError, match=r"a\.csv, line 3, column 'Kurs \[°\]': '20°' is not a number"):
         table.column("Kurs [°]")
+
+
+def test_a_column_changes_its_form_after_the_first_megabyte(tmp_path):
+    rows = "".join(f"{k},1,,7\n" for k in range(120_000))
+    path = write(tmp_path / "a.csv", f"t,x,late,word\n{rows}120000,2.5,3.5,seven\n")
+    table = read_csv(path)
+    assert table.column("x")[1][-2:].tolist() == [1.0, 2.5]
+    assert table.column("late")[1][-1] == 3.5
+    assert np.isnan(table.column("late")[1][0])
+    with pytest.raises(LogError, match=r"line 120002, column 'word': 'seven' is not a number"):
+        table.column("word")
+
+
+def test_rows_one_by_one():
+    growing = GrowingTable()
+    growing.add({"a": 1.0, "name": "x"}, 3)
+    growing.add({"b": 2.0}, 5)
+    growing.add({"a": "y", "name": 1.0, "b": 4.0}, 6)
+    table = growing.table("somewhere")
+    np.testing.assert_array_equal(table.column("a")[1], [1.0, np.nan, np.nan])
+    np.testing.assert_array_equal(table.column("b")[1], [np.nan, 2.0, 4.0])
+    assert table.columns["name"].tolist() == ["x", None, None]
+    assert table.line.tolist() == [3, 5, 6]
+
+
+def test_stamps_with_the_day_of_the_year():
+    assert utc_seconds("19+085:10:06:03.188") == utc_seconds("2019-03-26T10:06:03.188Z")
+    with pytest.raises(ValueError, match="does not match"):
+        utc_seconds("19+485:10:06:03.188")

@@ -18,6 +18,7 @@ from simnav.log.same_time import settle
 from simnav.log.spec import ChannelSpec
 from simnav.log.table import Table
 from simnav.spec import SpecError
+from tests.cases.tiny_log import CLOCK
 
 
 def table(**columns) -> Table:
@@ -321,3 +322,46 @@ def test_the_check_finds_all_errors_at_once(tiny):
     assert "is its unit 'deg'?" in errors["reference.attitude"]
     good = {f.part for f in found.findings if f.level == "ok"}
     assert good == {"imu", "reference.position", "reference.velocity"}
+
+
+STATED = """
+[log.instruments.gnss]
+file = "truth"
+columns = ["lat", "lon", "h"]
+units = ["deg", "deg", "m"]
+sigma = ["sdn", "sde", "sdu"]
+sigma_units = "cm"
+
+[instruments.gnss]
+kind = "gnss_position"
+rate_hz = 1.0
+sigma_m = [9.0, 9.0, 9.0]
+"""
+
+
+def test_sigmas_from_columns(tiny):
+    path = tiny.folder / "truth1.csv"
+    lines = path.read_text().splitlines()
+    more = ["sdn,sde,sdu", *(f"{100 + k},200,{'' if k == 3 else 300}" for k in range(len(lines) - 1))]
+    path.write_text("\n".join(f"{a},{b}" for a, b in zip(lines, more, strict=True)) + "\n")
+    tiny.add(STATED)
+    with pytest.warns(LogWarning, match=r"1 of 41 rows of gnss_position state no standard deviation .* line 5"):
+        source = LogSource(tiny.scenario(), 0)
+    gnss = source.advance(10.0).aids["gnss"]
+    assert source.instruments["gnss"].stated
+    k = np.round(source._begin + gnss.time - CLOCK)
+    expected = np.stack([1.0 + 0.01 * k, np.full(len(k), 2.0), np.full(len(k), 3.0)], axis=1)
+    expected[k == 3] = 9.0  # that of the datasheet
+    np.testing.assert_allclose(gnss.side, expected)
+    np.testing.assert_allclose(gnss.sigma, expected)
+    assert next(gnss.measurements()).side.tolist() == pytest.approx(expected[0].tolist())
+    tiny.replace('sigma = ["sdn", "sde", "sdu"]\nsigma_units = "cm"', 'sigma = ["sde"]\nsigma_times = 0.015')
+    assert LogSource(tiny.scenario(), 0).advance(10.0).aids["gnss"].side == pytest.approx(3.0)
+    for old, new, says in (
+        ('sigma = ["sde"]', 'sigma = ["sde", "sdn"]', "sigma of gnss_position has 2 columns; give one, or 3"),
+        ('"sde", "sdn"]', '"sde"]\nsigma_units = "deg"', "sigma of north in 'deg'; a unit of length is wanted"),
+        ('sigma = ["sde"]\nsigma_units = "deg"\n', "", "sigma_times needs 'sigma'"),
+    ):
+        tiny.replace(old, new)
+        with pytest.raises(ValueError, match=says):
+            LogSource(tiny.scenario(), 0)

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from simnav.log.nmea import SENTENCES, read_nmea
+from simnav.log.progress import watched
 from simnav.log.table import LogError, LogWarning
 
 
@@ -272,3 +273,13 @@ def test_a_usbl_fix_has_the_axes_that_it_says(tmp_path):
     assert [found[n][1] for n in ("north", "east")] == [100.0, 50.0]
     assert len(found["depth"]) == 2
     assert list(found["transponder"]) == ["M23", "M23"]
+
+
+def test_a_long_log_tells_how_far_it_has_been_read(tmp_path):
+    line = "2014-08-01T00:00:00.5Z $HEHDT,98.5,T"
+    path = write(tmp_path / "long.nmea", *[line] * 25_000)
+    told = []
+    with watched(lambda file, done, total: told.append((file.name, done, total))):
+        read_nmea(path)
+    size = path.stat().st_size
+    assert told == [("long.nmea", 10_000 * (len(line) + 1), size), ("long.nmea", 20_000 * (len(line) + 1), size)]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -78,3 +78,35 @@ def point(path: str, week: int, second: float, satellites: Sequence[str], raw: n
         observations.ptr, len(satellites), table, options, solution, directions, states.ptr, message
     )  # fmt: skip
     return np.array([solution.rr[k] for k in range(3)])
+
+
+def points(observed: str, path: str, delay: Callable[[str, float], float] | None) -> dict[int, np.ndarray]:
+    """RTKLIB's positions [m] of an observation file of one day, by the seconds since noon, rounded.
+
+    Its own model of the troposphere is used, or if `delay` is given, the delay [m] of a satellite at a second of the
+    day is subtracted. An epoch without a solution is left out.
+    """
+    observations = rtk.obs_t()
+    assert rtk.readrnx(observed, 1, "", observations, rtk.nav_t(), rtk.sta_t()) > 0
+    rtk.sortobs(observations)
+    options, table, found = rtk.prcopt_default, navigation(path), {}
+    options.mode, options.navsys, options.elmin = rtk.PMODE_SINGLE, rtk.SYS_GPS | rtk.SYS_GAL, 0.0
+    options.ionoopt, options.tropopt = rtk.IONOOPT_BRDC, rtk.TROPOPT_SAAS if delay is None else rtk.TROPOPT_OFF
+    every = [observations.data[k] for k in range(observations.n)]
+    second = [rtk.time2gpst(one.time, rtk.Arr1Dint(1)) % 86400.0 for one in every]
+    for time in sorted(set(second)):
+        rows = [k for k, other in enumerate(second) if other == time]
+        epoch = rtk.Arr1Dobsd_t(len(rows))
+        for j, k in enumerate(rows):
+            number = rtk.Arr1Dint(1)
+            letter = {rtk.SYS_GPS: "G", rtk.SYS_GAL: "E"}[rtk.satsys(every[k].sat, number)]
+            if delay is not None:
+                every[k].P[0] -= delay(f"{letter}{number[0]:02d}", time)
+            epoch[j] = every[k]
+        solution, states = rtk.sol_t(), rtk.Arr1Dssat_t(rtk.MAXSAT)
+        directions = array(np.zeros(2 * len(rows)))
+        if rtk.pntpos(
+            epoch.ptr, len(rows), table, options, solution, directions, states.ptr, rtk.Arr1Dchar(256)
+        ):  # fmt: skip
+            found[round(time - 43200.0)] = np.array([solution.rr[k] for k in range(3)])
+    return found

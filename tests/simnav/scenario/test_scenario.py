@@ -472,3 +472,7 @@ def test_nonsense_anywhere_gives_one_sentence_or_a_scenario(text):
 def test_what_is_no_name_and_no_path_is_refused_in_one_sentence(given):
     with pytest.raises(SpecError, match="is not a scenario; a name or the path of a TOML file is wanted"):
         load(given)
+
+
+def test_a_scenario_is_one_line_at_the_prompt() -> None:
+    assert repr(load("open-sea")) == "<Scenario: open-sea-v1, Open sea on a clean day, 900 s>"

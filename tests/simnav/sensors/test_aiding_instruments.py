@@ -210,6 +210,27 @@ def test_gyrocompass_speed_error_is_the_mariners_rule():
     assert Gyrocompass(sigma=0.0).build("g", 1).sense(tap).value[0, 0] == 0.0
 
 
+def test_the_errors_of_a_gyrocompass_at_60_degrees_are_twice_those_at_the_equator():
+    """Its wander, which grows with the secant of the latitude, in each run; and the speed error, to the radii."""
+    wander = {"kind": "gauss_markov", "sigma_deg": 0.5, "correlation_time_min": 15.0}
+    table = {"sigma_deg": 0.0, "error": [wander | {"proportional_to": {"secant_latitude": 1.0}}]}
+
+    def error(latitude: float, table: dict, north: float, seed: int) -> np.ndarray:
+        n = 600
+        place, velocity, zero = np.zeros((n, 3)), np.zeros((n, 3)), np.zeros((n, 3))
+        place[:, 0], velocity[:, 0] = np.radians(latitude), north
+        tap = TapStates(np.arange(float(n)), place, velocity, zero, zero, zero)
+        made = Gyrocompass.from_toml(table).install("g", seed, Surroundings())
+        return made.sense(tap).value[:, 0]
+
+    for seed in range(3):
+        equator, far = (error(latitude, table, 0.0, seed) for latitude in (0.0, 60.0))
+        assert np.std(equator) > 0.0
+        np.testing.assert_allclose(far, 2.0 * equator, rtol=1e-9)
+    steaming = {"sigma_deg": 0.0, "speed_error": True}
+    assert error(60.0, steaming, 5.0, 1) == pytest.approx(2.0 * error(0.0, steaming, 5.0, 1), rel=0.01)
+
+
 def test_headings_stay_in_one_turn():
     tap = states(np.zeros(5000))
     tap.attitude[:, 2] = np.pi - 0.001
