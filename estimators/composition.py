@@ -30,6 +30,7 @@ from typing import Any, ClassVar
 from simnav.estimator import Estimator, Needs, UnsuitableScenario, lacking
 from simnav.estimator.late_arrivals import LateArrivals, Manner, TrueTimes, is_untimely, parts_of, true_times
 from simnav.estimator.parameters import former_names, under_present_names
+from simnav.estimators.fix_test import FixTest
 from simnav.types import Array, Estimate, InitialState, Instruments, Measurements, NavigationStates
 
 if typing.TYPE_CHECKING:
@@ -201,6 +202,7 @@ class Row(Estimator):
     #: What is done with readings that arrive late: the parameter ``late`` of `simnav.estimator.make`.
     late: Manner = "replay"
     _late: LateArrivals | None = None
+    _fix_test: FixTest | None = None
     _truth: TrueTimes | None = None
     _shared: Sequence[object] = ()
 
@@ -233,6 +235,13 @@ class Row(Estimator):
         _equip(cls)
 
     @property
+    def sets_aside(self) -> bool:
+        """Whether the row may use a measurement with less weight than its datasheet says, or not at all."""
+        if self.reference:
+            return False
+        return bool({"adaptation", "weighting"} & self.recipe.keys()) or getattr(self.solver, "sets_aside", False)
+
+    @property
     def needs(self) -> Needs:
         """The instruments that its solver needs; and one that solves raw readings, if it is loosely coupled."""
         return (*self.solver.needs, _SOLUTIONS) if self.loose else self.solver.needs
@@ -245,6 +254,7 @@ class Row(Estimator):
             instruments = instruments.without({name for sheet in instruments.values() for name in sheet.sources})
         self._instruments = instruments
         self._late = self._late_arrivals() if any(sheet.timing for sheet in instruments.values()) else None
+        self._fix_test = FixTest(instruments) if self.sets_aside else None
         self.solver.reset(start, instruments)
 
     def _late_arrivals(self) -> LateArrivals:
@@ -252,12 +262,13 @@ class Row(Estimator):
 
     def update(self, measurements: Measurements) -> Estimate:
         """Take one step's measurements, each at its own time, also those that arrive late."""
-        if self._late is None:
-            if not is_untimely(measurements):
-                return self.solver.update(measurements)
+        if self._late is None and is_untimely(measurements):
             self._late = self._late_arrivals()
-        self.solver, estimate = self._late.update(self.solver, measurements)
-        return estimate
+        if self._late is None:
+            estimate = self.solver.update(measurements)
+        else:
+            self.solver, estimate = self._late.update(self.solver, measurements)
+        return estimate if self._fix_test is None else self._fix_test.judge(measurements, estimate)
 
     def smooth(self) -> NavigationStates | None:
         """The trajectory of a solver that smooths; else None."""

@@ -9,10 +9,10 @@ import numpy as np
 from simnav.compiled import kernel
 from simnav.estimators.algebra.chi_square import chi_square_limits, normal_quantile
 from simnav.estimators.models.roles import fixes_and_logs, witnesses
+from simnav.estimators.persistence import Course
 from simnav.types import Array, Instruments
 
 from .base import Innovation
-from .persistence import Course
 
 __all__ = ["PredictionTest", "standardised"]
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from simnav.estimator import Estimator, UnsuitableScenario
 from simnav.estimator.needs import Needs
+from simnav.estimators.fix_test import FixTest
 from simnav.estimators.models.channels import by_channel
 from simnav.estimators.models.suitable import Suitable
 from simnav.types import KINDS, Array, Estimate, InitialState, Instruments, Measurements
@@ -59,6 +60,7 @@ class PolicyEstimator(Estimator):
         The policy is asked about the first instrument, or channel, of each of its kinds; all others keep their noise.
         """
         policy, instruments = self.policy, by_channel(instruments)
+        self._fix_test = FixTest(instruments)
         self._filter = ReferenceFilter(list(instruments))
         self._filter.reset(start, instruments)
         names: list[str] = []
@@ -93,7 +95,7 @@ class PolicyEstimator(Estimator):
         model.restore(before)
         estimate.diagnostics = self._sigmas()
         estimate.flagged = self._flagged(measurements)
-        return estimate
+        return self._fix_test.judge(measurements, estimate)
 
     def _shift(self) -> Array:
         """From the plain filter's state to the policy's."""

@@ -52,9 +52,11 @@ class SageHusaKf(_Adaptive, adaptation=SageHusa):
         times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
         Fixes that see no error of a log at first may see it later. A log without fixes is believed from its second
         failure in one direction on, and a compass while another instrument finds the prediction wrong.
+    4
+        It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
     """
 
-    version = 3
+    version = 4
 
 
 @register("sage-husa-paper")
@@ -80,9 +82,11 @@ class SageHusaPaper(
         times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
         Fixes that see no error of a log at first may see it later. A log without fixes is believed from its second
         failure in one direction on, and a compass while another instrument finds the prediction wrong.
+    4
+        It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
     """
 
-    version = 3
+    version = 4
 
 
 @register("iae")
@@ -111,9 +115,11 @@ class Iae(_Adaptive, adaptation=piece(InnovationBased, source="innovation")):
         times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
         Fixes that see no error of a log at first may see it later. A log without fixes is believed from its second
         failure in one direction on, and a compass while another instrument finds the prediction wrong.
+    4
+        It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
     """
 
-    version = 3
+    version = 4
 
 
 @register("iae-fixed")
@@ -136,9 +142,11 @@ class IaeFixed(_Adaptive, adaptation=piece(FixedWindow, source="innovation")):
         times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
         Fixes that see no error of a log at first may see it later. A log without fixes is believed from its second
         failure in one direction on, and a compass while another instrument finds the prediction wrong.
+    4
+        It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
     """
 
-    version = 3
+    version = 4
     formerly = _FORMERLY
 
 
@@ -162,9 +170,11 @@ class Rae(_Adaptive, adaptation=piece(FixedWindow, source="residual", newest=Fal
         times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
         Fixes that see no error of a log at first may see it later. A log without fixes is believed from its second
         failure in one direction on, and a compass while another instrument finds the prediction wrong.
+    4
+        It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
     """
 
-    version = 3
+    version = 4
     formerly = _FORMERLY
 
 
@@ -194,9 +204,11 @@ class Adkf(_Adaptive, adaptation=AdaptiveFactor):
         times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
         Fixes that see no error of a log at first may see it later. A log without fixes is believed from its second
         failure in one direction on, and a compass while another instrument finds the prediction wrong.
+    4
+        It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
     """
 
-    version = 3
+    version = 4
 
 
 @register("adkf-paper")
@@ -209,7 +221,14 @@ class AdkfPaper(_Adaptive, adaptation=piece(AdaptiveFactor, preset="paper", c0=N
 
     Source: Z. Zhan, C. Liu, K. Jin et al., *GNSS/SINS/DVL integrated navigation algorithm based on adaptive
     differential Kalman filtering*, PLoS One 21(2), 2026.
+
+    Versions
+    --------
+    2
+        It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
     """
+
+    version = 2
 
 
 @register("adkf-23")
@@ -219,7 +238,14 @@ class Adkf23(Row, solver=KalmanEstimator, model=DvlCalibrationModel, adaptation=
     With ``model__preset=paper`` the noise of GNSS and DVL is the printed one, and with ``adaptation__preset=paper`` the
     statistic is. Source: Z. Zhan, C. Liu, K. Jin et al., *GNSS/SINS/DVL integrated navigation algorithm based on
     adaptive differential Kalman filtering*, PLoS One 21(2), 2026.
+
+    Versions
+    --------
+    2
+        It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
     """
+
+    version = 2
 
 
 @register("igg3")
@@ -248,9 +274,11 @@ class Igg3(_Adaptive, adaptation=Igg3Weights):
         times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
         Fixes that see no error of a log at first may see it later. A log without fixes is believed from its second
         failure in one direction on, and a compass while another instrument finds the prediction wrong.
+    4
+        It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
     """
 
-    version = 3
+    version = 4
 
 
 @register("huber-kf")
@@ -274,9 +302,11 @@ class HuberKf(_Adaptive, adaptation=HuberWeights):
         times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
         Fixes that see no error of a log at first may see it later. A log without fixes is believed from its second
         failure in one direction on, and a compass while another instrument finds the prediction wrong.
+    4
+        It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
     """
 
-    version = 3
+    version = 4
 
 
 @register("gated-ekf")
@@ -305,9 +335,11 @@ class GatedEkf(_Adaptive, adaptation=ChiSquareGate):
         times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
         Fixes that see no error of a log at first may see it later. A log without fixes is believed from its second
         failure in one direction on, and a compass while another instrument finds the prediction wrong.
+    4
+        It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
     """
 
-    version = 3
+    version = 4
 
 
 @register("fading-ekf")
@@ -315,7 +347,14 @@ class FadingEkf(_Adaptive, adaptation=FadingMemory):
     """Fading memory: information loses weight with its age.
 
     Source: D. Simon, *Optimal State Estimation*, 2006, section 7.4.
+
+    Versions
+    --------
+    2
+        It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
     """
+
+    version = 2
 
 
 @register("vb-akf")
@@ -344,9 +383,11 @@ class VbAkf(_Adaptive, adaptation=VariationalBayes):
         times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
         Fixes that see no error of a log at first may see it later. A log without fixes is believed from its second
         failure in one direction on, and a compass while another instrument finds the prediction wrong.
+    4
+        It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
     """
 
-    version = 3
+    version = 4
 
 
 @register("mckf")
@@ -369,9 +410,11 @@ class Mckf(_Adaptive, adaptation=piece(MaximumCorrentropy, smallest=1e-3)):
         times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
         Fixes that see no error of a log at first may see it later. A log without fixes is believed from its second
         failure in one direction on, and a compass while another instrument finds the prediction wrong.
+    4
+        It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
     """
 
-    version = 3
+    version = 4
 
 
 @register("imm")
@@ -400,6 +443,8 @@ class Imm(Row, solver=ImmEstimator, model=Suitable):
         times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
         Fixes that see no error of a log at first may see it later. A log without fixes is believed from its second
         failure in one direction on, and a compass while another instrument finds the prediction wrong.
+    4
+        It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
     """
 
-    version = 3
+    version = 4

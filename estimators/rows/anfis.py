@@ -27,9 +27,11 @@ class AnfisFgo(ShipFgo, adaptation=Anfis):
     2
         The noise is relative to what the last innovations have where they contradict the datasheet
         (``level="learned"``). Before, the rows lost up to 39 % to ``ship-ekf`` where a datasheet is wrong.
+    3
+        It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
     """
 
-    version = 2
+    version = 3
 
 
 @register("anfis-fgo-motion")
@@ -45,9 +47,11 @@ class AnfisFgoMotion(ShipFgo, adaptation=piece(Anfis, features="motion")):
     2
         The noise is relative to what the last innovations have where they contradict the datasheet
         (``level="learned"``). Before, the rows lost up to 39 % to ``ship-ekf`` where a datasheet is wrong.
+    3
+        It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
     """
 
-    version = 2
+    version = 3
 
 
 @register("anfis-ekf")
@@ -65,6 +69,8 @@ class AnfisEkf(ShipEkf, adaptation=Anfis):
     2
         The noise is relative to what the last innovations have where they contradict the datasheet
         (``level="learned"``). Before, the rows lost up to 39 % to ``ship-ekf`` where a datasheet is wrong.
+    3
+        It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
     """
 
-    version = 2
+    version = 3

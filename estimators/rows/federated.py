@@ -27,7 +27,14 @@ class Federated(Row, solver=piece(FederatedEstimator, reset_locals=True), model=
 
     Source: N. A. Carlson, *Federated square root filter for decentralized parallel processes*, IEEE Trans. Aerospace
     and Electronic Systems 26(3), 1990.
+
+    Versions
+    --------
+    2
+        It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
     """
+
+    version = 2
 
 
 @register("federated-no-reset")
@@ -40,4 +47,11 @@ class FederatedNoReset(Row, solver=piece(FederatedEstimator, reset_locals=False)
     Its covariance is an upper bound, not the error's: conservative where the sensors differ. Source: N. A. Carlson,
     *Federated square root filter for decentralized parallel processes*, IEEE Trans. Aerospace and Electronic Systems
     26(3), 1990.
+
+    Versions
+    --------
+    2
+        It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
     """
+
+    version = 2

@@ -39,9 +39,11 @@ class StudentTKf(Row, solver=KalmanEstimator, model=Suitable, adaptation=Student
         times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
         Fixes that see no error of a log at first may see it later. A log without fixes is believed from its second
         failure in one direction on, and a compass while another instrument finds the prediction wrong.
+    4
+        It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
     """
 
-    version = 3
+    version = 4
 
 
 @register("student-t-rts")
@@ -65,7 +67,9 @@ class StudentTRts(StudentTKf, smoother=StudentTSmoother):
         times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
         Fixes that see no error of a log at first may see it later. A log without fixes is believed from its second
         failure in one direction on, and a compass while another instrument finds the prediction wrong.
+    4
+        It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
     """
 
-    version = 3
+    version = 4
     formerly = _FORMERLY

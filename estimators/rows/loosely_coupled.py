@@ -35,7 +35,14 @@ class GatedEkfLoose(Row, solver=KalmanEstimator, model=Suitable, adaptation=ChiS
 
     Source: P. D. Groves, *Principles of GNSS, Inertial, and Multisensor Integrated Navigation Systems*, 2nd ed., 2013,
     sections 14.1.2 and 17.3.1.
+
+    Versions
+    --------
+    2
+        It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
     """
+
+    version = 2
 
     loose = True
 
@@ -52,6 +59,13 @@ class GncFgoLoose(
 
     Source: H. Yang, P. Antonante, V. Tzoumas and L. Carlone, *Graduated non-convexity for robust spatial perception*,
     IEEE Robotics and Automation Letters 5(2), 2020.
+
+    Versions
+    --------
+    2
+        It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
     """
+
+    version = 2
 
     loose = True

@@ -46,9 +46,11 @@ class SolutionSeparationEkf(Row, solver=SolutionSeparation, model=Suitable):
         disturbed IMU would explain why it disagrees, and an excluded one is used again where the position without it
         becomes more uncertain than the separation was. What a compass says does not condemn it, nor does a filter that
         has just begun.
+    3
+        It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
     """
 
-    version = 2
+    version = 3
 
 
 @register("mid-value")
@@ -78,6 +80,8 @@ class MidValue(
         A satellite that the others contradict is left out by the window without a schedule
         (`simnav.estimators.weightings.sibling_vote`). Where no instrument has channels, the numbers are those of
         version 1.
+    3
+        It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
     """
 
-    version = 2
+    version = 3

@@ -26,7 +26,14 @@ class PolicyEkf(PolicyEstimator):
     ----------
     file : str
         Policy file; empty for the one that comes with the package.
+
+    Versions
+    --------
+    2
+        It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
     """
+
+    version = 2
 
     def __init__(self, file: str = ""):
         super().__init__(file or str(Path(__file__).parents[1] / "learning" / "policy_ekf.npz"))

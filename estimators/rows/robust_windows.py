@@ -46,7 +46,14 @@ class HuberFgo(_Robust, weighting=piece(TunedMEstimator, weight=huber)):
     Version 2: a log that is the last witness beside the motion is not rejected for good.
 
     Source: P. J. Huber, *Robust Statistics*, 1981.
+
+    Versions
+    --------
+    2
+        It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
     """
+
+    version = 2
 
 
 @register("tukey-fgo")
@@ -60,7 +67,14 @@ class TukeyFgo(_Robust, weighting=piece(TunedMEstimator, weight=tukey)):
     Version 2: a log that is the last witness beside the motion is not rejected for good.
 
     Source: A. E. Beaton and J. W. Tukey, *The fitting of power series*, Technometrics 16(2), 1974.
+
+    Versions
+    --------
+    2
+        It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
     """
+
+    version = 2
 
 
 @register("cauchy-fgo")
@@ -74,7 +88,14 @@ class CauchyFgo(_Robust, weighting=piece(TunedMEstimator, weight=cauchy)):
     Version 2: a log that is the last witness beside the motion is not rejected for good.
 
     Source: P. W. Holland and R. E. Welsch, *Robust regression using iteratively reweighted least-squares*, 1977.
+
+    Versions
+    --------
+    2
+        It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
     """
+
+    version = 2
 
 
 @register("gm-fgo")
@@ -88,7 +109,14 @@ class GmFgo(_Robust, weighting=piece(TunedMEstimator, weight=geman_mcclure)):
     Version 2: a log that is the last witness beside the motion is not rejected for good.
 
     Source: S. Geman and D. E. McClure, *Statistical methods for tomographic image reconstruction*, 1987.
+
+    Versions
+    --------
+    2
+        It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
     """
+
+    version = 2
 
 
 @register("dcs-fgo")
@@ -103,7 +131,14 @@ class DcsFgo(_Robust, weighting=DynamicCovarianceScaling):
 
     Source: P. Agarwal, G. D. Tipaldi, L. Spinello et al., *Robust map optimization using dynamic covariance scaling*,
     ICRA 2013.
+
+    Versions
+    --------
+    2
+        It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
     """
+
+    version = 2
 
 
 @register("switchable-fgo")
@@ -117,7 +152,14 @@ class SwitchableFgo(_Robust, weighting=SwitchableConstraints):
     Version 2: a log that is the last witness beside the motion is not rejected for good.
 
     Source: N. Sünderhauf and P. Protzel, *Switchable constraints for robust pose graph SLAM*, IROS 2012.
+
+    Versions
+    --------
+    2
+        It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
     """
+
+    version = 2
 
 
 @register("gnc-fgo")
@@ -148,9 +190,11 @@ class GncFgo(
         A satellite that the others contradict is left out without a schedule
         (`simnav.estimators.weightings.sibling_vote`). Where no instrument has channels, the numbers are those of
         version 2.
+    4
+        It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
     """
 
-    version = 3
+    version = 4
 
 
 @register("max-mixture-fgo")
@@ -164,7 +208,14 @@ class MaxMixtureFgo(_Robust, weighting=MaxMixture):
     Version 2: a log that is the last witness beside the motion is not rejected for good.
 
     Source: E. Olson and P. Agarwal, *Inference on networks of mixtures for robust robot mapping*, IJRR 32(7), 2013.
+
+    Versions
+    --------
+    2
+        It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
     """
+
+    version = 2
 
 
 @register("ga-fgo")
@@ -176,7 +227,14 @@ class GaFgo(_Window, weighting=piece(GradientAdaptive, fewest=5)):
 
     Source: M. Guo, B. Wang, L. Wei et al., *Robust INS/GNSS/DVL integrated navigation for MASS based on
     gradient-adaptive factor graph optimization*, 2026.
+
+    Versions
+    --------
+    2
+        It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
     """
+
+    version = 2
 
 
 @register("ga-fgo-paper")
@@ -185,4 +243,11 @@ class GaFgoPaper(SwFgoPaper, weighting=piece(GradientAdaptive, defaults={"preset
 
     Source: M. Guo, B. Wang, L. Wei et al., *Robust INS/GNSS/DVL integrated navigation for MASS based on
     gradient-adaptive factor graph optimization*, 2026.
+
+    Versions
+    --------
+    2
+        It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
     """
+
+    version = 2

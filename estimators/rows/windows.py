@@ -72,9 +72,11 @@ class IaeFgo(Row, solver=_WINDOW, model=Suitable, adaptation=piece(InnovationBas
         times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
         Fixes that see no error of a log at first may see it later. A log without fixes is believed from its second
         failure in one direction on, and a compass while another instrument finds the prediction wrong.
+    4
+        It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
     """
 
-    version = 3
+    version = 4
 
 
 @register("iae-fgo-fixed")
@@ -98,9 +100,11 @@ class IaeFgoFixed(Row, solver=_WINDOW, model=Suitable, adaptation=piece(FixedWin
         times the noise of its datasheet did not explain was taken for the instrument's. Depth sensors are tested, too.
         Fixes that see no error of a log at first may see it later. A log without fixes is believed from its second
         failure in one direction on, and a compass while another instrument finds the prediction wrong.
+    4
+        It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
     """
 
-    version = 3
+    version = 4
 
 
 @register("sw-fgo-paper")

@@ -98,6 +98,7 @@ class FederatedEstimator(KalmanEstimator):
     """
 
     pieces = ("model", "adaptation")
+    sets_aside: ClassVar[bool] = True
     refuses: ClassVar[Mapping[str, str]] = {
         **KalmanEstimator.refuses,
         "iteration": "a local filter corrects its own error, not the reference that is linearised about",

@@ -165,6 +165,7 @@ class SolutionSeparation(Solver):
         Prior probability that an instrument is wrong.
     """
 
+    sets_aside: ClassVar[bool] = True
     pieces: ClassVar[tuple[str, ...]] = ("model",)
     refuses: ClassVar[Mapping[str, str]] = {
         **KalmanEstimator.refuses,

@@ -13,7 +13,7 @@ The horizontal NEES and the coverage are also computed for two parts of a run: b
 affected, and from then on. An estimator may be consistent without faults and inconsistent with them.
 
 An estimator can also test itself. If its measurements contradict its estimate, it sets the diagnostic ``inconsistent``
-to 1. A run in which this diagnostic is 1 for most of the time, or at the end, has the status ``inconsistent``, not
+to 1. A run in which this is so for more than a third of the time, or at the end, has the status ``inconsistent``, not
 ``ok``.
 """
 
@@ -251,8 +251,8 @@ def ending(status: str, scores: Mapping[str, float]) -> str:
     """The final status of a run: the status of its trial, or ``inconsistent``.
 
     A run with the status ``ok`` becomes ``inconsistent`` if the estimator reported the diagnostic ``inconsistent`` for
-    most of the run, or for most of its last tenth, for example after a late fault. This is not a failure: a ranking
-    uses the error of the run as it is, so that an estimator does not lose by the report.
+    more than a third of the run, or for most of its last tenth, for example after a late fault. This is not a failure:
+    a ranking uses the error of the run as it is, so that an estimator does not lose by the report.
 
     Parameters
     ----------
@@ -263,13 +263,13 @@ def ending(status: str, scores: Mapping[str, float]) -> str:
 
     Examples
     --------
-    >>> ending("ok", {"inconsistent": 0.98}), ending("timeout", {}), ending("ok", {"inconsistent": 0.1})
+    >>> ending("ok", {"inconsistent": 0.4}), ending("timeout", {}), ending("ok", {"inconsistent": 0.1})
     ('inconsistent', 'timeout', 'ok')
     >>> ending("ok", {"inconsistent": 0.1, "inconsistent_end": 0.9})
     'inconsistent'
     """
-    reported = max(scores.get("inconsistent", 0.0), scores.get("inconsistent_end", 0.0))
-    return "inconsistent" if status == "ok" and reported > 0.5 else status
+    reported = scores.get("inconsistent", 0.0) > 1.0 / 3.0 or scores.get("inconsistent_end", 0.0) > 0.5
+    return "inconsistent" if status == "ok" and reported else status
 
 
 def badge(nees_by_run: Array, degrees: int = 2) -> Badge:

@@ -8,12 +8,12 @@ import pytest
 from simnav.estimator import make
 from simnav.estimators.adaptations.base import Innovation
 from simnav.estimators.adaptations.innovation_based import FixedWindow, InnovationBased
-from simnav.estimators.adaptations.persistence import Course
 from simnav.estimators.adaptations.prediction import PredictionTest
 from simnav.estimators.adaptations.sage_husa import SageHusa
 from simnav.estimators.adaptations.variational_bayes import VariationalBayes
 from simnav.estimators.algebra.chi_square import normal_quantile
 from simnav.estimators.models.roles import witnesses
+from simnav.estimators.persistence import Course
 from simnav.scenario import load
 from simnav.scoring import score
 from simnav.source import record
