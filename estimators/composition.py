@@ -30,8 +30,9 @@ from typing import Any, ClassVar
 from simnav.estimator import Estimator, Needs, UnsuitableScenario, lacking
 from simnav.estimator.late_arrivals import LateArrivals, Manner, TrueTimes, is_untimely, parts_of, true_times
 from simnav.estimator.parameters import former_names, under_present_names
-from simnav.estimators.fix_test import FixTest
 from simnav.types import Array, Estimate, InitialState, Instruments, Measurements, NavigationStates
+
+from .fix_test import FixTest
 
 if typing.TYPE_CHECKING:
     from simnav.recording import Recording

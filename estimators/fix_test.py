@@ -19,10 +19,11 @@ from typing import NamedTuple
 
 from simnav.compiled import kernel
 from simnav.estimators.algebra.chi_square import chi_square_limits, normal_quantile
-from simnav.estimators.persistence import Course
 from simnav.geometry.earth import radii_scalar
 from simnav.kinds import kinds_with
 from simnav.types import Array, Datasheet, Estimate, Instruments, Measurement, Measurements
+
+from .persistence import Course
 
 __all__ = ["FixTest"]
 

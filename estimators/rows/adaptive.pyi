@@ -30,7 +30,7 @@ class _Adaptive(Row, solver=KalmanEstimator, model=Suitable, iteration=poor_head
 
 @register("sage-husa")
 class SageHusaKf(_Adaptive, adaptation=SageHusa):
-    version = 3
+    version = 4
     def __init__(
         self,
         *,
@@ -47,7 +47,7 @@ class SageHusaKf(_Adaptive, adaptation=SageHusa):
 class SageHusaPaper(
     _Adaptive, adaptation=piece(SageHusa, defaults={"fading": 1.0, "prior": 0, "lowest": 0.5, "scope": "fixes"})
 ):
-    version = 3
+    version = 4
     def __init__(
         self,
         *,
@@ -62,7 +62,7 @@ class SageHusaPaper(
 
 @register("iae")
 class Iae(_Adaptive, adaptation=piece(InnovationBased, source="innovation")):
-    version = 3
+    version = 4
     def __init__(
         self,
         *,
@@ -82,7 +82,7 @@ class Iae(_Adaptive, adaptation=piece(InnovationBased, source="innovation")):
 
 @register("iae-fixed")
 class IaeFixed(_Adaptive, adaptation=piece(FixedWindow, source="innovation")):
-    version = 3
+    version = 4
     formerly = _FORMERLY
     def __init__(
         self,
@@ -100,7 +100,7 @@ class IaeFixed(_Adaptive, adaptation=piece(FixedWindow, source="innovation")):
 
 @register("rae")
 class Rae(_Adaptive, adaptation=piece(FixedWindow, source="residual", newest=False)):
-    version = 3
+    version = 4
     formerly = _FORMERLY
     def __init__(
         self,
@@ -117,7 +117,7 @@ class Rae(_Adaptive, adaptation=piece(FixedWindow, source="residual", newest=Fal
 
 @register("adkf")
 class Adkf(_Adaptive, adaptation=AdaptiveFactor):
-    version = 3
+    version = 4
     def __init__(
         self,
         *,
@@ -133,6 +133,7 @@ class Adkf(_Adaptive, adaptation=AdaptiveFactor):
 
 @register("adkf-paper")
 class AdkfPaper(_Adaptive, adaptation=piece(AdaptiveFactor, preset="paper", c0=None, c1=None, together=0)):
+    version = 2
     def __init__(
         self,
         *,
@@ -144,6 +145,7 @@ class AdkfPaper(_Adaptive, adaptation=piece(AdaptiveFactor, preset="paper", c0=N
 
 @register("adkf-23")
 class Adkf23(Row, solver=KalmanEstimator, model=DvlCalibrationModel, adaptation=AdaptiveFactor, iteration=poor_heading):
+    version = 2
     def __init__(
         self,
         *,
@@ -162,7 +164,7 @@ class Adkf23(Row, solver=KalmanEstimator, model=DvlCalibrationModel, adaptation=
 
 @register("igg3")
 class Igg3(_Adaptive, adaptation=Igg3Weights):
-    version = 3
+    version = 4
     def __init__(
         self,
         *,
@@ -173,7 +175,7 @@ class Igg3(_Adaptive, adaptation=Igg3Weights):
 
 @register("huber-kf")
 class HuberKf(_Adaptive, adaptation=HuberWeights):
-    version = 3
+    version = 4
     def __init__(
         self,
         *,
@@ -183,7 +185,7 @@ class HuberKf(_Adaptive, adaptation=HuberWeights):
 
 @register("gated-ekf")
 class GatedEkf(_Adaptive, adaptation=ChiSquareGate):
-    version = 3
+    version = 4
     def __init__(
         self,
         *,
@@ -194,6 +196,7 @@ class GatedEkf(_Adaptive, adaptation=ChiSquareGate):
 
 @register("fading-ekf")
 class FadingEkf(_Adaptive, adaptation=FadingMemory):
+    version = 2
     def __init__(
         self,
         *,
@@ -203,7 +206,7 @@ class FadingEkf(_Adaptive, adaptation=FadingMemory):
 
 @register("vb-akf")
 class VbAkf(_Adaptive, adaptation=VariationalBayes):
-    version = 3
+    version = 4
     def __init__(
         self,
         *,
@@ -218,7 +221,7 @@ class VbAkf(_Adaptive, adaptation=VariationalBayes):
 
 @register("mckf")
 class Mckf(_Adaptive, adaptation=piece(MaximumCorrentropy, smallest=1e-3)):
-    version = 3
+    version = 4
     def __init__(
         self,
         *,
@@ -230,7 +233,7 @@ class Mckf(_Adaptive, adaptation=piece(MaximumCorrentropy, smallest=1e-3)):
 
 @register("imm")
 class Imm(Row, solver=ImmEstimator, model=Suitable):
-    version = 3
+    version = 4
     def __init__(
         self,
         *,

@@ -12,7 +12,7 @@ __all__ = ["AnfisEkf", "AnfisFgo", "AnfisFgoMotion"]
 
 @register("anfis-fgo")
 class AnfisFgo(ShipFgo, adaptation=Anfis):
-    version = 2
+    version = 3
     def __init__(
         self,
         *,
@@ -35,7 +35,7 @@ class AnfisFgo(ShipFgo, adaptation=Anfis):
 
 @register("anfis-fgo-motion")
 class AnfisFgoMotion(ShipFgo, adaptation=piece(Anfis, features="motion")):
-    version = 2
+    version = 3
     def __init__(
         self,
         *,
@@ -57,7 +57,7 @@ class AnfisFgoMotion(ShipFgo, adaptation=piece(Anfis, features="motion")):
 
 @register("anfis-ekf")
 class AnfisEkf(ShipEkf, adaptation=Anfis):
-    version = 2
+    version = 3
     def __init__(
         self,
         *,

@@ -25,7 +25,7 @@ class HeadingBankEkf(Row, solver=HeadingBank, model=Suitable):
 
 @register("solution-separation")
 class SolutionSeparationEkf(Row, solver=SolutionSeparation, model=Suitable):
-    version = 2
+    version = 3
     def __init__(
         self,
         *,
@@ -47,7 +47,7 @@ class MidValue(
     isolation=FaultIsolation,
     iteration=poor_heading,
 ):
-    version = 2
+    version = 3
     def __init__(
         self,
         *,

@@ -44,6 +44,7 @@ class _Robust(_Window, isolation=FaultIsolation):
 
 @register("huber-fgo")
 class HuberFgo(_Robust, weighting=piece(TunedMEstimator, weight=huber)):
+    version = 2
     def __init__(
         self,
         *,
@@ -60,6 +61,7 @@ class HuberFgo(_Robust, weighting=piece(TunedMEstimator, weight=huber)):
 
 @register("tukey-fgo")
 class TukeyFgo(_Robust, weighting=piece(TunedMEstimator, weight=tukey)):
+    version = 2
     def __init__(
         self,
         *,
@@ -76,6 +78,7 @@ class TukeyFgo(_Robust, weighting=piece(TunedMEstimator, weight=tukey)):
 
 @register("cauchy-fgo")
 class CauchyFgo(_Robust, weighting=piece(TunedMEstimator, weight=cauchy)):
+    version = 2
     def __init__(
         self,
         *,
@@ -92,6 +95,7 @@ class CauchyFgo(_Robust, weighting=piece(TunedMEstimator, weight=cauchy)):
 
 @register("gm-fgo")
 class GmFgo(_Robust, weighting=piece(TunedMEstimator, weight=geman_mcclure)):
+    version = 2
     def __init__(
         self,
         *,
@@ -108,6 +112,7 @@ class GmFgo(_Robust, weighting=piece(TunedMEstimator, weight=geman_mcclure)):
 
 @register("dcs-fgo")
 class DcsFgo(_Robust, weighting=DynamicCovarianceScaling):
+    version = 2
     def __init__(
         self,
         *,
@@ -125,6 +130,7 @@ class DcsFgo(_Robust, weighting=DynamicCovarianceScaling):
 
 @register("switchable-fgo")
 class SwitchableFgo(_Robust, weighting=SwitchableConstraints):
+    version = 2
     def __init__(
         self,
         *,
@@ -145,7 +151,7 @@ class GncFgo(
     solver=piece(WindowEstimator, defaults={"tolerance": 0.05, "iterations": 15}, every_sample=False),
     weighting=GraduatedNonConvexity,
 ):
-    version = 3
+    version = 4
     def __init__(
         self,
         *,
@@ -164,6 +170,7 @@ class GncFgo(
 
 @register("max-mixture-fgo")
 class MaxMixtureFgo(_Robust, weighting=MaxMixture):
+    version = 2
     def __init__(
         self,
         *,
@@ -180,6 +187,7 @@ class MaxMixtureFgo(_Robust, weighting=MaxMixture):
 
 @register("ga-fgo")
 class GaFgo(_Window, weighting=piece(GradientAdaptive, fewest=5)):
+    version = 2
     def __init__(
         self,
         *,
@@ -196,6 +204,7 @@ class GaFgo(_Window, weighting=piece(GradientAdaptive, fewest=5)):
 
 @register("ga-fgo-paper")
 class GaFgoPaper(SwFgoPaper, weighting=piece(GradientAdaptive, defaults={"preset": "paper"}, fewest=5)):
+    version = 2
     def __init__(
         self,
         *,

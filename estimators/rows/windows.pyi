@@ -54,7 +54,7 @@ class FgoFull(Row, solver=FullGraph, model=InertialModel):
 
 @register("iae-fgo")
 class IaeFgo(Row, solver=_WINDOW, model=Suitable, adaptation=piece(InnovationBased, source="innovation")):
-    version = 3
+    version = 4
     def __init__(
         self,
         *,
@@ -77,7 +77,7 @@ class IaeFgo(Row, solver=_WINDOW, model=Suitable, adaptation=piece(InnovationBas
 
 @register("iae-fgo-fixed")
 class IaeFgoFixed(Row, solver=_WINDOW, model=Suitable, adaptation=piece(FixedWindow, source="innovation")):
-    version = 3
+    version = 4
     def __init__(
         self,
         *,
