@@ -199,7 +199,7 @@ class NavigationEnv(ChartedEnv[Observation, Array]):
             raise ValueError(f"scenario {self.scenario.id}: the run is shorter than one step")
         self._begin_chart(self.scenario.id, self._source.duration)
         info = {"seed": seed, "start": start, "instruments": self._source.instruments, "note": note}
-        return self._observation(), self._reveal(info)
+        return _copied(self._observation()), self._reveal(info)
 
     def step(self, action: Array) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Give the estimate for the last observation; return its reward and the next observation.
@@ -216,7 +216,12 @@ class NavigationEnv(ChartedEnv[Observation, Array]):
         gymnasium.error.ResetNeeded
             If the run is over or has not begun.
         """
-        estimate = checked_action(action)
+        observation, *outcome = self.step_from(checked_action(action))
+        # Copies: a view would lead to the measurements of the steps to come, by its base.
+        return (_copied(observation), *outcome)
+
+    def step_from(self, estimate: list[float]) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
+        """As `step`, for the nine numbers of a checked action; the observation may be views of longer arrays."""
         stretch = self._stretch
         if stretch is None:
             raise gymnasium.error.ResetNeeded("no run is under way: call reset() first")
@@ -273,12 +278,12 @@ class NavigationEnv(ChartedEnv[Observation, Array]):
     def _observation(self) -> Observation:
         stretch, i = self._stretch, self._row
         assert stretch is not None
-        # Copies: a view would lead to the measurements of the steps to come, by its base.
-        observation: Observation = {"interval": stretch.intervals[i].copy()}
+        observation: Observation = {"interval": stretch.intervals[i]}
         for name, columns in stretch.columns.items():
-            observation[name] = {key: array[i].copy() for key, array in columns.items()}
-        for name in self._most.keys() - stretch.columns.keys():  # instruments that other runs of the scenario have
-            observation[name] = self._nothing(name)
+            observation[name] = {key: array[i] for key, array in columns.items()}
+        if len(stretch.columns) < len(self._most):
+            for name in self._most.keys() - stretch.columns.keys():  # instruments that other runs of the scenario have
+                observation[name] = self._nothing(name)
         return observation
 
     def _empty(self, time: float) -> Observation:
@@ -321,6 +326,14 @@ class NavigationEnv(ChartedEnv[Observation, Array]):
             chart.add_fixes(position, faulty)
         chart.add(float(stretch.intervals[i, 1]), stretch.truth[i, 0], np.array(estimate[:3]))
         self._show()
+
+
+def _copied(observation: Observation) -> Observation:
+    """The observation in arrays of its own."""
+    return {
+        name: {key: array.copy() for key, array in entry.items()} if isinstance(entry, dict) else entry.copy()
+        for name, entry in observation.items()
+    }
 
 
 def _open(scenario: Scenario, seed: int) -> tuple[Any, str]:

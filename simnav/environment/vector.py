@@ -202,18 +202,21 @@ class NavigationVectorEnv(VectorEnv[Observation, Array, NDArray[Any]]):
             raise gymnasium.error.ResetNeeded("all runs are over or have not begun: call reset() first")
         if len(actions) != self.num_envs:
             raise ValueError(f"actions are an ({self.num_envs}, 3, 3) array, one for each run, not {len(actions)}")
+        estimates: dict[int, list[float]] = {}
         for i in np.flatnonzero(~self._over).tolist():
             try:
-                checked_action(actions[i])
+                estimates[i] = checked_action(actions[i])
             except ValueError as error:
                 raise ValueError(f"run {i}: {error}") from None
         rewards, truncated = np.zeros(self.num_envs), np.zeros(self.num_envs, dtype=bool)
         infos: dict[str, Any] = {}
         for i, env in enumerate(self.envs):
-            if not self._over[i]:
-                self._last[i], rewards[i], _, truncated[i], info = env.step(actions[i])
-                self._over[i] = truncated[i]
-                if truncated[i] and self.autoreset_mode == AutoresetMode.SAME_STEP:
+            if i in estimates:
+                # Views of a longer array; `_batch` copies them.
+                self._last[i], rewards[i], _, over, info = env.step_from(estimates[i])
+                if over:
+                    truncated[i] = self._over[i] = True
+                if over and self.autoreset_mode == AutoresetMode.SAME_STEP:
                     info = {**info, "final_obs": self._last[i], "final_info": info}
                     self._last[i], first = env.reset()
                     info, self._over[i] = {**info, **first}, False
