@@ -155,6 +155,7 @@ class NavigationEnv(ChartedEnv[Observation, Array]):
         self._source: Any = None
         self._stretch: Stretch | None = None
         self._runs: SteppedRuns | None = None
+        self._number = 0  # of the run in these
         self._row = 0
         self._size = _FIRST_STRETCH
         self._steps = 0  # steps that the source has been advanced by
@@ -270,7 +271,7 @@ class NavigationEnv(ChartedEnv[Observation, Array]):
         self._steps += 1
         stretch = self._stretch
         if not isinstance(stretch, LiveStretch) or len(stretch.rows) == stretch.LENGTH:
-            self._stretch = stretch = LiveStretch(runs, self._most, self._widths, self._sides)
+            self._stretch = stretch = LiveStretch(runs, self._number, self._most, self._widths, self._sides)
         self._row = len(stretch.rows)
         stretch.advance()
         return True

@@ -18,9 +18,7 @@ if TYPE_CHECKING:
     from simnav.recording import AidStream, Block
     from simnav.simulation.steps import SteppedRuns
 
-__all__ = ["LiveStretch", "Stretch", "horizontal", "pack", "rows_of"]
-
-_ON = np.ones(1, np.bool_)
+__all__ = ["LiveStretch", "Stretch", "crowded", "entries", "horizontal", "keep", "pack", "padded", "rows_of"]
 
 
 @dataclass(eq=False)
@@ -78,69 +76,98 @@ def _row(latitude: float, longitude: float, height: float, heading: float, out: 
 
 
 @kernel(
-    "i8(i8, f8[:, ::1], Tuple((i8[::1], f8[:, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, :, ::1])), "
-    "Tuple((i8[::1], i8[:, ::1], f8[:, ::1], f8[:, :, ::1])), UniTuple(i8[::1], 2), "
+    "i8(UniTuple(i8[::1], 2), f8[:, ::1], Tuple((i8[::1], f8[:, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, :, ::1])), "
+    "Tuple((i8[::1], i8[:, ::1], f8[:, ::1], f8[:, :, ::1])), UniTuple(i8[:, ::1], 2), "
     "Tuple((f8[:, ::1], f8[:, ::1], i1[:, ::1], f8[:, :, ::1], f8[:, :, ::1])), "
     "Tuple((f8[:, :, ::1], i1[:, :, ::1], f8[:, :, :, ::1])), f8[:, :, ::1], f8[:, ::1])"
 )
-def _keep(
-    row: int, truth: Array, imu: tuple[Integers, Array, Array, Array, Array],
+def keep(
+    which: tuple[Integers, Integers], truth: Array, imu: tuple[Integers, Array, Array, Array, Array],
     delivered: tuple[Integers, Integers, Array, Array], slots: tuple[Integers, Integers],
     samples: tuple[Array, Array, NDArray[np.int8], Array, Array], aids: tuple[Array, NDArray[np.int8], Array],
     states: Array, rows: Array,
 ) -> int:  # fmt: skip
-    """Put the last step of a run into a row of padded arrays.
+    """Put the last step of each of q runs into a row of padded arrays.
 
-    Return -1, or the number of the first instrument with too many measurements.
+    Return -1, or the number of the first run with too many measurements of an instrument, times the length of a row of
+    ``slots``, plus the number of the instrument.
 
     Parameters
     ----------
-    row : int
-        Number of the row.
-    truth : (1, 9) array
-        Position, velocity and attitude at the end of the step.
+    which : two (q,) int arrays
+        Number of each run, and of its row.
+    truth : (b, 9) array
+        Position, velocity and attitude at the end of the step, of b runs.
     imu : tuple
         ``samples``, ``imu_time``, ``imu_interval``, ``rate`` and ``force`` of `simnav.simulation.steps.SteppedRuns`.
     delivered : tuple
         ``count``, ``who``, ``when`` and ``value`` of the same.
-    slots : two (i,) int arrays
+    slots : two (b, i) int arrays
         For each of i instruments: its number in the padded arrays, and its largest number of measurements in a step.
+        No measurements are put there if i is zero.
     samples : tuple of (S, K, ...) arrays
-        Times, intervals, validity, angular rates and specific forces of at most K IMU samples in S steps; overwritten.
+        Times, intervals, validity, angular rates and specific forces of at most K IMU samples in S rows; overwritten.
         No samples are put there if K is zero.
     aids : (S, A, K), (S, A, K), (S, A, K, 3) arrays
-        Times [s], validity (0 or 1) and values of at most K measurements of A instruments in S steps; overwritten.
+        Times [s], validity (0 or 1) and values of at most K measurements of A instruments in S rows; overwritten.
     states : (S, 3, 3) array
         Overwritten with the truth.
-    rows : (1, 6) array
-        Overwritten with the row of `rows_of`.
+    rows : (q, 6) array
+        Overwritten with the row of `rows_of` of each run.
     """
-    for i in range(3):
-        for j in range(3):
-            states[row, i, j] = truth[0, 3 * i + j]
-    _row(truth[0, 0], truth[0, 1], truth[0, 2], truth[0, 8], rows[0])
     number, imu_time, imu_interval, rate, force = imu
     time, length, valid, angular_rate, specific_force = samples
-    if time.shape[1] > 0:
-        for k in range(number[0]):
-            time[row, k], length[row, k], valid[row, k] = imu_time[0, k], imu_interval[0, k], 1
-            for j in range(3):
-                angular_rate[row, k, j], specific_force[row, k, j] = rate[0, k, j], force[0, k, j]
     count, who, when, value = delivered
     times, there, values = aids
     place, most = slots
-    for m in range(count[0] if place.size > 0 else 0):
-        n: int = who[0, m]
-        a = place[n]
-        k = 0
-        while k < most[n] and there[row, a, k]:
-            k += 1
-        if k == most[n]:
-            return n
-        times[row, a, k], there[row, a, k] = when[0, m], 1
-        for j in range(3):
-            values[row, a, k, j] = value[0, m, j]
+    for q in range(which[0].size):
+        b, row = which[0][q], which[1][q]
+        for i in range(3):
+            for j in range(3):
+                states[row, i, j] = truth[b, 3 * i + j]
+        _row(truth[b, 0], truth[b, 1], truth[b, 2], truth[b, 8], rows[q])
+        if time.shape[1] > 0:
+            for k in range(number[b]):
+                time[row, k], length[row, k], valid[row, k] = imu_time[b, k], imu_interval[b, k], 1
+                for j in range(3):
+                    angular_rate[row, k, j], specific_force[row, k, j] = rate[b, k, j], force[b, k, j]
+        for m in range(count[b] if place.shape[1] > 0 else 0):
+            n: int = who[b, m]
+            a = place[b, n]
+            k = 0
+            while k < most[b, n] and there[row, a, k]:
+                k += 1
+            if k == most[b, n]:
+                return b * place.shape[1] + n
+            times[row, a, k], there[row, a, k] = when[b, m], 1
+            for j in range(3):
+                values[row, a, k, j] = value[b, m, j]
     return -1
+
+
+def padded(steps: int, names: Sequence[str], most: Mapping[str, int]) -> tuple[Any, Any]:
+    """The arrays ``samples`` and ``aids`` of `keep` for so many rows, empty."""
+    s, imu, room = steps, int(most.get("imu", 0)), max((most[name] for name in names), default=0)
+    samples = (
+        np.zeros((s, imu)), np.zeros((s, imu)), np.zeros((s, imu), np.int8), np.zeros((s, imu, 3)),
+        np.zeros((s, imu, 3)),
+    )  # fmt: skip
+    aids = np.zeros((s, len(names), room)), np.zeros((s, len(names), room), np.int8), np.zeros((s, len(names), room, 3))
+    return samples, aids
+
+
+def entries(samples: Any, aids: Any, widths: Sequence[tuple[str, int, int]]) -> dict[str, dict[str, NDArray[Any]]]:
+    """The arrays of `padded` by instrument and name; ``widths``: name, most measurements and components of each."""
+    columns: dict[str, dict[str, NDArray[Any]]] = {}
+    if samples[0].shape[1]:
+        when, length, there, rate, force = samples
+        columns["imu"] = {
+            "time": when, "valid": there, "length": length, "angular_rate": rate, "specific_force": force,
+        }  # fmt: skip
+    time, valid, values = aids
+    for a, (name, k, d) in enumerate(widths):
+        columns[name] = {"time": time[:, a, :k], "valid": valid[:, a, :k], "value": values[:, a, :k, :d]}
+    return columns
 
 
 class LiveStretch(Stretch):
@@ -149,7 +176,9 @@ class LiveStretch(Stretch):
     Parameters
     ----------
     runs : SteppedRuns
-        The run.
+        The run, and others.
+    b : int
+        Number of the run.
     most, widths : mapping of str to int
         For each instrument, the largest number of its readings in one step and their number of components.
     sides : mapping of str to int
@@ -159,40 +188,35 @@ class LiveStretch(Stretch):
     #: Most steps.
     LENGTH = 64
 
-    def __init__(self, runs: SteppedRuns, most: Mapping[str, int], widths: Mapping[str, int], sides: Mapping[str, int]):
-        s, imu = self.LENGTH, int(most.get("imu", 0))
-        names = [name for name in most if name != "imu"]
-        room = max((most[name] for name in names), default=0)
-        time, values = np.zeros((s, len(names), room)), np.zeros((s, len(names), room, 3))
-        self._arrays = (time, np.zeros((s, len(names), room), np.int8), values)
+    def __init__(
+        self,
+        runs: SteppedRuns,
+        b: int,
+        most: Mapping[str, int],
+        widths: Mapping[str, int],
+        sides: Mapping[str, int],
+    ):
+        s, names = self.LENGTH, [name for name in most if name != "imu"]
+        self._samples, self._arrays = padded(s, names, most)
         self._aids = [(name, most[name], widths[name]) for name in names]
         self._sides = {name: np.zeros((s, most[name], width)) for name, width in sides.items()}
-        columns: dict[str, dict[str, NDArray[Any]]] = {}
-        self._samples = (
-            np.zeros((s, imu)), np.zeros((s, imu)), np.zeros((s, imu), np.int8), np.zeros((s, imu, 3)),
-            np.zeros((s, imu, 3)),
-        )  # fmt: skip
         self._one, nothing = np.zeros((1, 6)), np.zeros((1, 0))
-        self._none = np.zeros(1, np.int64), nothing, nothing, nothing[..., None], nothing[..., None]
-        super().__init__(np.zeros((s, 2)), columns, np.zeros((s, 3, 3)), [], {}, {})
+        self._none = np.zeros(b + 1, np.int64), nothing, nothing, nothing[..., None], nothing[..., None]
+        super().__init__(np.zeros((s, 2)), {}, np.zeros((s, 3, 3)), [], {}, {})
         self._share_columns()
-        own = runs.names[0]
-        self._runs = runs
-        self._place = np.array([] if sides else [names.index(name) for name in own], np.int64)
-        self._most = np.array([most[name] for name in own], np.int64)
+        own = runs.names[b]
+        self._runs, self._b, self._on = runs, b, np.arange(runs.n) == b
+        self._which = np.array([b]), np.zeros(1, np.int64)
+        self._slots = np.zeros((2, b + 1, 0 if sides else len(own)), np.int64)
+        if not sides:
+            self._slots[:, b] = [names.index(name) for name in own], [most[name] for name in own]
 
     def _share_columns(self) -> None:
         """The columns are the arrays that `advance` fills, and views of them."""
-        if self._samples[0].size:
-            when, length, there, rate, force = self._samples
-            self.columns["imu"] = {
-                "time": when, "valid": there, "length": length, "angular_rate": rate, "specific_force": force,
-            }  # fmt: skip
-        time, valid, values = self._arrays
-        for a, (name, k, d) in enumerate(self._aids):
-            self.columns[name] = {"time": time[:, a, :k], "valid": valid[:, a, :k], "value": values[:, a, :k, :d]}
-            if name in self._sides and self._sides[name].shape[2]:
-                self.columns[name]["side"] = self._sides[name]
+        self.columns.update(entries(self._samples, self._arrays, self._aids))
+        for name, side in self._sides.items():
+            if side.shape[2]:
+                self.columns[name]["side"] = side
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
@@ -206,28 +230,25 @@ class LiveStretch(Stretch):
         ValueError
             If an instrument delivers more samples than the rate of its datasheet allows.
         """
-        runs, i = self._runs, len(self.rows)
-        runs.advance(_ON)
-        self.intervals[i] = runs.interval_of(0)
+        runs, b, i = self._runs, self._b, len(self.rows)
+        runs.advance(self._on)
+        self.intervals[i] = runs.interval_of(b)
         imu: Any = self._none
         if "imu" in self.columns:
             imu = runs.samples, runs.imu_time, runs.imu_interval, runs.rate, runs.force
         delivered = runs.count, runs.who, runs.when, runs.value
-        row, aids = self._one, self._arrays
-        slots = self._place, self._most
-        many = _keep(i, runs.truth, imu, delivered, slots, self._samples, aids, self.truth, row)
+        self._which[1][0] = i
+        slots, row, aids = (self._slots[0], self._slots[1]), self._one, self._arrays
+        many = keep(self._which, runs.truth, imu, delivered, slots, self._samples, aids, self.truth, row)
         self.rows += row.tolist()
         if self._sides:  # a run with channels has only the block form
             self._place_slots(i)
         elif many >= 0:
-            raise ValueError(
-                f"{runs.names[0][many]} delivered more than {self._most[many]} samples in one step at "
-                f"{self.intervals[i, 1]:.3f} s, which is what its datasheet's rate allows"
-            )
+            raise crowded(runs, slots, many)
 
     def _place_slots(self, i: int) -> None:
         """Put the measurements of the last step, those of channels in their slots, into a row of the arrays."""
-        streams = self._runs.streams(0)
+        streams = self._runs.streams(self._b)
         for name, entry in self.columns.items():
             if name in streams:
                 stream = streams[name]
@@ -242,10 +263,19 @@ class LiveStretch(Stretch):
 
     def fixes(self, i: int) -> Iterator[tuple[Array, NDArray[np.bool_]]]:
         """See `Stretch.fixes`. It works for the last simulated step only."""
-        runs = self._runs
-        for j, who in enumerate(runs.who[0, : runs.count[0]].tolist()):
-            if _draws(runs.kinds[0][who]):
-                yield runs.value[0, j : j + 1, :2].copy(), runs.faults[0, j : j + 1] != 0
+        runs, b = self._runs, self._b
+        for j, who in enumerate(runs.who[b, : runs.count[b]].tolist()):
+            if _draws(runs.kinds[b][who]):
+                yield runs.value[b, j : j + 1, :2].copy(), runs.faults[b, j : j + 1] != 0
+
+
+def crowded(runs: SteppedRuns, slots: tuple[Integers, Integers], found: int) -> ValueError:
+    """The error that `keep` found: an instrument delivered more than its datasheet allows."""
+    b, i = divmod(found, slots[0].shape[1])
+    return ValueError(
+        f"{runs.names[b][i]} delivered more than {slots[1][b, i]} samples in one step at "
+        f"{runs.interval_of(b)[1]:.3f} s, which is what its datasheet's rate allows"
+    )
 
 
 def _slots(
