@@ -155,6 +155,7 @@ class NavigationEnv(ChartedEnv[Observation, Array]):
         self._source: Any = None
         self._stretch: Stretch | None = None
         self._runs: SteppedRuns | None = None
+        self._shared: SteppedRuns | None = None
         self._number = 0  # of the run in these
         self._row = 0
         self._size = _FIRST_STRETCH
@@ -194,8 +195,8 @@ class NavigationEnv(ChartedEnv[Observation, Array]):
             self._source.steer_by(*horizontal(start.position.tolist(), row), heading)
             from simnav.simulation.steps import SteppedRuns
 
-            self._runs = SteppedRuns(1)
-            self._runs.begin(0, self._source)
+            self._runs = SteppedRuns(1) if self._shared is None else self._shared
+            self._runs.begin(self._number, self._source)
         if not self._load():
             raise ValueError(f"scenario {self.scenario.id}: the run is shorter than one step")
         self._begin_chart(self.scenario.id, self._source.duration)
@@ -237,10 +238,32 @@ class NavigationEnv(ChartedEnv[Observation, Array]):
         if self._row < len(stretch.rows) or self._load():
             return self._observation(), reward, False, False, self._reveal({})
         last = self._row - 1
-        observation = self._empty(float(stretch.intervals[last, 1]))
+        observation = self.empty(float(stretch.intervals[last, 1]))
         info = {"truth": stretch.truth[last].copy()} if self.reveal_truth else {}
         self._stretch = None
         return observation, reward, False, True, info
+
+    @property
+    def plain(self) -> bool:
+        """Whether the reward is the usual one, and no instrument has channels."""
+        return self._weights is None and not self._sides
+
+    @property
+    def layout(self) -> tuple[list[str], dict[str, int], list[tuple[str, int, int]]]:
+        """The aiding instruments of any run; most samples of each and of the IMU; name, most samples and components."""
+        names = [name for name in self._most if name != "imu"]
+        return names, self._most, [(name, self._most[name], self._widths[name]) for name in names]
+
+    def share(self, runs: SteppedRuns, number: int) -> None:
+        """Begin the next runs in closed loop among others, under a number."""
+        self._shared, self._number = runs, number
+
+    def hand_over(self) -> tuple[list[float], int]:
+        """Leave a run that has just begun to whom it is shared with: its row of `Stretch.rows`, and the steps left."""
+        assert self._stretch is not None
+        row, left = self._stretch.rows[0], int(self._source.duration / self._source.step + 1e-6) - self._steps
+        self._stretch = None
+        return row, left
 
     def _forget(self) -> None:
         self._source = self._stretch = self._runs = None
@@ -287,7 +310,8 @@ class NavigationEnv(ChartedEnv[Observation, Array]):
                 observation[name] = self._nothing(name)
         return observation
 
-    def _empty(self, time: float) -> Observation:
+    def empty(self, time: float) -> Observation:
+        """An observation without measurements at a time [s]."""
         observation: Observation = {name: self._nothing(name) for name in self._most}
         observation["interval"] = np.array([time, time])
         return observation

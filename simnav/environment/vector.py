@@ -19,6 +19,7 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from simnav.environment.navigation import NavigationEnv, Observation, checked_action
+from simnav.environment.steered import SteeredRuns
 from simnav.types import Array
 
 if TYPE_CHECKING:
@@ -140,7 +141,9 @@ class NavigationVectorEnv(VectorEnv[Observation, Array, NDArray[Any]]):
         self.single_action_space = first.action_space
         self.observation_space = batch_space(first.observation_space, num_envs)
         self.action_space = batch_space(first.action_space, num_envs)
-        self._last: list[Observation] = []
+        self._steered = SteeredRuns(self.envs) if SteeredRuns.suits(first) else None
+        # Each run's last observation; None where it is a row of those of `SteeredRuns`.
+        self._last: list[Observation | None] = []
         self._over = np.ones(num_envs, dtype=bool)
 
     def reset(
@@ -178,7 +181,7 @@ class NavigationVectorEnv(VectorEnv[Observation, Array, NDArray[Any]]):
         self._last = self._last or [{} for _ in self.envs]
         infos: dict[str, Any] = {}
         for i in np.flatnonzero(mask).tolist():
-            self._last[i], info = self.envs[i].reset(seed=seeds[i])
+            self._last[i], info = self._begin(i, seeds[i])
             infos = self._add_info(infos, info, i)
         self._over[mask] = False
         return self._batch(), infos
@@ -210,18 +213,24 @@ class NavigationVectorEnv(VectorEnv[Observation, Array, NDArray[Any]]):
                 raise ValueError(f"run {i}: {error}") from None
         rewards, truncated = np.zeros(self.num_envs), np.zeros(self.num_envs, dtype=bool)
         infos: dict[str, Any] = {}
+        going = None if self._steered is None else self._steer(self._steered, estimates, rewards)
         for i, env in enumerate(self.envs):
             if i in estimates:
-                # Views of a longer array; `_batch` copies them.
-                self._last[i], rewards[i], _, over, info = env.step_from(estimates[i])
+                over, info = False, {}
+                if self._steered is None:
+                    # Views of a longer array; `_batch` copies them.
+                    self._last[i], rewards[i], _, over, info = env.step_from(estimates[i])
+                elif going is not None:
+                    over = not going[i]
+                    self._last[i] = self._steered.last(i) if over else None
                 if over:
                     truncated[i] = self._over[i] = True
                 if over and self.autoreset_mode == AutoresetMode.SAME_STEP:
                     info = {**info, "final_obs": self._last[i], "final_info": info}
-                    self._last[i], first = env.reset()
+                    self._last[i], first = self._begin(i, None)
                     info, self._over[i] = {**info, **first}, False
             elif self.autoreset_mode == AutoresetMode.NEXT_STEP:
-                self._last[i], info = env.reset()
+                self._last[i], info = self._begin(i, None)
                 self._over[i] = False
             else:
                 truncated[i] = True
@@ -239,15 +248,44 @@ class NavigationVectorEnv(VectorEnv[Observation, Array, NDArray[Any]]):
         for env in self.envs:
             env.close()
 
+    def _begin(self, i: int, seed: int | None) -> tuple[Observation, dict[str, Any]]:
+        """Begin a run; its first observation, and its info."""
+        return self.envs[i].reset(seed=seed) if self._steered is None else self._steered.begin(i, seed)
+
+    def _steer(self, runs: SteeredRuns, estimates: dict[int, list[float]], rewards: Array) -> NDArray[np.bool_]:
+        """Steer all vessels and advance their runs; which are not at their end."""
+        steered = np.zeros(self.num_envs, dtype=bool)
+        for i, estimate in estimates.items():
+            rewards[i], steered[i] = runs.steer(i, estimate), True
+        return runs.advance(steered)
+
     def _batch(self) -> Observation:
         """Stack the runs' last observations; always new arrays."""
+        last = [o for o in self._last if o is not None]
+        if self._steered is not None and len(last) < self.num_envs:
+            return self._rows_of(self._steered.observation)
         batch: Observation = {}
-        for name, entry in self._last[0].items():
+        for name, entry in last[0].items():
             if isinstance(entry, dict):
-                batch[name] = {key: _stacked([o[name][key] for o in self._last]) for key in entry}
+                batch[name] = {key: _stacked([o[name][key] for o in last]) for key in entry}
             else:
-                batch[name] = _stacked([o[name] for o in self._last])
+                batch[name] = _stacked([o[name] for o in last])
         return batch
+
+    def _rows_of(self, batch: Observation) -> Observation:
+        """Copies of common arrays, with the observations that are not in them."""
+        out: Observation = {
+            name: {key: array.copy() for key, array in entry.items()} if isinstance(entry, dict) else entry.copy()
+            for name, entry in batch.items()
+        }
+        for i, one in enumerate(self._last):
+            for name, entry in () if one is None else one.items():
+                if isinstance(entry, dict):
+                    for key, array in entry.items():
+                        out[name][key][i] = array
+                else:
+                    out[name][i] = entry
+        return out
 
 
 def _stacked(arrays: list[NDArray[Any]]) -> NDArray[Any]:

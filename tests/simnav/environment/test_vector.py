@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import gymnasium
 import numpy as np
 import pytest
@@ -78,14 +80,17 @@ def test_an_integer_seed_is_what_gymnasium_makes_of_it_or_spawns(scenario):
     assert infos["seed"].tolist() == spawn_seeds(1, 4)
 
 
-@pytest.mark.parametrize("mode", ["NEXT_STEP", "SAME_STEP"])
-def test_a_run_that_is_over_begins_anew_as_in_gymnasiums_own_vector_form(scenario, mode):
-    envs = NavigationVectorEnv(scenario, 2, autoreset_mode=mode)
-    theirs = SyncVectorEnv([lambda: NavigationEnv(scenario)] * 2, autoreset_mode=AutoresetMode[mode])
+@pytest.mark.parametrize("closed_loop", [False, True], ids=["open loop", "closed loop"])
+@pytest.mark.parametrize("mode", ["NEXT_STEP", "SAME_STEP", "DISABLED"])
+def test_a_run_that_is_over_begins_anew_as_in_gymnasiums_own_vector_form(scenario, mode, closed_loop):
+    envs = NavigationVectorEnv(scenario, 2, autoreset_mode=mode, closed_loop=closed_loop)
+    single = partial(NavigationEnv, scenario, closed_loop=closed_loop)
+    theirs = SyncVectorEnv([single] * 2, autoreset_mode=AutoresetMode[mode])
     batch, infos = envs.reset(seed=7)
     other, _ = theirs.reset(seed=7)
     actions = start_of(infos)
-    for _ in range(15):
+    actions[:, 0, 0] += [2e-6, -1e-6]  # a wrong estimate takes a vessel that steers by it off its track
+    for _ in range(12 if mode == "DISABLED" else 15):
         for i in range(2):
             assert_run(
                 batch, i, {k: v[i] if k == "interval" else {n: a[i] for n, a in v.items()} for k, v in other.items()}
@@ -95,11 +100,15 @@ def test_a_run_that_is_over_begins_anew_as_in_gymnasiums_own_vector_form(scenari
         np.testing.assert_array_equal(rewards, expected[0])
         np.testing.assert_array_equal(truncated, expected[2])
         assert ("final_obs" in infos) == ("final_obs" in others)
+        for i in np.flatnonzero(truncated if mode == "SAME_STEP" else []):
+            assert_run({k: {n: [a] for n, a in v.items()} if isinstance(v, dict) else [v]
+                        for k, v in infos["final_obs"][i].items()}, 0, others["final_obs"][i])  # fmt: skip
         assert infos.get("seed", np.zeros(2)).tolist() == others.get("seed", np.zeros(2)).tolist()
 
 
-def test_a_mask_begins_some_runs_anew_and_the_others_go_on(scenario):
-    envs = NavigationVectorEnv(scenario, 2, autoreset_mode="DISABLED")
+@pytest.mark.parametrize("closed_loop", [False, True], ids=["open loop", "closed loop"])
+def test_a_mask_begins_some_runs_anew_and_the_others_go_on(scenario, closed_loop):
+    envs = NavigationVectorEnv(scenario, 2, autoreset_mode="DISABLED", closed_loop=closed_loop)
     _, infos = envs.reset(seed=[1, 2])
     actions = start_of(infos)
     for _ in range(4):
@@ -121,13 +130,16 @@ def test_a_mask_begins_some_runs_anew_and_the_others_go_on(scenario):
         assert rewards[1] < 0.0
 
 
-def test_batches_do_not_share_memory(scenario):
-    envs = NavigationVectorEnv(scenario, 2)
+@pytest.mark.parametrize("closed_loop", [False, True], ids=["open loop", "closed loop"])
+def test_batches_do_not_share_memory(scenario, closed_loop):
+    envs = NavigationVectorEnv(scenario, 2, closed_loop=closed_loop, autoreset_mode="DISABLED")
     first, infos = envs.reset(seed=1)
     kept = first["imu"]["angular_rate"].copy()
     second, *_ = envs.step(start_of(infos))
     second["imu"]["angular_rate"][...] = 0.0
     np.testing.assert_array_equal(first["imu"]["angular_rate"], kept)
+    assert envs.reset(options={"reset_mask": np.array([True, False])})[0]["imu"]["valid"].all()
+    assert not second["imu"]["angular_rate"].any()
 
 
 @pytest.mark.parametrize(
