@@ -92,11 +92,14 @@ class RunReport(Shown):
         Wall-clock time of making it [s].
     estimators : tuple of EstimatorRun
         In the order in which they were asked for.
+    scenario : Scenario or None
+        Of the run; its obstacles are drawn.
     """
 
     recording: Recording
     simulation_seconds: float
     estimators: tuple[EstimatorRun, ...]
+    scenario: Scenario | None = None
 
     def headline(self) -> str:
         """The run, and who took part."""
@@ -152,7 +155,7 @@ class RunReport(Shown):
         trials = [(e.estimator, e.trial) for e in self.estimators]
         if not any(len(trial) for _, trial in trials):
             raise RequestError("there is nothing to draw: no estimator gave an estimate")
-        return run_figure(self.recording, trials, [e.estimator for e in self.estimators if e.reference])
+        return run_figure(self.recording, trials, [e.estimator for e in self.estimators if e.reference], self.scenario)
 
     def plot_lags(self) -> Figure:
         """The latency-accuracy curve: horizontal RMSE against the delay of the output.
@@ -214,7 +217,7 @@ def run_once(
         runs.append(EstimatorRun(request.label, request.parameters, estimator.reference, trial.status,
                                  printable(trial.reason), seconds, scores, trial))  # fmt: skip
     report(len(requests), len(requests))
-    return RunReport(recording, simulated, tuple(runs))
+    return RunReport(recording, simulated, tuple(runs), scenario)
 
 
 def score_of_files(scenario: Scenario, paths: Sequence[Path], seed: int) -> RunReport:
@@ -230,7 +233,7 @@ def score_of_files(scenario: Scenario, paths: Sequence[Path], seed: int) -> RunR
             trial = trial_of_file(path, recording)
         scores = score(trial, recording) if len(trial) else {}
         runs.append(EstimatorRun(path.name, {}, False, trial.status, printable(trial.reason), math.nan, scores, trial))
-    return RunReport(recording, simulated, tuple(runs))
+    return RunReport(recording, simulated, tuple(runs), scenario)
 
 
 def _covariance(scores: Mapping[str, float]) -> str:

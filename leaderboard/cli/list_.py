@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from simnav import sensors
 from simnav.estimator import describe, names
+from simnav.field_meanings import meanings
 from simnav.leaderboard.ranking import tables
 from simnav.scenario.catalogue import headers
 from simnav.sensors.imu_models import GRADES, IMU_MODELS
@@ -147,10 +148,9 @@ def imus() -> list[ImuItem]:
 def _kind(spec: type[Spec], fallback: str) -> KindItem:
     field = spec.model_fields.get("kind")
     kind = str(field.default) if field is not None else spec.__name__.removesuffix("Spec").lower()
+    said = meanings(spec)
     keys = {
-        key: Key(info.is_required(), info.description or "")
-        for key, (name, info) in spec.toml_keys().items()
-        if name != "kind"
+        key: Key(info.is_required(), said[name]) for key, (name, info) in spec.toml_keys().items() if name != "kind"
     }
     return KindItem(kind, (spec.__doc__ or fallback).strip().splitlines()[0].rstrip(":"), keys)
 
