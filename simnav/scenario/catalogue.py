@@ -23,6 +23,8 @@ __all__ = ["NAME", "Header", "ScenarioWarning", "headers"]
 
 _GROUP = "simnav.scenarios"
 
+#: An instrument with channels in a file.
+_CHANNELS = re.compile(r"^[^#\n]*\bkind *= *[\"'](gnss_raw|dvl_beams|usbl_fix|acoustic_range)[\"']", re.MULTILINE)
 #: Names of scenarios: kebab-case.
 NAME = re.compile(r"[a-z][a-z0-9]*(-[a-z0-9]+)*")
 
@@ -187,7 +189,7 @@ def _read(path: Path) -> Header | None:
         training=table.get("training") is True,
         path=path,
         recorded=re.search(r"^\[log[\].]", text, re.MULTILINE) is not None,
-        channels=re.search(r"^[^#\n]*\bkind *= *[\"'](gnss_raw|dvl_beams)[\"']", text, re.MULTILINE) is not None,
+        channels=_CHANNELS.search(text) is not None,
     )
 
 
