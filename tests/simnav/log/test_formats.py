@@ -37,6 +37,13 @@ def test_mutated_files_are_read_or_refused(form):
     assert set(found) <= {"read", "refused"}, found
 
 
+def test_a_folder_or_nothing_in_place_of_the_file_is_named(form, tmp_path):
+    for path, what in ((tmp_path, "a folder|cannot be read|no such file"), (tmp_path / "x", "no such file")):
+        with pytest.raises(LogError, match=what) as raised:
+            read(form, path)
+        assert ": reader " not in str(raised.value)
+
+
 @pytest.fixture
 def good(tmp_path):
     def make(form, **keys):
