@@ -79,13 +79,13 @@ def _row(latitude: float, longitude: float, height: float, heading: float, out: 
 
 @kernel(
     "i8(i8, f8[:, ::1], Tuple((i8[::1], f8[:, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, :, ::1])), "
-    "Tuple((i8[::1], i8[:, ::1], f8[:, ::1], f8[:, :, ::1])), i8[::1], i8[::1], "
+    "Tuple((i8[::1], i8[:, ::1], f8[:, ::1], f8[:, :, ::1])), UniTuple(i8[::1], 2), "
     "Tuple((f8[:, ::1], f8[:, ::1], i1[:, ::1], f8[:, :, ::1], f8[:, :, ::1])), "
     "Tuple((f8[:, :, ::1], i1[:, :, ::1], f8[:, :, :, ::1])), f8[:, :, ::1], f8[:, ::1])"
 )
 def _keep(
     row: int, truth: Array, imu: tuple[Integers, Array, Array, Array, Array],
-    delivered: tuple[Integers, Integers, Array, Array], place: Integers, most: Integers,
+    delivered: tuple[Integers, Integers, Array, Array], slots: tuple[Integers, Integers],
     samples: tuple[Array, Array, NDArray[np.int8], Array, Array], aids: tuple[Array, NDArray[np.int8], Array],
     states: Array, rows: Array,
 ) -> int:  # fmt: skip
@@ -103,7 +103,7 @@ def _keep(
         ``samples``, ``imu_time``, ``imu_interval``, ``rate`` and ``force`` of `simnav.simulation.steps.SteppedRuns`.
     delivered : tuple
         ``count``, ``who``, ``when`` and ``value`` of the same.
-    place, most : (i,) int arrays
+    slots : two (i,) int arrays
         For each of i instruments: its number in the padded arrays, and its largest number of measurements in a step.
     samples : tuple of (S, K, ...) arrays
         Times, intervals, validity, angular rates and specific forces of at most K IMU samples in S steps; overwritten.
@@ -128,14 +128,15 @@ def _keep(
                 angular_rate[row, k, j], specific_force[row, k, j] = rate[0, k, j], force[0, k, j]
     count, who, when, value = delivered
     times, there, values = aids
+    place, most = slots
     for m in range(count[0] if place.size > 0 else 0):
-        i: int = who[0, m]
-        a = place[i]
+        n: int = who[0, m]
+        a = place[n]
         k = 0
-        while k < most[i] and there[row, a, k]:
+        while k < most[n] and there[row, a, k]:
             k += 1
-        if k == most[i]:
-            return i
+        if k == most[n]:
+            return n
         times[row, a, k], there[row, a, k] = when[0, m], 1
         for j in range(3):
             values[row, a, k, j] = value[0, m, j]
@@ -183,9 +184,10 @@ class LiveStretch(Stretch):
     def _share_columns(self) -> None:
         """The columns are the arrays that `advance` fills, and views of them."""
         if self._samples[0].size:
-            order = "time", "length", "valid", "angular_rate", "specific_force"
-            samples = dict(zip(order, self._samples, strict=True))
-            self.columns["imu"] = {key: samples[key] for key in ("time", "valid", "length", *order[3:])}
+            when, length, there, rate, force = self._samples
+            self.columns["imu"] = {
+                "time": when, "valid": there, "length": length, "angular_rate": rate, "specific_force": force,
+            }  # fmt: skip
         time, valid, values = self._arrays
         for a, (name, k, d) in enumerate(self._aids):
             self.columns[name] = {"time": time[:, a, :k], "valid": valid[:, a, :k], "value": values[:, a, :k, :d]}
@@ -212,7 +214,8 @@ class LiveStretch(Stretch):
             imu = runs.samples, runs.imu_time, runs.imu_interval, runs.rate, runs.force
         delivered = runs.count, runs.who, runs.when, runs.value
         row, aids = self._one, self._arrays
-        many = _keep(i, runs.truth, imu, delivered, self._place, self._most, self._samples, aids, self.truth, row)
+        slots = self._place, self._most
+        many = _keep(i, runs.truth, imu, delivered, slots, self._samples, aids, self.truth, row)
         self.rows += row.tolist()
         if self._sides:  # a run with channels has only the block form
             self._place_slots(i)
