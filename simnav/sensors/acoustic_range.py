@@ -87,7 +87,7 @@ def observe(point: NavigationPoint, sheet: Datasheet) -> tuple[Array, dict[str, 
     example={
         "rate_hz": 0.2, "latitude_deg": 54.0, "longitude_deg": 7.9, "beacons": ["A", "B", "C"],
         "north_m": [300.0, -250.0, 100.0], "east_m": [100.0, 200.0, -400.0], "depth_m": [60.0, 65.0, 70.0],
-        "sigma_m": 0.15, "sound_speed_percent": 0.1,
+        "sigma_m": 0.15, "sound_speed_percent": 0.1, "lever_arm_m": [0, 0, 3],
     },
 )  # fmt: skip
 class AcousticRange(AcousticSpec):

@@ -80,7 +80,7 @@ class Paths:
         """(n,) ranges [m] that a device makes of the times (see the module)."""
         if correction == "profile":
             return self.distance
-        return self.time * (self.mean if correction == "harmonic" else assumed)
+        return np.asarray(self.time * (self.mean if correction == "harmonic" else assumed))
 
     def vectors(self, correction: Correction, assumed: float) -> Array:
         """(n, 3) vectors [m] that a device with an array at the first position makes of times and angles."""
@@ -236,5 +236,5 @@ class AcousticInstrument(ChannelInstrument):
         where = np.searchsorted(tap.time, found.time), found.channel
         wrong = error[where]
         bit = np.where(wrong.any(axis=1), np.uint32(1 << self.bit), np.uint32(0))
-        late = {} if not self.acoustics.travels() else {"arrival": found.time + latency[where]}
+        late: dict[str, Any] = {} if not self.acoustics.travels() else {"arrival": found.time + latency[where]}
         return replace(found, faults=bit, fault_error=wrong.copy(), **late)

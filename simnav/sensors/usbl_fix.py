@@ -146,7 +146,13 @@ def reading_sigma(side: Array, sheet: Datasheet) -> Array:
         ),
         reading_sigma=reading_sigma,
     ),
-    example={"rate_hz": 0.5, "latitude_deg": 54.0, "longitude_deg": 7.9, "alignment_deg": 0.1},
+    example={
+        "rate_hz": 0.5,
+        "latitude_deg": 54.0,
+        "longitude_deg": 7.9,
+        "alignment_deg": 0.1,
+        "lever_arm_m": [0, 0, 3],
+    },
 )
 class UsblFix(AcousticSpec):
     """Position of the vehicle by an ultra-short baseline under a ship. Its channel is ``transponder``.
