@@ -7,7 +7,7 @@ import stat
 from collections.abc import Callable
 from functools import lru_cache, wraps
 from pathlib import Path
-from typing import Concatenate, ParamSpec, TypeVar
+from typing import Concatenate, ParamSpec, TypeVar, cast
 
 from simnav.log.table import LogError
 
@@ -50,6 +50,6 @@ def kept(
             except OSError as error:
                 raise LogError(f"{path} cannot be read: {error.strerror or error}") from None
 
-        return reading
+        return cast(Callable[Concatenate[Path, P], T], reading)
 
     return wrap
