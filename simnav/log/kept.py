@@ -46,7 +46,7 @@ def kept(
             if stat.S_ISDIR(state.st_mode) and not folders:
                 raise LogError(f"{path}: it is a folder, where a file is wanted")
             try:
-                return known(path, state.st_mtime_ns, state.st_size, *args, **kwargs)
+                return known(path, state.st_mtime_ns, state.st_size, *args, **kwargs)  # type: ignore[arg-type]  # see the docstring
             except OSError as error:
                 raise LogError(f"{path} cannot be read: {error.strerror or error}") from None
 
