@@ -218,9 +218,9 @@ class NavigationEnv(ChartedEnv[Observation, Array]):
         gymnasium.error.ResetNeeded
             If the run is over or has not begun.
         """
-        observation, *outcome = self.step_from(checked_action(action))
+        observation, reward, terminated, truncated, info = self.step_from(checked_action(action))
         # Copies: a view would lead to the measurements of the steps to come, by its base.
-        return (_copied(observation), *outcome)
+        return _copied(observation), reward, terminated, truncated, info
 
     def step_from(self, estimate: list[float]) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """As `step`, for the nine numbers of a checked action; the observation may be views of longer arrays."""

@@ -138,7 +138,8 @@ def keep(
             while k < most[b, n] and there[row, a, k]:
                 k += 1
             if k == most[b, n]:
-                return b * place.shape[1] + n
+                found: int = b * place.shape[1] + n
+                return found
             times[row, a, k], there[row, a, k] = when[b, m], 1
             for j in range(3):
                 values[row, a, k, j] = value[b, m, j]

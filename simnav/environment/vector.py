@@ -215,8 +215,9 @@ class NavigationVectorEnv(VectorEnv[Observation, Array, NDArray[Any]]):
         infos: dict[str, Any] = {}
         going = None if self._steered is None else self._steer(self._steered, estimates, rewards)
         for i, env in enumerate(self.envs):
+            info: dict[str, Any] = {}
             if i in estimates:
-                over, info = False, {}
+                over = False
                 if self._steered is None:
                     # Views of a longer array; `_batch` copies them.
                     self._last[i], rewards[i], _, over, info = env.step_from(estimates[i])
