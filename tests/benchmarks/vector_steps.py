@@ -1,12 +1,14 @@
-"""Steps a second of learning tasks in their vector forms, beside Gymnasium's, on one core and on two.
+"""Steps a second of the environment and of learning tasks in their vector forms, beside Gymnasium's.
 
 ``python -m tests.benchmarks.vector_steps`` prints a table of medians. Those on one core step in turn, and their seconds
 are of processor time, which other processes disturb least. On two cores they are of the clock: run it on a machine that
-does nothing else. Voyages are prepared beforehand.
+does nothing else. Voyages are prepared beforehand. With names of parts (``environment``, ``tuning``, ``guidance``) it
+measures these only, and with ``--one-core`` nothing on two cores.
 """
 
 from __future__ import annotations
 
+import argparse
 import multiprocessing
 import time
 from functools import partial
@@ -14,9 +16,11 @@ from functools import partial
 import numpy as np
 from gymnasium.vector import AsyncVectorEnv, SyncVectorEnv
 
+from simnav.environment import NavigationEnv, NavigationVectorEnv
 from simnav.estimators.learning.environment import FilterTaskEnv
 from simnav.estimators.learning.guidance import GuidanceEnv
 from simnav.estimators.learning.guidance_vector import GuidanceVectorEnv
+from simnav.estimators.learning.pool import Pool
 from simnav.estimators.learning.vector import FilterTaskVectorEnv
 
 N, STEPS, ROUNDS = 64, 150, 7
@@ -32,9 +36,10 @@ def one_tuning():
     return FilterTaskEnv(*TUNING, steps=STEPS, instruments="fixes")
 
 
-def rate(envs, steps, clock=time.perf_counter):
+def rate(envs, steps, clock=time.perf_counter, actions=None):
     """Steps a second of all environments together."""
-    actions = np.zeros(envs.action_space.shape, envs.action_space.dtype)
+    if actions is None:
+        actions = np.zeros(envs.action_space.shape, envs.action_space.dtype)
     begun = clock()
     for _ in range(steps):
         envs.step(actions)
@@ -43,12 +48,14 @@ def rate(envs, steps, clock=time.perf_counter):
 
 def in_turn(all_envs, steps, clock=time.process_time):
     """The median rate of several vector forms that step in turn."""
-    rates = {name: [] for name in all_envs}
-    for envs in all_envs.values():
-        envs.reset(seed=1)
+    rates, actions = {name: [] for name in all_envs}, {}
+    for name, envs in all_envs.items():
+        _, infos = envs.reset(seed=1)
+        if envs.action_space.shape[1:] == (3, 3):  # estimates: the starts
+            actions[name] = np.stack([np.stack([s.position, s.velocity, s.attitude]) for s in infos["start"]])
     for _ in range(ROUNDS):
         for name, envs in all_envs.items():
-            rates[name].append(rate(envs, steps[name], clock))
+            rates[name].append(rate(envs, steps[name], clock, actions.get(name)))
     return {name: float(np.median(found)) for name, found in rates.items()}
 
 
@@ -75,25 +82,55 @@ def on_two_cores(make, steps):
     return 2.0 * float(np.median(found))
 
 
-def main():
-    single = partial(GuidanceEnv, GUIDANCE)
+def measure_environment(two_cores):
+    for loop, closed in (("open loop", False), ("closed loop", True)):
+        single = partial(NavigationEnv, GUIDANCE, closed_loop=closed)
+        simnav = NavigationVectorEnv(GUIDANCE, N, closed_loop=closed)
+        forms = {"simnav": simnav, "SyncVectorEnv": SyncVectorEnv([single] * N)}
+        show(f"Environment in {loop}", in_turn(forms, {"simnav": 40, "SyncVectorEnv": 40}))
+
+
+def measure_tuning(two_cores):
     forms = {"simnav": tuning(N), "SyncVectorEnv": SyncVectorEnv([one_tuning] * N)}
     found = in_turn(forms, {"simnav": 28, "SyncVectorEnv": 6})
-    found["simnav, two cores"] = on_two_cores(tuning, 28)
-    parallel = AsyncVectorEnv([one_tuning] * N)
-    found |= in_turn({"AsyncVectorEnv, two cores": parallel}, {"AsyncVectorEnv, two cores": 20}, time.perf_counter)
-    parallel.close()
+    pool = forms["simnav"]._pool
+    most = pool.capacity * Pool.cost(pool.options) / 1e6
+    print(f"Tuning keeps {pool.capacity} prepared voyages of {STEPS} steps in at most {most:.0f} MB")
+    if two_cores:
+        found["simnav, two cores"] = on_two_cores(tuning, 28)
+        parallel = AsyncVectorEnv([one_tuning] * N)
+        found |= in_turn({"AsyncVectorEnv, two cores": parallel}, {"AsyncVectorEnv, two cores": 20}, time.perf_counter)
+        parallel.close()
     show("Tuning", found)
+
+
+def measure_guidance(two_cores):
+    single = partial(GuidanceEnv, GUIDANCE)
     forms = {"simnav": GuidanceVectorEnv(GUIDANCE, N), "SyncVectorEnv": SyncVectorEnv([single] * N)}
     found = in_turn(forms, {"simnav": 30, "SyncVectorEnv": 30})
-    found["simnav, two cores"] = on_two_cores(partial(GuidanceVectorEnv, GUIDANCE), 30)
+    if two_cores:
+        found["simnav, two cores"] = on_two_cores(partial(GuidanceVectorEnv, GUIDANCE), 30)
+    short = GuidanceVectorEnv(GUIDANCE, N, steps=29)  # each thirtieth step is a reset of all voyages
+    found |= in_turn({"simnav, episodes of 29 steps": short}, {"simnav, episodes of 29 steps": 30})
     show("Guidance", found)
+
+
+PARTS = {"environment": measure_environment, "tuning": measure_tuning, "guidance": measure_guidance}
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("parts", nargs="*", help=f"of {', '.join(PARTS)}; default: all")
+    parser.add_argument("--one-core", action="store_true", help="measure nothing on two cores")
+    given = parser.parse_args()
+    for part in given.parts or PARTS:
+        PARTS[part](not given.one_core)
 
 
 def show(task, found):
     print(f"{task}, {N} environments")
     for name, steps in found.items():
-        print(f"  {name:28}{steps:10.0f} steps/s{steps / found['SyncVectorEnv']:8.1f} times SyncVectorEnv")
+        print(f"  {name:30}{steps:10.0f} steps/s{steps / found['SyncVectorEnv']:8.1f} times SyncVectorEnv")
 
 
 if __name__ == "__main__":
