@@ -92,7 +92,7 @@ class Paths:
         sine = np.sign(self.depression) * np.sqrt(1.0 - level**2)
         azimuth = np.arctan2(self.vector[:, 1], self.vector[:, 0])
         direction = np.stack([level * np.cos(azimuth), level * np.sin(azimuth), sine], axis=1)
-        return self.ranges(correction, assumed)[:, None] * direction
+        return np.asarray(self.ranges(correction, assumed)[:, None] * direction)
 
 
 def paths(surroundings: Surroundings, first: Array, second: Array) -> Paths:

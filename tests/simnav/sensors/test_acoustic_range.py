@@ -46,7 +46,7 @@ def device(seed: int = 1, parts: dict[str, Any] | None = None, **table: Any) -> 
 
 @pytest.mark.parametrize("way", ["one_way", "two_way"])
 def test_the_equation_predicts_the_range_and_its_derivatives(way: str) -> None:
-    clock = {"clock_s": 0.01, "clock_drift_ppm": 1.0} if way == "one_way" else {}
+    clock: dict[str, Any] = {"clock_s": 0.01, "clock_drift_ppm": 1.0} if way == "one_way" else {}
     ranges = device(3, way=way, sound_speed_percent=0.3, beacon_error_m=0.5, lever_arm_m=[1.0, -0.5, 0.4], **clock)
     tap = taps(1, (20.0, -30.0, 20.0), (0.1, -0.05, 0.8))
     stream = ranges.sense(tap)

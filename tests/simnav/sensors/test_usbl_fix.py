@@ -166,7 +166,12 @@ def test_echoes_are_gross_errors_with_labels() -> None:
 
 
 def test_the_division_into_blocks_changes_nothing() -> None:
-    table = {"reflections": 0.2, "bias_instability_m": 0.5, "correlation_time_s": 60.0, "attitude_noise_deg": 0.1}
+    table: dict[str, Any] = {
+        "reflections": 0.2,
+        "bias_instability_m": 0.5,
+        "correlation_time_s": 60.0,
+        "attitude_noise_deg": 0.1,
+    }
     tap, parts, usbl = taps(60, (60.0, 20.0, 105.0)), [], device(**table)
     whole = device(**table).sense(tap)
     for rows in (slice(0, 7), slice(7, 8), slice(8, 60)):
