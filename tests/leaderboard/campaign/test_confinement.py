@@ -6,6 +6,7 @@ import json
 import os
 import platform
 import signal
+import sys
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -316,6 +317,33 @@ def test_who_has_not_been_started_has_not_failed(
     finally:
         close_server()
     assert len(lost) == losses
+
+
+PROGRAM = """
+import sys, time
+taken = bytearray(60 << 20)
+for k in range(0, len(taken), 4096): taken[k] = 1
+for line in sys.stdin:
+    if line.startswith("start"): place = ",".join(line.split(",")[3:6])
+    if line.startswith("begin"): time.sleep(0.2), print("ready", flush=True)
+    if line.startswith("step"): print("estimate", line[5:-1], place, ",,,,,", sep=",", flush=True)
+"""
+
+
+@pytest.mark.skipif(platform.system() != "Linux", reason="memory of other processes is seen on Linux only")
+def test_a_program_is_confined_and_its_memory_counts(
+    server: EstimatorServer, recording: Recording, tmp_path: Path
+) -> None:
+    """Its working folder is that of the file which names it; it is not there afterwards."""
+    (tmp_path / "mine.txt").write_text(PROGRAM)
+    (tmp_path / "mine.py").write_text(
+        "from simnav.estimator.program import ProgramEstimator\n"
+        f"class Mine(ProgramEstimator):\n    program = '{sys.executable} -S mine.txt'\n"
+    )
+    there = attempt(server, entrant(str(tmp_path / "mine.py")), recording, Limits(60.0, 1 << 30))
+    assert (there.status, there.reason) == ("ok", "")
+    assert 60 << 20 < there.peak_memory < 120 << 20
+    assert not [p for p in Path("/proc").glob("[0-9]*/cmdline") if b"mine.txt" in p.read_bytes()]
 
 
 def test_time_is_measured_outside(server: EstimatorServer, recording: Recording, tmp_path: Path) -> None:
