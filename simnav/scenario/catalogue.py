@@ -23,15 +23,10 @@ __all__ = ["NAME", "Header", "ScenarioWarning", "headers"]
 
 _GROUP = "simnav.scenarios"
 
-<<<<<<< HEAD
-#: An instrument with channels in a file.
-_CHANNELS = re.compile(r"^[^#\n]*\bkind *= *[\"'](gnss_raw|dvl_beams|usbl_fix|acoustic_range)[\"']", re.MULTILINE)
-=======
 #: Kinds of instruments with channels, and how a scenario names one.
-_WITH_CHANNELS = ("gnss_raw", "dvl_beams")
+_WITH_CHANNELS = ("gnss_raw", "dvl_beams", "usbl_fix", "acoustic_range")
 _CHANNELS = re.compile(rf"^[^#\n]*\bkind *= *[\"']({'|'.join(_WITH_CHANNELS)})[\"']", re.MULTILINE)
 
->>>>>>> 93448bbfb6b0b55c054ca75378c4c7a8cce75162
 #: Names of scenarios: kebab-case.
 NAME = re.compile(r"[a-z][a-z0-9]*(-[a-z0-9]+)*")
 
@@ -195,13 +190,8 @@ def _read(path: Path) -> Header | None:
         group=str(table.get("group", "other")),
         training=table.get("training") is True,
         path=path,
-<<<<<<< HEAD
-        recorded=re.search(r"^\[log[\].]", text, re.MULTILINE) is not None,
-        channels=_CHANNELS.search(text) is not None,
-=======
         recorded="\n[log" in text and re.search(r"^\[log[\].]", text, re.MULTILINE) is not None,
         channels=any(kind in text for kind in _WITH_CHANNELS) and _CHANNELS.search(text) is not None,
->>>>>>> 93448bbfb6b0b55c054ca75378c4c7a8cce75162
     )
 
 

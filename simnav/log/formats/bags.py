@@ -16,11 +16,7 @@ import numpy as np
 
 from simnav.log.files import FileSpec
 from simnav.log.growing import GrowingTable
-<<<<<<< HEAD
 from simnav.log.kept import kept
-from simnav.log.progress import tell
-=======
->>>>>>> 93448bbfb6b0b55c054ca75378c4c7a8cce75162
 from simnav.log.reader import Rows, register_reader
 from simnav.log.table import LogError, Table
 from simnav.spec import closest
