@@ -120,7 +120,8 @@ class AcousticSpec(AidSpec):
     Attributes
     ----------
     correction : str
-        What the device makes of times and angles (see the module).
+        What the device makes of times and angles: ``profile`` (it traces the ray), ``harmonic`` (mean speed between the
+        depths) or ``fixed``.
     assumed_speed : float
         Speed of sound that a device with ``correction = "fixed"`` assumes [m/s].
     sound_speed : float

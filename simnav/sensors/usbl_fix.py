@@ -162,15 +162,20 @@ class UsblFix(AcousticSpec):
     Attributes
     ----------
     grade : str
-        Class of the instrument (`GRADES`), for the figures that are not given.
-    accuracy, range_noise, cone : float
-        As of `Grade`.
+        Class of the instrument, for the next three figures where they are not given: ``precise``, ``ordinary`` or
+        ``simple``.
+    accuracy : float
+        One sigma of the position in each direction across the line of sight, as a share of the slant range.
+    range_noise : float
+        One sigma of the range [m].
+    cone : float
+        Largest angle from straight down at which there is a fix [rad].
     sigma, bias, bias_instability : tuple of float
         Errors of the position of the transceiver, north-east-down [m].
     alignment : tuple of float
         One sigma of the error of attitude and mounting, constant in a run, about bow, starboard and down [rad].
     attitude_noise : tuple of float
-        One sigma of its white part [rad].
+        One sigma of the white part of the error of the ship's attitude [rad].
     latitude, longitude : float
         Origin of the points [rad].
     north, east : tuple of float
