@@ -14,6 +14,7 @@ from simnav.geometry.rotation import dcm_from_rotation_vector, dcm_from_rpy
 from simnav.kinds import NavigationPoint
 from simnav.sensors import UsblFix
 from simnav.sensors.channels import ChannelInstrument
+from simnav.sensors.faults.by_channel import each_channel
 from simnav.sensors.usbl_fix import GRADES, observe
 from simnav.spec import SpecError
 from simnav.types import Array, TapStates
@@ -119,6 +120,13 @@ def test_a_fix_is_late_by_the_way_of_the_sound() -> None:
         timing = UsblFix.from_toml(PLACE | {"returned": returned}).datasheet("usbl").timing
         assert timing is not None
         assert timing.longest >= times * 1000.0 / 1500.0
+
+
+def test_fixes_that_a_fault_leaves_arrive_as_before() -> None:
+    stream = device().sense(taps(6, (0.0, 0.0, 755.0)))
+    left = each_channel(stream, (), lambda part: part.rows(part.time > 2.5))
+    assert left.time.tolist() == [3.0, 4.0, 5.0]
+    np.testing.assert_array_equal(left.arrival, stream.arrival[3:])
 
 
 def test_there_is_no_fix_beyond_cone_and_reach_and_above_the_surface() -> None:
