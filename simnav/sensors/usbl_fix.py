@@ -15,8 +15,8 @@ systems deliver.
 
 A fix is valid when the transponder answers. It comes to the vehicle when the answer has gone to the ship, and, by
 sound, the message back: ``latency`` of the table ``timing`` is what the ship's computer and the modem take besides.
-There is no fix beyond the cone of the transceiver or its reach, in a shadow of the sound, or while the transponder is
-not under water.
+The next interrogation waits for the answer. There is no fix beyond the cone of the transceiver or its reach, in a
+shadow of the sound, or while the transponder is not under water.
 
 Figures of classes and their sources are in ``docs/how-to/use-acoustic-positioning.md``.
 """
@@ -334,6 +334,7 @@ class _UsblFix(AcousticInstrument):
         path = paths(self.surroundings, place, displace(tap.position, self.lever_displacement(tap)))
         down = np.divide(path.vector[:, 2], path.distance, out=np.ones(n), where=path.distance > 0.0)
         there = np.isfinite(path.time) & (path.distance <= spec.reach) & (down >= np.cos(spec.cone) - 1e-12)
+        there &= self.pinged(tap.time, np.where(there, path.time, np.nan)[:, None])
         axes = _ship_axes(heading)
         seen = np.einsum("nji,nj->ni", axes, path.vectors(spec.correction, spec.assumed_speed))
         seen = np.where(there[:, None], seen, 0.0)

@@ -29,7 +29,7 @@ BEACONS: dict[str, Any] = {
 ARCTIC = Profile(np.array([0.0, 400.0]), np.array([1440.0, 1446.0]))
 
 
-def taps(n: int, offset: Any = (0.0, 0.0, 50.0), attitude: Any = (0.0, 0.0, 0.0), rate: float = 1.0) -> TapStates:
+def taps(n: int, offset: Any = (0.0, 0.0, 50.0), attitude: Any = (0.0, 0.0, 0.0), rate: float = 0.1) -> TapStates:
     """A vehicle that stays north, east and below the origin [m]."""
     place = np.broadcast_to(displace(ORIGIN, np.array(offset, dtype=float)), (n, 3)).copy()
     zero = np.zeros((n, 3))
@@ -87,7 +87,7 @@ def test_a_two_way_range_is_late_by_one_way_of_the_sound() -> None:
     assert timing is not None
     assert timing.longest >= 2.0
     one_way = device(way="one_way")
-    np.testing.assert_array_equal(one_way.sense(taps(2)).arrivals, [0.0] * 3 + [1.0] * 3)
+    np.testing.assert_array_equal(one_way.sense(taps(2)).arrivals, [0.0] * 3 + [10.0] * 3)
     assert AcousticRange.from_toml(BEACONS | {"way": "one_way"}).datasheet("ranges").timing is None
 
 
