@@ -19,6 +19,7 @@ from typing import Any
 from pydantic.fields import FieldInfo
 
 import simnav.scenario.reading  # noqa: F401 (it registers the error process of recordings)
+from simnav.field_meanings import meanings
 from simnav.sensors.imu import ImuSpec
 from simnav.spec import Spec, spec_types, toml_number, unit_of
 
@@ -64,13 +65,13 @@ def _cells(line: str) -> list[str]:
 def _keys(specs: list[type[Spec]], told: dict[str, str]) -> list[list[str]]:
     """A row for each key; of several classes each has a column, and they have the same fields."""
     keys = [list(spec.toml_keys().items()) for spec in specs]
-    said = _attributes(specs[0])
+    said = meanings(specs[0])
     rows = []
     for together in zip(*keys, strict=True):
         name, info = together[0][1]
         meaning = told.get(together[0][0])
         if meaning is None:
-            meaning = _prefix(info, _plain(info.description or said.get(name, "")))
+            meaning = _prefix(info, _plain(said[name]))
         rows.append([*(f"`{key}`" for key, _ in together), _default(info), meaning])
     return rows
 
@@ -117,20 +118,9 @@ def _prefix(info: FieldInfo, meaning: str) -> str:
     return f"{sort}: {meaning}" if meaning and not meaning.startswith("table") else meaning or sort
 
 
-def _attributes(spec: type[Spec]) -> dict[str, str]:
-    """What the docstrings of a class and of its bases say of their attributes."""
-    found: dict[str, str] = {}
-    for cls in reversed(spec.__mro__):
-        text = inspect.cleandoc(cls.__doc__ or "").partition("\nAttributes\n----------\n")[2]
-        for match in re.finditer(r"^(\w[^\n:]*)(?: : [^\n]*)?\n((?:[ \t]+[^\n]*\n?|\n(?=[ \t]))+)", text + "\n", re.M):
-            for name in match[1].split(","):
-                found[name.strip()] = re.sub(r"\s+", " ", match[2]).strip()
-    return found
-
-
 def _plain(text: str) -> str:
-    """A meaning as a cell: without the SI units of Python, without a full stop, with the first letter small."""
-    text = re.sub(r" \[(?!log|instr|\[)[^\]\s]{1,8}\](?!`)", "", re.sub(r"\s+", " ", text)).replace("``", "`")
+    """A meaning as a cell: without a full stop, with the first letter small."""
+    text = re.sub(r"\s+", " ", text).replace("``", "`")
     text = re.sub(r"`(?:simnav\.[\w.]+\.)?(ChannelSpec|LOG_UNITS)`", r"`\1`", text).replace("|", "\\|").rstrip(".")
     return text[:1].lower() + text[1:] if text[1:2].islower() and not text.startswith("Gauss") else text
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -93,11 +93,14 @@ class RunReport(Shown):
         Wall-clock time of making it [s].
     estimators : tuple of EstimatorRun
         In the order in which they were asked for.
+    scenario : Scenario or None
+        Of the run; its obstacles are drawn.
     """
 
     recording: Recording
     simulation_seconds: float
     estimators: tuple[EstimatorRun, ...]
+    scenario: Scenario | None = None
 
     def headline(self) -> str:
         """The run, and who took part."""
@@ -153,7 +156,7 @@ class RunReport(Shown):
         trials = [(e.estimator, e.trial) for e in self.estimators]
         if not any(len(trial) for _, trial in trials):
             raise RequestError("there is nothing to draw: no estimator gave an estimate")
-        return run_figure(self.recording, trials, [e.estimator for e in self.estimators if e.reference])
+        return run_figure(self.recording, trials, [e.estimator for e in self.estimators if e.reference], self.scenario)
 
     def plot_lags(self) -> Figure:
         """The latency-accuracy curve: horizontal RMSE against the delay of the output.
@@ -199,7 +202,7 @@ class ScoreReport(RunReport):
         Errors after an alignment and relative errors, by label; without files that have no positions.
     """
 
-    trajectories: Mapping[str, TrajectoryErrors]
+    trajectories: Mapping[str, TrajectoryErrors] = field(default_factory=dict)
 
     def shown(self) -> Sequence[tables.Fitted]:
         """The tables of the scores, and that of aligned and relative errors."""
@@ -237,7 +240,7 @@ def run_once(
         runs.append(EstimatorRun(request.label, request.parameters, estimator.reference, trial.status,
                                  printable(trial.reason), seconds, scores, trial))  # fmt: skip
     report(len(requests), len(requests))
-    return RunReport(recording, simulated, tuple(runs))
+    return RunReport(recording, simulated, tuple(runs), scenario)
 
 
 def score_of_files(scenario: Scenario, paths: Sequence[Path], seed: int) -> ScoreReport:
@@ -255,7 +258,7 @@ def score_of_files(scenario: Scenario, paths: Sequence[Path], seed: int) -> Scor
         runs.append(EstimatorRun(path.name, {}, False, trial.status, printable(trial.reason), math.nan, scores, trial))
     errors = {run.estimator: trajectory_errors(run.trial, recording) for run in runs if len(run.trial)}
     known = {name: found for name, found in errors.items() if found is not None}
-    return ScoreReport(recording, simulated, tuple(runs), known)
+    return ScoreReport(recording, simulated, tuple(runs), scenario, known)
 
 
 def _covariance(scores: Mapping[str, float]) -> str:

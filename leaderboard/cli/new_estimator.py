@@ -31,6 +31,8 @@ def show(out: Output, request: NewEstimatorCommand) -> None:
 def write_estimator(name: str, output: Path | None = None) -> tuple[str, Path]:
     """Write a new estimator's file, never over an existing one; returns its registered name and the path.
 
+    The name may be given as that of the file: ``my_filter.py`` is ``my-filter``.
+
     Raises
     ------
     RequestError
@@ -38,7 +40,7 @@ def write_estimator(name: str, output: Path | None = None) -> tuple[str, Path]:
     """
     from jinja2 import Environment
 
-    kebab = to_kebab(name)
+    kebab = to_kebab(name.removesuffix(".py"))
     if not re.fullmatch(r"[a-z][a-z0-9]*(-[a-z0-9]+)*", kebab) or keyword.iskeyword(kebab):
         raise RequestError(f"{name!r} is no name for an estimator; it should be words like 'my-filter'")
     if kebab in names():

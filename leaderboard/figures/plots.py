@@ -23,11 +23,14 @@ from .frames import (
     time_panels,
     time_unit,
 )
+from .sky_figure import draw_place, draw_sky
 from .style import GREY, INK, PALETTE, PAPER, TRUTH, Style, figure, styled
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+    from .sky_view import SkyView
 
 __all__ = ["Band", "Curve", "Dot", "Track", "dots", "error_cdf", "error_over_time", "run_chart", "trajectory"]
 
@@ -35,6 +38,8 @@ Array = NDArray[np.float64]
 
 #: Points of a curve over time; more cannot be seen.
 _POINTS = 300
+#: Height of the sky and the map of obstacles, in rows of diagnostics.
+_SKY_ROWS = 3
 #: What an axis of all estimators shows ends at this multiple of their median.
 FAR_OFF = 20.0
 
@@ -304,9 +309,12 @@ def run_chart(
     faults: Sequence[tuple[float, float, str]] = (),
     diagnostics: Mapping[str, Sequence[Curve]] | None = None,
     bounds: Mapping[str, float] | None = None,
+    sky: SkyView | None = None,
     title: str = "",
 ) -> Figure:
     """Chart beside the errors over time with their claimed three-sigma bounds; below both, diagnostics in two columns.
+
+    With satellites, the sky and the map of the obstacles come last.
 
     Parameters
     ----------
@@ -326,14 +334,17 @@ def run_chart(
         Label of the vertical axis -> curves.
     bounds : mapping of str to float, optional
         Label of a diagnostic's axis -> a line, below which it should be 95 % of the time.
+    sky : SkyView, optional
+        Satellites and obstacles of the run.
     title : str
         Title of the figure.
     """
     below = diagnostics or {}
     top, rows = max(len(errors), 1), -(-len(below) // 2)
     with styled():
-        fig = figure(13.0, max(5.0, 1.0 + 1.45 * (top + rows)))
-        grid = fig.add_gridspec(top + rows, 2, width_ratios=(1.0, 1.15))
+        last = 0 if sky is None else _SKY_ROWS
+        fig = figure(13.0, max(5.0, 1.0 + 1.45 * (top + rows + last)))
+        grid = fig.add_gridspec(top + rows + last, 2, width_ratios=(1.0, 1.15))
         _chart(fig.add_subplot(grid[:top, 0]), truth, tracks, style, fixes or {}, title)
         chart = fig.axes[0]
         chart.set_anchor("N")
@@ -375,6 +386,9 @@ def run_chart(
         if first is not None:
             claimed = any(c.bound is not None for curves in errors.values() for c in curves)
             first.set_title("Error; dashed: claimed ±3σ" if claimed else "Error")
+        if sky is not None:
+            draw_sky(fig, grid[top + rows :, 0], sky)
+            draw_place(fig, grid[top + rows :, 1], sky)
     return fig
 
 

@@ -16,12 +16,14 @@ from simnav.spec import UNITS
 from simnav.types import KINDS, Array
 
 from .plots import Curve, Track, run_chart
+from .sky_view import sky_view
 from .style import Style
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from simnav.recording import Recording
+    from simnav.scenario import Scenario
     from simnav.trial import Trial
 
 __all__ = ["fault_spans", "fixes", "innovation_unit", "outage_spans", "relative_track", "run_figure", "true_track"]
@@ -124,7 +126,12 @@ def _without(recording: Recording, name: str, channel: str, start: float, end: f
     return [(float(time[i]), float(min(ends[j], end))) for i, j in edges.reshape(-1, 2)]
 
 
-def run_figure(recording: Recording, trials: Sequence[tuple[str, Trial]], references: Sequence[str] = ()) -> Figure:
+def run_figure(
+    recording: Recording,
+    trials: Sequence[tuple[str, Trial]],
+    references: Sequence[str] = (),
+    scenario: Scenario | None = None,
+) -> Figure:
     """The figure of ``simnav run --plot``.
 
     Parameters
@@ -135,6 +142,8 @@ def run_figure(recording: Recording, trials: Sequence[tuple[str, Trial]], refere
         Those without any epoch are left out.
     references : sequence of str
         Labels of those that are told the truth.
+    scenario : Scenario or None
+        Of the run; it has the obstacles around a receiver of raw observations.
     """
     shown = [(label, trial, errors(trial, recording)) for label, trial in trials if len(trial)]
     style = Style((label for label, _, _ in shown), references)
@@ -167,6 +176,7 @@ def run_figure(recording: Recording, trials: Sequence[tuple[str, Trial]], refere
         faults=fault_spans(recording),
         diagnostics=_diagnostics(shown, recording),
         bounds={_label(f"nis.{name}", _UNITS["nis"]): _nis_bound(name, recording) for name in recording.data.aids},
+        sky=sky_view(recording, scenario),
         title=f"{recording.scenario}, seed {recording.seed}{note}",
     )
 

@@ -7,6 +7,7 @@ a file for each scenario and choice of seeds, named after a digest of all that d
 from __future__ import annotations
 
 import contextlib
+import inspect
 import json
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
@@ -19,11 +20,13 @@ import numpy as np
 from simnav.leaderboard.campaign.fingerprint import recording_digest
 from simnav.leaderboard.campaign.sources import code_of, digest
 from simnav.leaderboard.figures.run_figure import fixes, innovation_unit, true_track
+from simnav.leaderboard.figures.sky_view import sky_view
 from simnav.leaderboard.results.user_cache import keep, user_cache
 
 from .charts import NO_BOUND, columns
 from .facts import EVENT, catalogued, datasheets, events
 from .rounding import short, spaced
+from .sky_charts import sky_data
 
 if TYPE_CHECKING:
     from simnav.recording import Recording
@@ -65,6 +68,8 @@ class Background:
         faults known.
     runs : dict of str to dict
         By seed: ``faults`` as columns, and ``track`` as from `track_of`.
+    sky : dict
+        Of the first run that is shown, as from `simnav.leaderboard.site.sky_charts.sky_data`.
     """
 
     happening: dict[str, list[Any]] = field(default_factory=lambda: columns(EVENT, ()))
@@ -72,6 +77,7 @@ class Background:
     units: dict[str, list[Any]] = field(default_factory=dict)
     bound: Mapping[str, list[Any]] = field(default_factory=lambda: NO_BOUND)
     runs: dict[str, dict[str, Any]] = field(default_factory=dict)
+    sky: dict[str, Any] = field(default_factory=dict)
 
 
 def prepare() -> None:
@@ -123,6 +129,7 @@ def background(identity: str, seeds: Iterable[int]) -> Background:
             str(seed): {"faults": _faults(recording), "track": track_of(recording)}
             for seed, recording in recordings.items()
         },
+        sky=sky_data(sky_view(first, scenario)),
     )
 
 
@@ -211,7 +218,10 @@ def _code() -> tuple[str, str]:
     from simnav.leaderboard.campaign.fingerprint import simulator_version, with_library
     from simnav.leaderboard.results.provenance import numerics
 
-    return simulator_version(), with_library(digest(code_of(Path(__file__)).digest, *numerics()))
+    files = dict.fromkeys(
+        inspect.getfile(part) for part in (background, events, columns, short, true_track, sky_view, sky_data)
+    )
+    return simulator_version(), with_library(digest(*(code_of(Path(file)).digest for file in files), *numerics()))
 
 
 def _file(identity: str, seeds: Sequence[int]) -> Path | None:

@@ -23,6 +23,7 @@ from .curves import Curves, Gathered
 from .latency import latency_chart
 from .overview import OVER_SCENARIOS, bar_scale, board_columns, board_row
 from .rounding import short
+from .sky_charts import sky_charts
 from .sweeps import SweepFile
 
 if TYPE_CHECKING:
@@ -277,6 +278,7 @@ def _over_all_runs(
         ends = [t for t in around.happening["end"] if t is not None]
         duration = max([entry.duration, float(time[-1]) if len(time) else 0.0, *ends])
         made.append(charts.timeline("timeline", {"events": around.happening}, f"Of seed {first}.", duration))
+    made += sky_charts(around.sky, first)
     timed_runs = [count for c in by.values() if (count := sum(bool(len(x.time)) for x in c))]
     drawn, wide = _counted(timed_runs, len(entry.seeds)), max(timed_runs, default=0) >= _BAND
     band = (

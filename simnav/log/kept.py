@@ -7,7 +7,7 @@ import stat
 from collections.abc import Callable
 from functools import lru_cache, wraps
 from pathlib import Path
-from typing import Concatenate, ParamSpec, TypeVar
+from typing import Concatenate, ParamSpec, TypeVar, cast
 
 from simnav.log.table import LogError
 
@@ -46,10 +46,10 @@ def kept(
             if stat.S_ISDIR(state.st_mode) and not folders:
                 raise LogError(f"{path}: it is a folder, where a file is wanted")
             try:
-                return known(path, state.st_mtime_ns, state.st_size, *args, **kwargs)
+                return known(path, state.st_mtime_ns, state.st_size, *args, **kwargs)  # type: ignore[arg-type]  # see the docstring
             except OSError as error:
                 raise LogError(f"{path} cannot be read: {error.strerror or error}") from None
 
-        return reading
+        return cast(Callable[Concatenate[Path, P], T], reading)
 
     return wrap

@@ -21,10 +21,10 @@ from simnav.log.files import FileSpec
 from simnav.log.growing import GrowingTable
 from simnav.log.kept import kept
 from simnav.log.nmea_sentences import SENTENCES, InvalidError, Row
-from simnav.log.progress import tell
 from simnav.log.reader import Rows, register_reader
 from simnav.log.table import LogError, LogWarning, Table, utc_seconds
 from simnav.spec import closest
+from simnav.watchers import tell
 
 __all__ = ["SENTENCES", "NmeaFile", "read_nmea", "take_variation"]
 

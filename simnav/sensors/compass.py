@@ -23,6 +23,11 @@ class MagneticCompass(AidSpec):
     The remaining deviation by hard iron is B sin(heading) + C cos(heading), with the semicircular coefficients B and C
     (Bowditch, *The American Practical Navigator*, 2019, chapter 8). B and C are drawn with the standard deviation
     ``deviation``, and ``fixed_deviation`` = (B, C) is added. The constant coefficient A is the bias.
+
+    Attributes
+    ----------
+    deviation : float
+        Semicircular coefficients B and C of the deviation that remains, one sigma [rad].
     """
 
     errors: ClassVar[tuple[str, ...]] = (*AidSpec.errors, "deviation")
@@ -58,6 +63,11 @@ class Gyrocompass(AidSpec):
     along the horizontal component of Earth rate plus transport rate, so the heading is too large by atan2(v_N / (R_M +
     h), omega cos(latitude) + v_E / (R_N + h)), with the velocity north v_N and east v_E, the radii of curvature R_M and
     R_N, the height h and the Earth rate omega (Bowditch 2019, chapter 8: the speed, or steaming, error).
+
+    Attributes
+    ----------
+    speed_error : bool
+        Whether the reading has the speed (steaming) error.
     """
 
     kind: Literal["gyrocompass"] = "gyrocompass"

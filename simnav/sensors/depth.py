@@ -45,6 +45,13 @@ class Depth(AidSpec):
 
     With ``surroundings.water_column`` the sensor converts the pressure of that water by ``assumed_density`` and
     standard gravity, or, without it, by the formula of the standard ocean (`simnav.world.water_column`).
+
+    Attributes
+    ----------
+    waves : bool
+        Whether the sensor reads the pressure of the waves above it.
+    assumed_density : float or None
+        Density by which the sensor converts pressure [kg/m^3]; without it, the standard ocean.
     """
 
     later: ClassVar[Mapping[str, Any]] = {**AidSpec.later, "waves": False, "assumed_density": None}

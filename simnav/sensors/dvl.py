@@ -58,6 +58,13 @@ class Dvl(AidSpec):
     first order R(eta)' u = u - eta x u. The white noise of a ping has the variance sigma^2 + (speed_noise |u|)^2; the
     datasheet gives sigma. The DVL has bottom lock while the altitude of the transducer is between ``minimum_altitude``
     and ``maximum_altitude``; without a bottom (`simnav.world.surroundings`) it always has.
+
+    Attributes
+    ----------
+    speed_noise : float
+        Part of the white noise that grows with speed, one sigma [-].
+    minimum_altitude, maximum_altitude : float
+        Altitudes of the transducer between which it has bottom lock [m].
     """
 
     errors: ClassVar[tuple[str, ...]] = (*AidSpec.errors, "speed_noise")

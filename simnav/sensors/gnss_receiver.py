@@ -36,7 +36,15 @@ _LEAST_SIGMA = (1e-3, 1e-4)
 
 
 class _ReceiverSpec(AidSpec):
-    """What both kinds have in common. Attributes as of `GnssReceiver`."""
+    """What both kinds have in common.
+
+    Attributes
+    ----------
+    observations : str
+        Name of the instrument of kind ``gnss_raw`` whose observations it solves.
+    false_alarm : float
+        Probability of a false alarm of RAIM in each solution; 0 for no RAIM.
+    """
 
     observations: str = "gnss_raw"
     false_alarm: float = Field(1e-5, ge=0.0, lt=0.5)
@@ -55,12 +63,8 @@ class GnssReceiver(_ReceiverSpec):
 
     Attributes
     ----------
-    observations : str
-        Name of the instrument of kind ``gnss_raw`` whose observations it solves.
     sigma, bias_instability, correlation_time
         What the datasheet says about the error of the position; the error itself comes from the observations.
-    false_alarm : float
-        Probability of a false alarm of RAIM in each solution; 0 for no RAIM.
     """
 
     kind: Literal["gnss_receiver"] = "gnss_receiver"
@@ -83,7 +87,7 @@ class GnssReceiver(_ReceiverSpec):
     example={"sigma_m_s": 0.05, "lever_arm_m": [1.0, 0.0, -3.0]},
 )
 class GnssReceiverVelocity(_ReceiverSpec):
-    """Velocity of the antenna by Doppler. Attributes as of `GnssReceiver`."""
+    """Velocity of the antenna by Doppler."""
 
     kind: Literal["gnss_receiver_velocity"] = "gnss_receiver_velocity"
     sigma: SigmaTriple = quantity("m_s")

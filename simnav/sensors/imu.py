@@ -139,6 +139,13 @@ class ImuSpec(Spec):
     With ``model`` or ``grade`` its figures are those of a manufacturer (`simnav.sensors.imu_models`). Figures that are
     given beside it replace them one by one.
 
+    Attributes
+    ----------
+    rate : float
+        Samples per second [Hz].
+    gyroscope, accelerometer : GyroscopeSpec, AccelerometerSpec
+        Figures of the three axes.
+
     Examples
     --------
     >>> imu = ImuSpec.from_toml({"rate_hz": 100, "gyroscope": {"random_walk_deg_sqrt_h": 0.01}})

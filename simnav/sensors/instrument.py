@@ -82,9 +82,9 @@ _CHANNEL, _MOST_CHANNELS = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.+-]*"), 1000
 class AidSpec(Spec):
     """Base class of the specifications of aiding instruments.
 
-    Subclasses declare ``sigma`` and, as far as they apply, ``bias``, ``bias_instability``, ``scale``,
-    ``misalignment``, ``lever_arm``, ``lever_arm_sigma`` and their ``fixed_`` forms, each with its unit. If the
-    components of a measurement have different units, each has a field of its own: ``sigma_range``, ``sigma_bearing``.
+    Subclasses declare ``sigma`` and, as far as they apply, the fields from ``bias`` to ``lever_arm_sigma`` below and
+    their ``fixed_`` forms, each with its unit. If the components of a measurement have different units, each has a
+    field of its own: ``sigma_range``, ``sigma_bearing``.
 
     Attributes
     ----------
@@ -97,6 +97,20 @@ class AidSpec(Spec):
     unstated : tuple of str
         The error fields whose one-sigma figure is in no datasheet. Only the oracles know it, see
         `simnav.scenario.Scenario.actual_sheet`.
+    rate, phase
+        The readings are of the times phase, phase + 1/rate, and so on.
+    sigma
+        White noise of a reading, one sigma.
+    bias
+        Turn-on bias, one sigma: it is drawn for each run, and constant in it.
+    bias_instability, correlation_time
+        In-run bias, a first-order Gauss-Markov process: one sigma and correlation time (inf: a random walk).
+    scale
+        Scale-factor error, one sigma.
+    misalignment
+        Error of the mounting about each body axis, one sigma.
+    lever_arm, lever_arm_sigma
+        Vector from the IMU to the instrument (forward, starboard, down), and how well it was measured, one sigma.
     """
 
     definition: ClassVar[Kind]
@@ -207,6 +221,10 @@ class AidSpec(Spec):
         With sources `build` returns a `simnav.sensors.DerivedInstrument`. A source reads no other instrument itself.
         """
         return {}
+
+    def latency_spread(self) -> float | None:
+        """By how much the latencies of two readings may differ [s]; None: each reading arrives when it is valid."""
+        return None if self.timing is None else self.timing.spread
 
     def origin(self) -> Mapping[str, str]:
         """What an export needs beyond the datasheet, such as the date (`Recording.origins`); nothing by default."""

@@ -60,6 +60,15 @@ class SpeedLog(AidSpec):
     With ``protrusion``, ``distance_from_bow`` and ``calibrated_at`` the log is within the boundary layer of the hull
     (`layer_share`), and was calibrated at a speed: it reads too little below it, and too much above. With ``shear`` the
     water is that at the depth of the sensor, where a current with ``shear_per_s`` is weaker than at the surface.
+
+    Attributes
+    ----------
+    protrusion, distance_from_bow : float or None
+        Place of the sensor in the boundary layer: distance from the hull and from the bow [m].
+    calibrated_at : float or None
+        Speed at which the log was calibrated in the boundary layer [m/s].
+    shear : bool
+        Whether it measures the current at its own depth, where ``shear_per_s`` makes that weaker.
     """
 
     later: ClassVar[Mapping[str, Any]] = {

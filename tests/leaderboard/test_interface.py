@@ -123,8 +123,11 @@ CALLS: dict[str, tuple[list[str], Callable[[], Any]]] = {
         ).to_dict(),
     ),
     "campaign": (
-        ["campaign", "-s", "pond.toml", "-e", "gnss-only,ship-ekf", "-n", "2", "-o", "out", "--no-oracle"],
-        lambda: simnav.campaign("pond.toml", "gnss-only,ship-ekf", runs=2, output="out", oracle=False).to_dict(),
+        ["campaign", "-s", "pond.toml", "-e", "gnss-only,ship-ekf", "-n", "2", "-o", "out", "--no-oracle",
+         "--workers", "1"],
+        lambda: simnav.campaign(
+            "pond.toml", "gnss-only,ship-ekf", runs=2, output="out", workers=1, oracle=False
+        ).to_dict(),
     ),
     "leaderboard": (["leaderboard", "out", "-o", "theirs", "--workers", "1"], call_leaderboard),
     "bound": (

@@ -17,10 +17,10 @@ import numpy as np
 from simnav.log.files import FileSpec
 from simnav.log.growing import GrowingTable
 from simnav.log.kept import kept
-from simnav.log.progress import tell
 from simnav.log.reader import Rows, register_reader
 from simnav.log.table import LogError, Table
 from simnav.spec import closest
+from simnav.watchers import tell
 
 __all__ = ["topics_of"]
 

@@ -23,9 +23,9 @@ from simnav.log.growing import GrowingTable
 from simnav.log.kept import kept
 from simnav.log.nmea import NmeaFile, take_variation
 from simnav.log.nmea_sentences import Row
-from simnav.log.progress import tell
 from simnav.log.reader import Rows, register_reader
 from simnav.log.table import LogError, LogWarning, utc_seconds
+from simnav.watchers import tell
 
 __all__ = ["PGNS", "read_n2k"]
 

@@ -21,9 +21,9 @@ from simnav.log.binary import refuse_binary
 from simnav.log.files import FileSpec
 from simnav.log.growing import GrowingTable
 from simnav.log.kept import kept
-from simnav.log.progress import tell
 from simnav.log.reader import Rows, register_reader
 from simnav.log.table import LogError, LogWarning, Table
+from simnav.watchers import tell
 
 _DEG = math.pi / 180.0
 _NUMBER = re.compile(r"[+-]?\d{1,9}(\.\d*)?", re.ASCII)

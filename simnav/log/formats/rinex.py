@@ -22,9 +22,9 @@ from simnav.log.formats.gps_time import leap_seconds
 from simnav.log.growing import GrowingTable
 from simnav.log.kept import kept
 from simnav.log.nmea import NmeaFile
-from simnav.log.progress import tell
 from simnav.log.reader import Rows, register_reader
 from simnav.log.table import LogError, LogWarning
+from simnav.watchers import tell
 
 __all__ = ["read_rinex"]
 

@@ -21,9 +21,9 @@ from simnav.log.files import FileSpec
 from simnav.log.growing import GrowingTable
 from simnav.log.kept import kept
 from simnav.log.nmea import NmeaFile
-from simnav.log.progress import tell
 from simnav.log.reader import Rows, register_reader
 from simnav.log.table import LogError, LogWarning
+from simnav.watchers import tell
 
 __all__ = ["read_ubx"]
 

@@ -121,6 +121,13 @@ class NoiseStep(FaultSpec):
     Noise is added to the measurement. Its variance is the difference between the new variance and the square of the
     measurement's own ``sigma``, so that the fault also works on real logs. If the measurement is noisier already,
     nothing is added.
+
+    Attributes
+    ----------
+    factor : float or None
+        The new sigma, as a multiple of the measurement's own.
+    sigma_position, sigma_velocity, sigma_heading : float or tuple or None
+        The new sigma [m, m/s, rad].
     """
 
     stems: ClassVar[tuple[str, ...]] = ("sigma",)
@@ -174,6 +181,17 @@ class GrossError(FaultSpec):
     The ``distribution`` is "uniform": size = [minimum, maximum], with a random sign; "normal": size is the standard
     deviation; or "fixed": size is the error itself. With ``common`` one random number is drawn for all axes, otherwise
     one for each axis.
+
+    Attributes
+    ----------
+    probability : float
+        Share of the measurements that have one.
+    distribution : str
+        ``uniform``, ``normal`` or ``fixed``.
+    common : bool
+        Whether all axes have the same random number.
+    size_position, size_velocity, size_heading : float or tuple or None
+        Size [m, m/s, rad].
     """
 
     stems: ClassVar[tuple[str, ...]] = ("size",)
@@ -235,7 +253,15 @@ class _GrossError(AdditiveLayer):
 
 @register_fault
 class Multipath(FaultSpec):
-    """A time-correlated error: a first-order Gauss-Markov process, stationary from the start."""
+    """A time-correlated error: a first-order Gauss-Markov process, stationary from the start.
+
+    Attributes
+    ----------
+    correlation_time : float
+        Correlation time of the error [s].
+    sigma_position, sigma_velocity, sigma_heading : float or tuple or None
+        Standard deviation of the error [m, m/s, rad].
+    """
 
     stems: ClassVar[tuple[str, ...]] = ("sigma",)
     effect: ClassVar[Effect] = "lasting"
@@ -273,7 +299,13 @@ class _Multipath(AdditiveLayer):
 
 @register_fault
 class Ramp(FaultSpec):
-    """An error that grows from zero at the start of each interval, with the rate ``slope``."""
+    """An error that grows from zero at the start of each interval, with the rate ``slope``.
+
+    Attributes
+    ----------
+    slope_position, slope_velocity, slope_heading : float or tuple or None
+        How fast the error grows [m/s, m/s^2, rad/s].
+    """
 
     stems: ClassVar[tuple[str, ...]] = ("slope",)
     effect: ClassVar[Effect] = "growing"
@@ -297,7 +329,13 @@ class _Ramp(AdditiveLayer):
 
 @register_fault
 class BiasStep(FaultSpec):
-    """A constant error, ``offset``, by axis: north-east-down for positions and GNSS velocity, body axes for a DVL."""
+    """A constant error, ``offset``, by axis: north-east-down for positions and GNSS velocity, body axes for a DVL.
+
+    Attributes
+    ----------
+    offset_position, offset_velocity, offset_heading : float or tuple or None
+        The error [m, m/s, rad].
+    """
 
     stems: ClassVar[tuple[str, ...]] = ("offset",)
     effect: ClassVar[Effect] = "lasting"

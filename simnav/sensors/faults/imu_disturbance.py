@@ -24,6 +24,13 @@ class ImuDisturbance(FaultSpec):
     """A constant error and white noise on the IMU's output, for each body axis; one number sets all three axes.
 
     ``specific_force_noise`` and ``angular_rate_noise`` are the standard deviation of a sample.
+
+    Attributes
+    ----------
+    specific_force, angular_rate : tuple
+        Constant error of each axis [m/s^2, rad/s].
+    specific_force_noise, angular_rate_noise : tuple
+        Standard deviation of a sample of each axis [m/s^2, rad/s].
     """
 
     effect: ClassVar[Effect] = "imu"

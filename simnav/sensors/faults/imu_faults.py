@@ -46,7 +46,13 @@ class ImuFaultSpec(FaultSpec):
 
 @register_fault
 class ImuBiasStep(ImuFaultSpec):
-    """The biases of the IMU change at the start, in the units of datasheets; one number sets all three axes."""
+    """The biases of the IMU change at the start, in the units of datasheets; one number sets all three axes.
+
+    Attributes
+    ----------
+    angular_rate, specific_force : tuple
+        Change of the bias of each axis [rad/s, m/s^2].
+    """
 
     kind: Literal["imu_bias_step"] = "imu_bias_step"
     angular_rate: Triple = quantity("deg_h", ZERO, also=("deg_s",))
@@ -66,7 +72,13 @@ class ImuBiasStep(ImuFaultSpec):
 
 @register_fault
 class ImuClipping(ImuFaultSpec):
-    """The output of the IMU saturates at smaller values than its range."""
+    """The output of the IMU saturates at smaller values than its range.
+
+    Attributes
+    ----------
+    angular_rate_limit, specific_force_limit : float
+        Size at which the output saturates [rad/s, m/s^2].
+    """
 
     kind: Literal["imu_clipping"] = "imu_clipping"
     angular_rate_limit: Positive = quantity("deg_s", inf)
@@ -89,6 +101,11 @@ class ImuDropout(ImuFaultSpec):
     """Samples of the IMU are lost, and in their place it repeats the last one before, or reads zero.
 
     With ``mean_active_s`` and ``mean_gap_s`` they are lost in random bursts.
+
+    Attributes
+    ----------
+    output : str
+        What it gives in place of lost samples: ``last`` or ``zero``.
     """
 
     kind: Literal["imu_dropout"] = "imu_dropout"

@@ -328,7 +328,7 @@ def test_a_new_estimator_works_and_keeps_the_contract(here):
     mine, gnss = (e["scores"]["horizontal_rmse"] for e in run)
     assert mine < 1.5 * gnss  # a start that is worth having
     before = (here / "slow_filter.py").read_text()
-    assert "already" in complaint("new-estimator", "slow-filter")
+    assert "already" in complaint("new-estimator", "slow_filter.py")
     assert "exists" in complaint("new-estimator", "quick-filter", "--output", "slow_filter.py")
     assert (here / "slow_filter.py").read_text() == before
 
