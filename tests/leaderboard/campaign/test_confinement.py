@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from simnav.compiled import cache_directory
 from simnav.estimator import make
 from simnav.leaderboard.campaign.confinement import attempt as attempt_module
 from simnav.leaderboard.campaign.confinement import bubblewrap, landlock, seccomp
@@ -27,6 +28,7 @@ from simnav.leaderboard.campaign.confinement.attempt import (
     seed_words,
 )
 from simnav.leaderboard.campaign.confinement.limits import resident
+from simnav.leaderboard.campaign.confinement.server import _load_kernels as load_kernels
 from simnav.leaderboard.campaign.confinement.session import EstimatorServer, Limits, NoAnswerError
 from simnav.leaderboard.campaign.entrant import Entrant
 from simnav.leaderboard.campaign.sources import may_call_kernels
@@ -253,6 +255,33 @@ def test_kernels_are_loaded_when_the_first_one_may_call_them(recording: Recordin
         assert attempt(server, entrant("ekf"), recording, Limits(60.0, 1 << 30)).status == "ok"
     finally:
         close_server()
+
+
+def test_a_server_loads_no_kernel_that_an_estimator_left(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """In a sandbox estimators run before the kernels are loaded, and have the folder of the kernels in common."""
+    given = cache_directory()
+    assert given is not None
+    monkeypatch.setenv("SIMNAV_CACHE_DIR", str(tmp_path))
+    target = cache_directory()
+    assert target is not None
+    assert tmp_path in target.parents
+    ours = next(path for path in given.rglob("*.nbi"))
+    planted = target / ours.relative_to(given)
+    planted.parent.mkdir(parents=True)
+    planted.write_bytes(b"a compiled function of a stranger")
+    child = os.fork()  # its memory is settled for ever
+    if child == 0:
+        code = 1
+        try:
+            read = []
+            monkeypatch.setattr(
+                "simnav.compiled.Kernel.compile", lambda self: read.append(planted.read_bytes() == ours.read_bytes())
+            )
+            load_kernels(str(given))
+            code = 0 if read and all(read) and not target.exists() else 2
+        finally:
+            os._exit(code)
+    assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 0
 
 
 def test_a_server_that_is_gone_before_its_kernels_are_loaded_is_no_failure_of_an_estimator() -> None:
