@@ -2,8 +2,8 @@
 
 ``python -m tests.benchmarks.vector_steps`` prints a table of medians. Those on one core step in turn, and their seconds
 are of processor time, which other processes disturb least. On two cores they are of the clock: run it on a machine that
-does nothing else. Voyages are prepared beforehand. With names of parts (``environment``, ``tuning``, ``guidance``) it
-measures these only, and with ``--one-core`` nothing on two cores.
+does nothing else. Voyages are prepared beforehand. With names of parts (``step``,
+``environment``, ``tuning``, ``guidance``) it measures these only, and with ``--one-core`` nothing on two cores.
 """
 
 from __future__ import annotations
@@ -24,6 +24,8 @@ from simnav.estimators.learning.pool import Pool
 from simnav.estimators.learning.vector import FilterTaskVectorEnv
 
 N, STEPS, ROUNDS = 64, 150, 7
+#: Steps of a voyage of `GUIDANCE`.
+VOYAGE = 319
 TUNING = ("training-gnss-faults", "Tuning")
 GUIDANCE = "gnss-noise-step"
 
@@ -48,14 +50,12 @@ def rate(envs, steps, clock=time.perf_counter, actions=None):
 
 def in_turn(all_envs, steps, clock=time.process_time):
     """The median rate of several vector forms that step in turn."""
-    rates, actions = {name: [] for name in all_envs}, {}
-    for name, envs in all_envs.items():
-        _, infos = envs.reset(seed=1)
-        if envs.action_space.shape[1:] == (3, 3):  # estimates: the starts
-            actions[name] = np.stack([np.stack([s.position, s.velocity, s.attitude]) for s in infos["start"]])
+    rates = {name: [] for name in all_envs}
+    for envs in all_envs.values():
+        envs.reset(seed=1)
     for _ in range(ROUNDS):
         for name, envs in all_envs.items():
-            rates[name].append(rate(envs, steps[name], clock, actions.get(name)))
+            rates[name].append(rate(envs, steps[name], clock))
     return {name: float(np.median(found)) for name, found in rates.items()}
 
 
@@ -82,12 +82,40 @@ def on_two_cores(make, steps):
     return 2.0 * float(np.median(found))
 
 
+def measure_step(two_cores):
+    """A step of one environment: the least and the median of windows of 64 steps, in microseconds."""
+    for name in (GUIDANCE, "open-sea"):
+        for loop, closed in (("open loop", False), ("closed loop", True)):
+            env, found = NavigationEnv(name, closed_loop=closed), []
+            for seed in range(4):
+                _, info = env.reset(seed=seed)
+                start = info["start"]
+                action = np.stack([start.position, start.velocity, start.attitude])
+                for k in range(5):
+                    begun = time.process_time()
+                    for _ in range(56 if k == 0 else 64):  # the first are short stretches
+                        env.step(action)
+                    found += [(time.process_time() - begun) / 64] if k else []
+            print(f"  {name} in {loop:12}{1e6 * min(found):8.1f} us, median{1e6 * np.median(found):8.1f} us")
+
+
 def measure_environment(two_cores):
+    """Whole voyages, without their resets, the fastest of three: a form may simulate many steps in one of them."""
     for loop, closed in (("open loop", False), ("closed loop", True)):
         single = partial(NavigationEnv, GUIDANCE, closed_loop=closed)
         simnav = NavigationVectorEnv(GUIDANCE, N, closed_loop=closed)
-        forms = {"simnav": simnav, "SyncVectorEnv": SyncVectorEnv([single] * N)}
-        show(f"Environment in {loop}", in_turn(forms, {"simnav": 40, "SyncVectorEnv": 40}))
+        forms, found = {"simnav": simnav, "SyncVectorEnv": SyncVectorEnv([single] * N)}, {}
+        for seed in (1, 100, 200):
+            for name, envs in forms.items():
+                actions = starts(envs.reset(seed=seed)[1])
+                steps = rate(envs, VOYAGE, time.process_time, actions)
+                found[name] = max(steps, found.get(name, 0.0))
+        show(f"Environment in {loop}", found)
+
+
+def starts(infos):
+    """The starts of voyages, as estimates."""
+    return np.stack([np.stack([s.position, s.velocity, s.attitude]) for s in infos["start"]])
 
 
 def measure_tuning(two_cores):
@@ -115,7 +143,12 @@ def measure_guidance(two_cores):
     show("Guidance", found)
 
 
-PARTS = {"environment": measure_environment, "tuning": measure_tuning, "guidance": measure_guidance}
+PARTS = {
+    "step": measure_step,
+    "environment": measure_environment,
+    "tuning": measure_tuning,
+    "guidance": measure_guidance,
+}
 
 
 def main():
