@@ -37,7 +37,8 @@ def draw_start(truth: NavigationStates, covariance: Array, seed: int, factors: A
         If the covariance is not symmetric and positive definite.
     """
     covariance = np.asarray(covariance, dtype=np.float64)
-    if covariance.shape != (9, 9) or not np.allclose(covariance, covariance.T):
+    square = covariance.shape == (9, 9)
+    if not square or not (np.array_equal(covariance, covariance.T) or np.allclose(covariance, covariance.T)):
         raise ValueError(f"an initial covariance is a symmetric (9, 9) array, not one of shape {covariance.shape}")
     try:
         root = np.linalg.cholesky(covariance)

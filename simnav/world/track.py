@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from math import sqrt
+from threading import Lock
 from typing import ClassVar, Protocol
 
 import numpy as np
@@ -10,7 +11,9 @@ import numpy as np
 from simnav.compiled import kernel
 from simnav.types import Array, NavigationStates
 
-__all__ = ["PlannedTrack"]
+__all__ = ["Follower", "PlannedTrack"]
+
+_EXTENDING = Lock()
 
 
 @kernel("Tuple((f8, i8))(f8[:, ::1], i8, i8, f8, f8)")
@@ -74,21 +77,34 @@ class PlannedTrack:
         self.points = world.track[None]
         self.position = world.state().position.copy()
         self.dives = world.dive[None]
-        self._at = 0
 
     def reach(self, time: float) -> None:
         """Extend the track up to a time [s]."""
-        more = int(time) + 2 - len(self.points)
-        if more > 0:
-            track, position, dives = self._world.trace(more)
-            self.points = np.concatenate([self.points, track])
-            self.position = np.concatenate([self.position, position])
-            self.dives = np.concatenate([self.dives, dives])
+        with _EXTENDING:  # runs in several threads may share a track
+            more = int(time) + 2 - len(self.points)
+            if more > 0:
+                track, position, dives = self._world.trace(more)
+                self.points = np.concatenate([self.points, track])
+                self.position = np.concatenate([self.position, position])
+                self.dives = np.concatenate([self.dives, dives])
+
+
+class Follower:
+    """Where a run is along a planned track, which may be that of many runs.
+
+    Parameters
+    ----------
+    track : PlannedTrack
+        The track.
+    """
+
+    def __init__(self, track: PlannedTrack):
+        self._track, self._at, self._length = track, 0, 1
 
     def aside(self, north: float, east: float, time: float) -> tuple[float, float]:
         """The distance of a position to starboard of the track [m], and the planned speed there [m/s].
 
-        The nearest point is searched within `WINDOW` seconds of the last nearest point.
+        The nearest point is searched within `PlannedTrack.WINDOW` seconds of the last nearest point.
 
         Parameters
         ----------
@@ -97,7 +113,12 @@ class PlannedTrack:
         time : float
             Present time of the run [s].
         """
-        if int(time) + self.WINDOW >= len(self.points):
-            self.reach(time + 4 * self.WINDOW)
-        aside, self._at = _aside(self.points, self._at, self.WINDOW, north, east)
-        return aside, float(self.points[self._at, 3])
+        window = PlannedTrack.WINDOW
+        if int(time) + window >= self._length:
+            # Other runs may have extended the track further: it is as long as if it were this run's alone.
+            until = time + 4 * window
+            self._length = max(self._length, int(until) + 2)
+            self._track.reach(until)
+        points = self._track.points[: self._length]
+        aside, self._at = _aside(points, self._at, window, north, east)
+        return aside, float(points[self._at, 3])

@@ -17,7 +17,7 @@ from simnav.world.manoeuvring import dynamics
 from simnav.world.manoeuvring.hull import Hull
 from simnav.world.sea import Sea, components, steady, wave_number
 from simnav.world.start import Start
-from simnav.world.track import PlannedTrack
+from simnav.world.track import Follower, PlannedTrack
 from simnav.world.trajectory import WorldBlock
 from simnav.world.vessel import KinematicVessel
 from simnav.world.wind import AirFlow
@@ -77,7 +77,7 @@ class World:
         if not rate > 0.0:
             raise ValueError(f"rate = {rate!r} Hz should be positive")
         self.rate = float(rate)
-        self._plan: PlannedTrack | None = None
+        self._follower: Follower | None = None
         self._voyage = start, vessel, manoeuvres, current, air
         p = np.zeros(motion.PARAMETERS)
         p[motion.DT] = 1.0 / rate
@@ -154,9 +154,9 @@ class World:
         """
         x = self._x
         x[motion.ERROR_NORTH], x[motion.ERROR_EAST], x[motion.ERROR_HEADING] = north, east, heading
-        if self._plan is None:
-            self._plan = World.plan(*self._voyage)
-        aside, speed = self._plan.aside(float(x[motion.NORTH]) + north, float(x[motion.EAST]) + east, self.time)
+        if self._follower is None:
+            self._follower = Follower(_planned(*self._voyage))
+        aside, speed = self._follower.aside(float(x[motion.NORTH]) + north, float(x[motion.EAST]) + east, self.time)
         ahead = max(LEAST_LOOKAHEAD, LOOKAHEAD_TIME * speed)
         x[motion.TO_TRACK] = -np.arctan(aside / ahead)
 
@@ -289,3 +289,24 @@ class World:
         # Division, not multiplication by the interval: the time is then the float nearest to the decimal, 2.29 s.
         time = np.arange(first + 1, first + n + 1) / self.rate
         return WorldBlock(ImuSamples(time, np.full(n, 1.0 / self.rate), rate[0], force[0]), out)
+
+
+#: The tracks that were planned last, by what they follow from.
+_plans: dict[tuple[type, str], PlannedTrack] = {}
+
+
+def _planned(
+    start: Start,
+    vessel: KinematicVessel,
+    manoeuvres: Sequence[Manoeuvre],
+    current: Current | None,
+    air: AirFlow | None,
+) -> PlannedTrack:
+    """The planned track, one for all runs with the same voyage: to plan it takes as long as a fifth of the run."""
+    key = type(vessel), repr((start, vessel, tuple(manoeuvres), current, None if air is None else air.wind))
+    track = _plans.get(key)
+    if track is None:
+        if len(_plans) > 7:
+            _plans.pop(next(iter(_plans)), None)
+        track = _plans[key] = World.plan(start, vessel, manoeuvres, current, air)
+    return track

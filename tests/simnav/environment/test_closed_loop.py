@@ -10,6 +10,7 @@ from simnav.geometry.earth import displace, relative_position
 from simnav.scenario import load
 from simnav.scenario.catalogue import headers
 from simnav.simulation.simulator import Simulator
+from simnav.world import world
 
 SIMULATED = [h.id for h in headers() if not h.recorded]
 QUICK = [name for name in SIMULATED if not name.startswith(("training", "random"))]
@@ -39,6 +40,19 @@ def test_a_wrong_estimate_takes_her_off_her_track(name):
 def test_a_wrong_heading_does_too():
     right, wrong = sailed("open-sea", (0.0, 0.0)), sailed("open-sea", (0.0, 0.0), heading=0.1)
     assert np.hypot(*relative_position(wrong, right)[:2]) > 5.0
+
+
+def test_a_planned_track_that_others_have_extended_is_the_same():
+    """Runs with one voyage share its planned track, which follows from the manoeuvres alone."""
+    world._plans.clear()
+    alone = sailed("open-sea", (0.0, 20.0), steps=80)
+    assert len(world._plans) == 1
+    (track,) = world._plans.values()
+    short = len(track.points)
+    track.reach(800.0)
+    assert len(track.points) > short
+    np.testing.assert_array_equal(sailed("open-sea", (0.0, 20.0), steps=80), alone)
+    assert list(world._plans.values()) == [track]
 
 
 def test_a_log_is_refused():
