@@ -75,7 +75,6 @@ from .propagation import (
     TURN_TIME,
     Samples,
     correct_inertial,
-    propagate_covariance,
     propagate_inertial,
 )
 from .state_blocks import StateBlocks
@@ -338,12 +337,10 @@ class InertialModel(ErrorModel):
             return
         self._first = propagate_inertial(
             (self.position, self.velocity, self.dcm, self._memory, self.bias, self._turn, self._clock), self._samples,
-            self._first, until, self._noise, self.transition, self.process_noise,
+            self._first, until, self._noise, self.transition, self.process_noise, covariance,
+            (self.calibration, self._decay, self._density), elapsed,
         )  # fmt: skip
         self.time = until
-        propagate_covariance(
-            covariance, self.transition, self.process_noise, self.calibration, self._decay, self._density, elapsed
-        )
         if self.blocks.clocks:
             self.blocks.carry_values(self.calibration, _NAV, elapsed)
             self.blocks.carry_covariance(covariance, elapsed)

@@ -64,6 +64,7 @@ SAMPLES = "Tuple((f8[::1], f8[::1], f8[:, ::1], f8[:, ::1]))"
 #: the mean rate of the one before; and the rate at the time of the state, extrapolated from both: a mean is half a
 #: sample old, which over the lever arm of a DVL in a seaway would be taken for a misalignment.
 Moving: TypeAlias = tuple[Array, Array, Array, Array, Array, Array, Array]
+MOVING = "Tuple((f8[::1], f8[::1], f8[:, ::1], f8[::1], f8[::1], f8[::1], f8[::1]))"
 
 
 @kernel()
@@ -276,10 +277,7 @@ def next_stretch(
     return i, stop, whole, hold
 
 
-@kernel(
-    "UniTuple(i8, 2)(Tuple((f8[::1], f8[::1], f8[:, ::1], f8[::1], f8[::1], f8[::1], f8[::1])), "
-    f"{SAMPLES}, i8, f8, f8[::1], f8[:, ::1])"
-)
+@kernel(f"UniTuple(i8, 2)({MOVING}, {SAMPLES}, i8, f8, f8[::1], f8[:, ::1])")
 def advance_inertial(
     state: Moving, samples: Samples, first: int, until: float, noise: Array, blocks: Array
 ) -> tuple[int, int]:
@@ -378,17 +376,6 @@ def advance_inertial(
     return i, count
 
 
-def propagate_inertial(
-    state: Moving, samples: Samples, first: int, until: float, noise: Array, transition: Array, process_noise: Array
-) -> int:
-    """Do `advance_inertial` and `accumulate_error`; return the index of the first sample not completely used."""
-    clock = state[-1]
-    blocks = np.empty((int((until - clock[0]) / BLOCK) + 2, BLOCK_COLUMNS))
-    first, count = advance_inertial(state, samples, first, until, noise, blocks)
-    accumulate_error(blocks, count, noise, transition, process_noise)
-    return first
-
-
 @kernel("void(f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[::1], f8[::1], f8[::1], f8)")
 def propagate_covariance(
     covariance: Array, transition: Array, process_noise: Array, calibration: Array, rate: Array, density: Array,
@@ -448,6 +435,40 @@ def propagate_covariance(
         for j in range(m, n):
             covariance[i, j] *= decay[i - m] * decay[j - m]
         covariance[i, i] += noise[i - m]
+
+
+@kernel(
+    f"i8({MOVING}, {SAMPLES}, i8, f8, f8[::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], "
+    "Tuple((f8[::1], f8[::1], f8[::1])), f8)"
+)
+def propagate_inertial(
+    state: Moving, samples: Samples, first: int, until: float, noise: Array, transition: Array, process_noise: Array,
+    covariance: Array, others: tuple[Array, Array, Array], elapsed: float,
+) -> int:  # fmt: skip
+    """Do `advance_inertial`, `accumulate_error` and `propagate_covariance` in one kernel.
+
+    Parameters
+    ----------
+    state, samples, first, until, noise
+        As of `advance_inertial`.
+    transition, process_noise : (15, 15) arrays
+        Overwritten, as by `accumulate_error`.
+    covariance, elapsed
+        As of `propagate_covariance`.
+    others : tuple of (n - 15,) arrays
+        Values, inverse correlation times and noise densities of the other states, as of `propagate_covariance`.
+
+    Returns
+    -------
+    int
+        Index of the first sample that is not completely used.
+    """
+    blocks = np.empty((int((until - state[6][0]) / BLOCK) + 2, BLOCK_COLUMNS))
+    first, count = advance_inertial(state, samples, first, until, noise, blocks)
+    accumulate_error(blocks, count, noise, transition, process_noise)
+    calibration, rate, density = others
+    propagate_covariance(covariance, transition, process_noise, calibration, rate, density, elapsed)
+    return first
 
 
 @kernel("void(f8[::1], f8[::1], f8[:, ::1], f8[::1], f8[::1], f8[::1])")
