@@ -433,8 +433,8 @@ class Chain(ABC):
         self.base += count
         self.nodes.drop(count)
         self.motions.drop(count)
-        self.aids.drop(int(np.searchsorted(self.aids["node"], self.base)))
-        folds = int(np.searchsorted(self.folds["node"], self.base))
+        self.aids.drop(int(self.aids["node"].searchsorted(self.base)))
+        folds = int(self.folds["node"].searchsorted(self.base))
         self.fold_base += folds
         self.folds.drop(folds)
 
@@ -457,7 +457,7 @@ class Chain(ABC):
 
     def factors_from(self, node: int) -> tuple[int, int]:
         """The indices of the first motion and aiding factors of a node of the window, or of a later one."""
-        return max(node - 1, 0), int(np.searchsorted(self.aids["node"], self.base + node)) if node else 0
+        return max(node - 1, 0), int(self.aids["node"].searchsorted(self.base + node)) if node else 0
 
     @abstractmethod
     def linearise_motion(self, first: int = 0) -> None:
@@ -476,7 +476,7 @@ class Chain(ABC):
             return
         at_node = aids["fold"] < 0
         self.observe(first, np.where(at_node, row, -1), self.nodes, "", jacobian)
-        self.move_folds(int(np.searchsorted(folds["node"], aids["node"][first])))
+        self.move_folds(int(folds["node"].searchsorted(aids["node"][first])))
         row = np.where(at_node, -1, aids["fold"] - self.fold_base)
         self.observe(first, row, folds, "now_", jacobian)
         add_motion_noise(
