@@ -13,7 +13,7 @@ import textwrap
 from collections.abc import Callable
 from dataclasses import MISSING, Field, dataclass, field, fields
 from fractions import Fraction
-from functools import wraps
+from functools import cache, wraps
 from typing import Any, ParamSpec, Protocol, TypeVar, cast, dataclass_transform
 
 from simnav.leaderboard.results.errors import RequestError
@@ -101,6 +101,11 @@ def option_of(declared: Field[Any]) -> Option:
     return found
 
 
+@cache  # many requests share options
+def _filled(text: str) -> str:
+    return textwrap.fill(text, _WIDTH, initial_indent="    ", subsequent_indent="    ")
+
+
 @dataclass_transform(frozen_default=True, field_specifiers=(option,))
 def request(cls: type[T]) -> type[T]:
     """Make a class a request: a frozen dataclass whose documentation lists the options.
@@ -112,8 +117,7 @@ def request(cls: type[T]) -> type[T]:
     for f in options_of(made):
         told = option_of(f)
         lines.append(f"{f.name} : {f.type}{', optional' if f.default is None else ''}")
-        lines.append(textwrap.fill(f"{told.help} {told.more}".strip(), _WIDTH, initial_indent="    ",
-                                   subsequent_indent="    "))  # fmt: skip
+        lines.append(_filled(f"{told.help} {told.more}".strip()))
     made.__doc__ = "\n".join(lines)
     return made
 

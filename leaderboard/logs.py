@@ -26,19 +26,19 @@ if TYPE_CHECKING:
     from simnav.scenario import Scenario
 
     from .recordings import PublicRecordings
-    from .single_run import RunReport
+    from .single_run import ScoreReport
 
 __all__ = ["align", "export", "inspect_log", "recordings", "score_files", "tune_noise"]
 
 
 @call(ScoreRequest)
-def score_files(request: ScoreRequest) -> RunReport:
+def score_files(request: ScoreRequest) -> ScoreReport:
     """Score estimates that were made elsewhere.
 
     Returns
     -------
-    RunReport
-        As of a run; the estimators are the files, by their names.
+    ScoreReport
+        As of a run, with errors after an alignment and relative ones; the estimators are the files, by their names.
 
     Raises
     ------

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -25,6 +25,7 @@ from simnav.leaderboard.results.shown import Shown
 from simnav.scoring import SCORES, protection_levels, score, stanford
 from simnav.scoring.consistency import badge
 from simnav.scoring.lagged import seconds_of
+from simnav.scoring.trajectory_errors import TrajectoryErrors, trajectory_errors
 
 from .printed import first_lines
 from .ranking import tables
@@ -37,7 +38,7 @@ if TYPE_CHECKING:
     from simnav.scoring import Stanford
     from simnav.trial import Trial
 
-__all__ = ["EstimatorRun", "RunReport", "run_once", "score_of_files"]
+__all__ = ["EstimatorRun", "RunReport", "ScoreReport", "run_once", "score_of_files"]
 
 
 #: Diagnostics that an estimator gives for each instrument that it uses.
@@ -191,6 +192,28 @@ class RunReport(Shown):
         }
 
 
+@dataclass(frozen=True, eq=False, repr=False)
+class ScoreReport(RunReport):
+    """Estimates of one run that were made elsewhere; the attributes are those of `RunReport`, and:
+
+    Attributes
+    ----------
+    trajectories : mapping of str to TrajectoryErrors
+        Errors after an alignment and relative errors, by label; without files that have no positions.
+    """
+
+    trajectories: Mapping[str, TrajectoryErrors] = field(default_factory=dict)
+
+    def shown(self) -> Sequence[tables.Fitted]:
+        """The tables of the scores, and that of aligned and relative errors."""
+        found = super().shown()
+        return [*found, trajectory_table(self.trajectories)] if self.trajectories else found
+
+    def to_dict(self) -> dict[str, Any]:
+        """What ``simnav score --json`` prints, but for the figure."""
+        return super().to_dict() | {"trajectories": {name: asdict(t) for name, t in self.trajectories.items()}}
+
+
 def run_once(
     scenario: Scenario,
     requests: Sequence[EstimatorRequest],
@@ -220,7 +243,7 @@ def run_once(
     return RunReport(recording, simulated, tuple(runs), scenario)
 
 
-def score_of_files(scenario: Scenario, paths: Sequence[Path], seed: int) -> RunReport:
+def score_of_files(scenario: Scenario, paths: Sequence[Path], seed: int) -> ScoreReport:
     """Score files of estimates of one run; see `simnav.leaderboard.interface.score_files`."""
     from simnav.trial.estimate_file import trial_of_file
 
@@ -233,7 +256,9 @@ def score_of_files(scenario: Scenario, paths: Sequence[Path], seed: int) -> RunR
             trial = trial_of_file(path, recording)
         scores = score(trial, recording) if len(trial) else {}
         runs.append(EstimatorRun(path.name, {}, False, trial.status, printable(trial.reason), math.nan, scores, trial))
-    return RunReport(recording, simulated, tuple(runs), scenario)
+    errors = {run.estimator: trajectory_errors(run.trial, recording) for run in runs if len(run.trial)}
+    known = {name: found for name, found in errors.items() if found is not None}
+    return ScoreReport(recording, simulated, tuple(runs), scenario, known)
 
 
 def _covariance(scores: Mapping[str, float]) -> str:
@@ -259,6 +284,27 @@ def lag_table(estimators: Sequence[EstimatorRun]) -> tables.Fitted:
     caption = f"Without an estimate of earlier times; what they gave then is repeated: {same}." if same else ""
     return tables.Fitted("Horizontal RMSE [m] of an output that is late", columns, cells, columns, numeric=columns[1:],
                          caption=caption)  # fmt: skip
+
+
+def trajectory_table(trajectories: Mapping[str, TrajectoryErrors]) -> tables.Fitted:
+    """Errors after an alignment, and relative errors over times and distances: a row a file."""
+    first = next(iter(trajectories.values()))
+    times = [f"{r.span:g} s [m]" for r in first.over_times]
+    distances = [f"{r.span:g} m [%]" for r in first.over_distances]
+    turned = f"turned in {first.over_times[0].span:g} s [deg]"
+    columns = ["estimates", "error [m]", "aligned [m]", *times, *distances, turned]
+    cells = [
+        [name + (" (height left out)" if t.dimensions == 2 else ""), tables.number(t.absolute),
+         tables.number(t.aligned), *(tables.number(r.translation) for r in t.over_times),
+         *(tables.number(100.0 * r.translation / r.span) for r in t.over_distances),
+         tables.number(math.degrees(t.over_times[0].rotation))]
+        for name, t in trajectories.items()
+    ]  # fmt: skip
+    return tables.Fitted(
+        "Root mean squares of position errors in three dimensions", columns, cells, columns, numeric=columns[1:],
+        caption="Aligned: after the rotation and translation that fit best, as by 'evo_ape -a'. Then the relative "
+        "errors of the motion over a time, and over a distance along the true track, over all pairs of epochs.",
+    )  # fmt: skip
 
 
 def _repeats(trial: Trial) -> bool:

@@ -1,8 +1,8 @@
 """simnav: the open benchmark for marine integrated navigation.
 
 Importing it registers every scenario of the catalogue with Gymnasium, so that
-``gymnasium.make("simnav:simnav/OpenSea-v1")`` works. Each public name is loaded when it is first used, so that the
-import itself is quick.
+``gymnasium.make("simnav:simnav/OpenSea-v1")`` works (`simnav.gymnasium_ids`). Each public name is loaded when it is
+first used, so that the import itself is quick.
 """
 
 from __future__ import annotations
@@ -11,14 +11,10 @@ from importlib import import_module
 from pathlib import Path as _Path
 from typing import TYPE_CHECKING, Any
 
-from gymnasium.envs.registration import register as _register_env
-from gymnasium.envs.registration import registry as _registry
-
 from simnav.checkout import require_links as _require_links
+from simnav.gymnasium_ids import register_with_gymnasium as _register_with_gymnasium
 
 _require_links(_Path(__file__).parent)
-
-from simnav.scenario.catalogue import headers as _headers  # noqa: E402
 
 if TYPE_CHECKING:
     from simnav.blocks import StateBlock
@@ -214,6 +210,8 @@ def __getattr__(name: str) -> Any:
         from importlib.metadata import version
 
         return version("simnav")
+    if name in _HOMES:  # simnav.scenario.load
+        return import_module(f"simnav.{name}")
     if name not in _home_of:
         raise AttributeError(f"module 'simnav' has no attribute {name!r}")
     value = globals()[name] = getattr(import_module(f"simnav.{_home_of[name]}"), name)
@@ -224,43 +222,4 @@ def __dir__() -> list[str]:
     return sorted({*globals(), *__all__})
 
 
-def _register_scenarios() -> None:
-    """Give every scenario of the catalogue its Gymnasium id."""
-    for header in _headers():
-        if header.gym_id not in _registry:
-            _register_env(
-                id=header.gym_id,
-                entry_point="simnav.environment:NavigationEnv",
-                vector_entry_point="simnav.environment:NavigationVectorEnv",
-                kwargs={"scenario": header.id},
-            )
-        _register_tasks(header.gym_id, header.id, recorded=header.recorded, channels=header.channels)
-
-
-# The library must not import the learning tasks (they belong to simnav.estimators): their entry points are strings.
-_LEARNING = "simnav.estimators.learning"
-
-
-def _register_tasks(gym_id: str, scenario: str, *, recorded: bool, channels: bool) -> None:
-    """Register the learning tasks over a scenario with Gymnasium: those around a filter take no channels."""
-    name, _, version = gym_id.rpartition("-v")
-    for task in () if channels else ("Tuning", "Detection", "Correction"):
-        task_id = f"{name}-{task}-v{version}"
-        if task_id not in _registry:
-            _register_env(
-                id=task_id,
-                entry_point=f"{_LEARNING}.environment:FilterTaskEnv",
-                vector_entry_point=f"{_LEARNING}.vector:FilterTaskVectorEnv",
-                kwargs={"scenario": scenario, "task": task},
-            )
-    task_id = f"{name}-Guidance-v{version}"
-    if not recorded and task_id not in _registry:
-        _register_env(
-            id=task_id,
-            entry_point=f"{_LEARNING}.guidance:GuidanceEnv",
-            vector_entry_point=f"{_LEARNING}.guidance_vector:GuidanceVectorEnv",
-            kwargs={"scenario": scenario},
-        )
-
-
-_register_scenarios()
+_register_with_gymnasium()

@@ -10,22 +10,22 @@ edit of any of these gives a new directory. Each file has a checksum (`simnav.ke
 from __future__ import annotations
 
 import contextlib
-import functools
 import hashlib
 import os
 import shutil
 import sys
-import tempfile
 import threading
 import time
 import types
 from collections.abc import Callable, Iterator
-from contextvars import ContextVar
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, ParamSpec, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
+
+from simnav.cache_folder import cache_directory
+from simnav.watchers import announce, announced, awaited
 
 __all__ = ["Array", "Flags", "Integers", "Kernel", "announced", "cache_directory", "kernel", "kernels", "prune"]
 
@@ -42,55 +42,6 @@ KEEP = 60 * 86400.0
 
 _kernels: list[Kernel[..., Any]] = []
 _compiling = threading.RLock()  # Numba takes the cache directory from a global setting
-_announce: ContextVar[Callable[[], None] | None] = ContextVar("announce", default=None)
-
-
-@contextlib.contextmanager
-def announced(tell: Callable[[], None]) -> Iterator[None]:
-    """Within this context ``tell`` is called once, before the first kernel that is not in the cache is compiled."""
-    token = _announce.set(tell)
-    try:
-        yield
-    finally:
-        _announce.reset(token)
-
-
-def cache_directory() -> Path | None:
-    """The directory of compiled kernels.
-
-    It is the first of these that can be written to: ``$SIMNAV_CACHE_DIR``; the user's cache directory; a private
-    directory among the temporary files.
-
-    Returns
-    -------
-    Path or None
-        None if none of them can be written to: kernels are then compiled in every process.
-    """
-    return _cache_directory(os.environ.get("SIMNAV_CACHE_DIR", ""), os.environ.get("XDG_CACHE_HOME", ""))
-
-
-@functools.lru_cache
-def _cache_directory(chosen: str, xdg: str) -> Path | None:
-    candidates = [Path(chosen).expanduser()] if chosen else []
-    with contextlib.suppress(RuntimeError):  # no home directory
-        if sys.platform == "darwin":
-            candidates.append(Path.home() / "Library" / "Caches" / "simnav")
-        elif os.name == "nt":
-            candidates.append(Path(os.environ.get("LOCALAPPDATA") or Path.home()) / "simnav")
-        else:
-            candidates.append((Path(xdg) if xdg else Path.home() / ".cache") / "simnav")
-    user = str(os.getuid()) if hasattr(os, "getuid") else "user"
-    with contextlib.suppress(OSError):  # no directory for temporary files
-        candidates.append(Path(tempfile.gettempdir()) / f"simnav-{user}")
-    for candidate in candidates:
-        path = candidate / "kernels"
-        with contextlib.suppress(OSError):
-            path.mkdir(parents=True, exist_ok=True, mode=0o700)
-            # The cache is unpickled, so it must be ours. (For root, permissions alone prove nothing: write.)
-            if not hasattr(os, "getuid") or path.stat().st_uid == os.getuid():
-                with tempfile.TemporaryFile(dir=path):
-                    return path
-    return None
 
 
 class Kernel(Generic[Parameters, Returned]):
@@ -171,9 +122,8 @@ class Kernel(Generic[Parameters, Returned]):
         with _compiling:
             if self._dispatcher is None:
                 directory = self.directory()
-                if self.signature is not None and (tell := _announce.get()) is not None and not _holds(directory):
-                    _announce.set(None)
-                    tell()
+                if self.signature is not None and awaited() and not _holds(directory):
+                    announce()
                 if directory is not None:
                     try:
                         directory.mkdir(mode=0o700, exist_ok=True)

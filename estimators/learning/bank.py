@@ -181,36 +181,65 @@ def observe(
 
 
 @kernel()
+def _moving(transition: Array) -> int:
+    """Number of states without the last ones that are constant, as those of instruments are: rows and columns of I."""
+    for i in range(transition.shape[0] - 1, -1, -1):
+        if transition[i, i] != 1.0:
+            return i + 1
+        for j in range(transition.shape[0]):
+            if j != i and (transition[i, j] != 0.0 or transition[j, i] != 0.0):
+                return i + 1
+    return 0
+
+
+@kernel()
 def _propagate(
-    P: Array, delta: Array, transition: Array, process_noise: Array, factor: float, A: Array, B: Array, T: Array
-) -> None:
-    """Compute ``delta = Phi delta`` and ``P = Phi P Phi' + factor Q`` in place; A, B, T are (n, n) work space."""
-    n = delta.size
-    for i in range(n):
-        x = 0.0
+    P: Array, delta: Array, transition: Array, process_noise: Array, factor: float, A: Array, B: Array, T: Array,
+    moved: Array,
+) -> None:  # fmt: skip
+    """Compute ``delta = Phi delta`` and ``P = Phi P Phi' + factor Q`` in place; P is symmetric.
+
+    Products with zeros are left out, and so are those of the constant states. The sums stay the same to the last bit.
+
+    A, B, T are (n, n) and ``moved`` is (n,) work space.
+    """
+    n, m = delta.size, _moving(transition)
+    for k in range(m):
+        moved[k] = 0.0
+        for i in range(m):
+            T[k, i] = transition[i, k]
+            B[k, i] = 0.0
+    for k in range(m):
+        x = delta[k]
+        for i in range(m):
+            moved[i] += T[k, i] * x
+    for i in range(m):
+        delta[i] = moved[i]
         for j in range(n):
-            x += transition[i, j] * delta[j]
             A[i, j] = 0.0
-            B[i, j] = 0.0
-            T[j, i] = transition[i, j]
-        B[0, i] = x
-    for i in range(n):
-        delta[i] = B[0, i]
-        B[0, i] = 0.0
-    for i in range(n):
-        for k in range(n):
+        for k in range(m):
             x = transition[i, k]
             if x != 0.0:
                 for j in range(n):
                     A[i, j] += x * P[k, j]
-    for i in range(n):
-        for k in range(n):
+    for k in range(m):
+        end = m
+        while end > 1 and T[k, end - 1] == 0.0:
+            end -= 1
+        end = min((end + 3) // 4 * 4, m)  # whole vectors of the processor
+        for i in range(m):
             x = A[i, k]
-            for j in range(n):
+            for j in range(end):
                 B[i, j] += x * T[k, j]
     for i in range(n):
         for j in range(i + 1):
-            x = 0.5 * (B[i, j] + B[j, i]) + factor * process_noise[i, j]
+            if i < m:
+                x = 0.5 * (B[i, j] + B[j, i])
+            elif j < m:
+                x = A[j, i]
+            else:
+                x = 0.5 * (P[i, j] + P[j, i])
+            x += factor * process_noise[i, j]
             P[i, j] = x
             P[j, i] = x
 
@@ -239,7 +268,7 @@ def take(
     transition, process_noise, moves, instrument, _, size, innovation, jacobian, noise, correction = events
     n = delta.shape[1]
     most = scale.shape[2]
-    A, B, T = np.empty((n, n)), np.empty((n, n)), np.empty((n, n))
+    A, B, T, moved = np.empty((n, n)), np.empty((n, n)), np.empty((n, n)), np.empty(n)
     correct = np.empty(n)
     counts = np.empty(scale.shape[1], np.int64)
     H1, H2, H3 = np.empty((1, n)), np.empty((2, n)), np.empty((3, n))
@@ -254,7 +283,7 @@ def take(
         counts[:] = 0
         for e in range(first[b], last[b]):
             if moves[e]:
-                _propagate(P, d, transition[e], process_noise[e], factor, A, B, T)
+                _propagate(P, d, transition[e], process_noise[e], factor, A, B, T, moved)
             m = size[e]
             if m > 0:
                 at = place[instrument[e]]

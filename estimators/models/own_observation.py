@@ -25,7 +25,7 @@ import numpy as np
 from simnav.blocks import NAVIGATION
 from simnav.geometry.earth import earth_rate, principal_radii
 from simnav.geometry.rotation import dcm_from_rotation_vector
-from simnav.kinds import NavigationPoint
+from simnav.kinds import NavigationPoint, NavigationPoints
 from simnav.plugins import place_of
 from simnav.types import KINDS, NO_SIDE, Array, Datasheet
 
@@ -363,15 +363,33 @@ class OwnObservation:
         positions = point.position + errors[:, :3] / metres
         velocities = point.velocity + errors[:, 3:6]
         attitudes = dcm_from_rotation_vector(errors[:, 6:9]) @ point.dcm
-        rates = point.angular_rate - errors[:, 9:12]
-        for k, state in enumerate(zip(positions, velocities, attitudes, rates, strict=True)):
-            blocks = self._blocks_at(point, errors[k], offset)
-            there = self.read(NavigationPoint(point.time, *state, blocks, *point[6:]))
-            if there is not None:
-                differences[k] = self.kind.difference(there, reading)
+        states = positions, velocities, attitudes, point.angular_rate - errors[:, 9:12]
+        if self.kind.observations is not None:
+            differences = np.asarray(self.kind.difference(self._many(point, states, errors, offset), reading))
+        else:
+            for k, state in enumerate(zip(*states, strict=True)):
+                blocks = self._blocks_at(point, errors[k], offset)
+                there = self.read(NavigationPoint(point.time, *state, blocks, *point[6:]))
+                if there is not None:
+                    differences[k] = self.kind.difference(there, reading)
         if bias_at >= 0:
             differences += errors[:, bias_at : bias_at + len(reading)]
         return differences
+
+    def _many(
+        self, point: NavigationPoint, states: tuple[Array, Array, Array, Array], errors: Array, offset: int
+    ) -> Array:
+        """The (k, d) readings at k states by one call, for a kind that predicts many (`simnav.kinds.Observations`)."""
+        assert self.kind.observations is not None
+        k = len(errors)
+        blocks = {name: np.broadcast_to(zero, (k, len(zero))) for name, zero in self._zeros.items()}
+        for name, at in self._slices:
+            blocks[name] = point.blocks[name] + errors[:, offset + at.start : offset + at.stop]
+        channel = self._given.channels.index(self.channel) if self.channel else 0
+        side = np.broadcast_to(point.side, (k, *point.side.shape))
+        points = NavigationPoints(np.full(k, point.time), *states, blocks, np.full(k, channel), side)
+        reading, _ = self.kind.observations(points, self._given)
+        return np.asarray(reading)
 
     def by_angular_rate(self, point: NavigationPoint) -> Array:
         """The (d, 3) derivative of the reading by the angular rate of the body, by differences; zero without a reading.

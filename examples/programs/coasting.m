@@ -1,12 +1,18 @@
-% Coasting between fixes of GNSS, as a program for simnav: matlab -batch coasting, or octave coasting.m
-% The position moves with the velocity, and a fix replaces it. MATLAB reads its standard input by Java.
-in = java.io.BufferedReader(java.io.InputStreamReader(java.lang.System.in));
+% Coasting between fixes of GNSS, as a program for simnav: octave-cli coasting.m, or matlab -batch coasting
+% The position moves with the velocity, and a fix replaces it.
+octave = exist('OCTAVE_VERSION', 'builtin') > 0;
+if octave
+    next = @() input('', 's');                   % fgetl would wait for the line after it
+else                                             % MATLAB reads its standard input by Java
+    in = java.io.BufferedReader(java.io.InputStreamReader(java.lang.System.in));
+    next = @() char(in.readLine());
+end
 radius = 6371e3; time = 0; fixed = [0 0]; fixed_at = -1; sigma = 10;
 state = zeros(1, 9);                             % lat, lon, h, vn, ve, vd, roll, pitch, yaw
 while true
-    line = in.readLine();
+    try, line = next(); catch, break, end        % the input has ended
     if isempty(line), break, end
-    cells = strsplit(char(line), ',');
+    cells = strsplit(line, ',');
     switch cells{1}
         case 'start'
             numbers = str2double(cells(2:end));
@@ -34,4 +40,5 @@ while true
             fprintf(',%g', [sigma sigma sigma 1 1 1 0 0 0]);
             fprintf('\n');
     end
+    if octave, fflush(stdout); end               % each line is written at once
 end

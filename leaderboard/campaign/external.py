@@ -11,6 +11,7 @@ from pathlib import Path
 
 from simnav.leaderboard.results import store
 from simnav.leaderboard.results.errors import RequestError
+from simnav.leaderboard.results.result import EXTERNAL
 from simnav.log import LogError
 from simnav.scenario import Scenario
 from simnav.trial.estimate_file import ENDINGS, trial_of_file
@@ -26,10 +27,7 @@ from .seal import PUBLIC, Seal
 from .sources import digest
 from .worker import Unit, judged
 
-__all__ = ["MARK", "add_external", "external_files"]
-
-#: What follows the name of a row that was made elsewhere.
-MARK = " (external)"
+__all__ = ["add_external", "external_files"]
 
 
 def external_files(folder: Path, scenarios: Sequence[Scenario], numbers: Sequence[int]) -> dict[str, dict[str, Path]]:
@@ -102,7 +100,9 @@ def add_external(
     """
     files, simulator, scoring = external_files(external, scenarios, numbers), simulator_version(), scoring_code()
     rows = [
-        Entrant(name, {}, f"{name}{MARK}", False, digest(*(path.read_bytes().hex() for path in of.values())), own=name)
+        Entrant(
+            name, {}, f"{name}{EXTERNAL}", False, digest(*(path.read_bytes().hex() for path in of.values())), own=name
+        )
         for name, of in files.items()
     ]
     for scenario in scenarios:
@@ -126,9 +126,9 @@ def add_external(
             for row, key in keys:
                 try:
                     trial = trial_of_file(files[row.name][run], recording, row.name)
-                    made = Attempt(trial.status, trial.reason, trial, 0.0, 0, "none")
+                    made = Attempt(trial.status, trial.reason, trial, 0.0, 0, "external")
                 except LogError as error:
-                    made = Attempt("invalid-output", str(error), None, 0.0, 0, "none")
+                    made = Attempt("invalid-output", str(error), None, 0.0, 0, "external")
                 result = judged(unit, row, key, recording, made)
                 store.write(folder, replace(result, note=f"external; {result.note}".rstrip("; ")))
     store.compact(folder)

@@ -22,7 +22,7 @@ from simnav.leaderboard.results.plain import as_json
 if TYPE_CHECKING:
     from rich.console import Console, RenderableType
 
-    from simnav.log.progress import Watcher
+    from simnav.watchers import Watcher
 
 __all__ = ["Output", "ProgressBar", "session"]
 
@@ -221,8 +221,7 @@ def session(json: bool, debug: bool) -> Iterator[Output]:
     """
     import typer
 
-    from simnav.compiled import announced
-    from simnav.log.progress import watched
+    from simnav.watchers import announced, watched
 
     out = Output(json, debug)
     previous = warnings.showwarning

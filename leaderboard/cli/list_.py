@@ -6,15 +6,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from simnav import sensors
-from simnav.estimator import describe, names
-from simnav.field_meanings import meanings
 from simnav.leaderboard.ranking import tables
 from simnav.scenario.catalogue import headers
-from simnav.sensors.imu_models import GRADES, IMU_MODELS
 
 from .commands import ListCommand, Topic
 from .console import Output
+from .own_estimators import Summary, summaries
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -32,8 +29,10 @@ def show(out: Output, request: ListCommand) -> None:
         found["scenarios"] = scenarios()
         out.print(_scenario_lines(found["scenarios"]))
     if request.topic in (None, Topic.ESTIMATORS):
-        found["estimators"] = estimators(places=out.json)
-        out.print(_estimator_lines(found["estimators"]))
+        if out.json:
+            found["estimators"] = estimators()
+        else:
+            out.print(_estimator_lines(summaries()))
     if request.topic in (Topic.INSTRUMENTS, Topic.FAULTS):
         found[request.topic] = instruments() if request.topic is Topic.INSTRUMENTS else faults()
         out.print(_kind_lines(request.topic.value.capitalize(), found[request.topic]))
@@ -112,19 +111,20 @@ def scenarios() -> list[ScenarioItem]:
     ]
 
 
-def estimators(*, places: bool = True) -> list[EstimatorItem]:
-    """Every registered estimator; without ``places``, which take a tenth of the time, no file and line."""
+def estimators() -> list[EstimatorItem]:
+    """Every registered estimator."""
+    from simnav.estimator import describe, names  # as below: a plain list needs neither estimators nor instruments
 
     return [
         EstimatorItem(d.name, d.aliases, d.summary, d.reference,
-                      {p.name: None if p.required else p.default for p in d.parameters},
-                      *((d.file, d.line) if places else ("", 0)))
+                      {p.name: None if p.required else p.default for p in d.parameters}, d.file, d.line)
         for d in map(describe, names())
     ]  # fmt: skip
 
 
 def instruments() -> list[KindItem]:
     """Every kind of instrument."""
+    from simnav import sensors
 
     imu = _kind(sensors.ImuSpec, "angular rate and specific force")
     return [imu, *(_kind(spec, spec.definition.quantity) for spec in sensors.instrument_specs())]
@@ -132,12 +132,15 @@ def instruments() -> list[KindItem]:
 
 def faults() -> list[KindItem]:
     """Every kind of fault."""
+    from simnav import sensors
 
     return [_kind(spec, "") for spec in sensors.fault_specs()]
 
 
 def imus() -> list[ImuItem]:
     """Every IMU that a scenario may name, with the figures of its datasheet."""
+    from simnav.sensors.imu_models import GRADES, IMU_MODELS
+
     return [
         ImuItem(m.name, m.manufacturer, m.grade, GRADES[m.grade] == m.name, m.datasheet, m.read_in, m.gyroscope,
                 m.accelerometer, m.effects)
@@ -148,6 +151,8 @@ def imus() -> list[ImuItem]:
 def _kind(spec: type[Spec], fallback: str) -> KindItem:
     field = spec.model_fields.get("kind")
     kind = str(field.default) if field is not None else spec.__name__.removesuffix("Spec").lower()
+    from simnav.field_meanings import meanings
+
     said = meanings(spec)
     keys = {
         key: Key(info.is_required(), said[name]) for key, (name, info) in spec.toml_keys().items() if name != "kind"
@@ -182,7 +187,7 @@ def _scenario_lines(found: list[ScenarioItem]) -> tables.Lines:
                         spare=["track"])  # fmt: skip
 
 
-def _estimator_lines(found: list[EstimatorItem]) -> tables.Lines:
+def _estimator_lines(found: list[Summary]) -> tables.Lines:
     rows = [[e.name + (" *" if e.reference else ""), e.summary.replace("``", "")] for e in found]
     dim = [i for i, e in enumerate(found) if e.reference]
     caption = f"{_MORE} * reference: it is told the truth, and is not ranked." if dim else _MORE

@@ -16,6 +16,7 @@ _MEANS = {
     "landlock": "a process without the recording, no writing, no TCP, the results out of sight",
     "process": "a process without the recording, but with all rights of the user",
     "none": "nothing: an estimator could read the truth",
+    "external": "",
     "not known": "the results do not say",
 }
 
@@ -29,5 +30,9 @@ def confined(results: Iterable[Result]) -> dict[str, int]:
 def confinement_line(results: Iterable[Result]) -> str:
     """One line for the terminal; empty where there is nothing to be said."""
     found = confined(results)
+    elsewhere = found.pop("external", 0)
     parts = [f"{name} ({count} results: {_MEANS.get(name, 'unknown here')})" for name, count in found.items()]
-    return f"estimators were confined by {'; '.join(parts)}" if parts else ""
+    said = [f"estimators were confined by {'; '.join(parts)}"] if parts else []
+    if elsewhere:
+        said.append(f"{elsewhere} results were made elsewhere: nobody knows what their makers saw")
+    return "; ".join(said)

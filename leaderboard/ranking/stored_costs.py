@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from simnav.leaderboard.results.provenance import Provenance
+from simnav.leaderboard.results.result import EXTERNAL
 
 from .measured_file import checked_names, read_measured, save_measured, short_number
 from .plain_row import plain_rows
@@ -146,5 +147,10 @@ def cost_of(estimator: str, plain: str, score: str) -> CostMultiple | None:
 
 def not_measured(estimators: Iterable[str]) -> str:
     """The sentence on rows whose cost was not measured; empty where there is none."""
-    names = ", ".join(estimators)
-    return f"Cost not measured: {names}; 'simnav bench NAME' measures it." if names else ""
+    named = list(estimators)
+    here = ", ".join(n for n in named if not n.endswith(EXTERNAL))
+    elsewhere = ", ".join(n for n in named if n.endswith(EXTERNAL))
+    said = [f"Cost not measured: {here}; 'simnav bench NAME' measures it."] if here else []
+    if elsewhere:
+        said.append(f"Cost not known, for the estimates were made elsewhere: {elsewhere}.")
+    return " ".join(said)

@@ -10,12 +10,13 @@ from simnav.leaderboard.results.plain import as_json
 
 from . import tables
 from .agreement import RankCorrelation, rank_correlation
+from .lost_runs import LOSS, lost_recordings
 from .tracks import RECORDED, RECORDINGS, title
 
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from .board import Ranking, TrackRanking
+    from .board import Ranking, ScenarioRanking, TrackRanking
 
 __all__ = ["VoyageRow", "Voyages", "side_by_side", "voyage_tables"]
 
@@ -36,6 +37,8 @@ class VoyageRow:
         Its place by score among the rows that are ranked on both.
     simulated_ranks, recorded_ranks : (int, int) or None
         Interval of its rank on each track, among all rows there; None on a track whose rows cannot be ordered.
+    lost : str
+        How many recordings of the track it loses against the plain row, and of how many: ``2 of 8``.
     """
 
     estimator: str
@@ -43,6 +46,7 @@ class VoyageRow:
     recorded: int
     simulated_ranks: tuple[int, int] | None
     recorded_ranks: tuple[int, int] | None
+    lost: str = ""
 
 
 @dataclass(frozen=True)
@@ -97,11 +101,15 @@ def side_by_side(board: Ranking) -> list[Voyages]:
     for recorded in filter(None, map(tracks.get, _RECORDED)):
         for simulated in filter(None, map(tracks.get, _SIMULATED)):
             if simulated.score == recorded.score and (c := rank_correlation(simulated, recorded)) is not None:
-                found.append(Voyages(simulated.track, recorded.track, _rows(simulated, recorded, c.rows), c))
+                voyages = [t for t in board.scenarios if t.track == recorded.track]
+                rows = _rows(simulated, recorded, c.rows, voyages)
+                found.append(Voyages(simulated.track, recorded.track, rows, c))
     return found
 
 
-def _rows(simulated: TrackRanking, recorded: TrackRanking, names: Sequence[str]) -> tuple[VoyageRow, ...]:
+def _rows(
+    simulated: TrackRanking, recorded: TrackRanking, names: Sequence[str], voyages: Sequence[ScenarioRanking]
+) -> tuple[VoyageRow, ...]:
     here, there = (
         {r.estimator: r for r in track.rows if r.estimator in names and r.ranked} for track in (simulated, recorded)
     )
@@ -113,7 +121,8 @@ def _rows(simulated: TrackRanking, recorded: TrackRanking, names: Sequence[str])
         return None if row.rank_low is None or row.rank_high is None else (row.rank_low, row.rank_high)
 
     return tuple(
-        VoyageRow(n, first[n], second[n], ranks(here[n]), ranks(there[n])) for n in sorted(first, key=first.__getitem__)
+        VoyageRow(n, first[n], second[n], ranks(here[n]), ranks(there[n]), lost_recordings(n, voyages).words)
+        for n in sorted(first, key=first.__getitem__)
     )
 
 
@@ -121,13 +130,16 @@ def voyage_tables(found: Sequence[Voyages]) -> list[Table | str]:
     """A table for each pair of tracks, and its rank correlation."""
     shown: list[Table | str] = []
     for pair in found:
-        columns = ["estimator", title(pair.simulated), "ranks", title(pair.recorded), "ranks "]
+        columns = ["estimator", title(pair.simulated), "ranks", title(pair.recorded), "ranks ", "lost"]
         rows = [
-            [r.estimator, r.simulated, _interval(r.simulated_ranks), r.recorded, _interval(r.recorded_ranks)]
+            [r.estimator, r.simulated, _interval(r.simulated_ranks), r.recorded, _interval(r.recorded_ranks), r.lost]
             for r in pair.rows
         ]
         shown.append(tables.table("places on simulated and on recorded voyages", columns, rows, numeric=columns[1:]))
-        shown.append(pair.sentence + ".")
+        shown.append(
+            f"{pair.sentence}. Lost: recordings on which the row failed, or has more than {LOSS:g} times the error of "
+            "the plain row."
+        )
     return shown
 
 

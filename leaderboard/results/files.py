@@ -20,12 +20,14 @@ FORMULA = r"^[=+\-@\t\r]"
 def complete_file(path: Path) -> Iterator[Path]:
     """A temporary path to write to, which is moved to its place at the end, so that a reader never sees a part of it.
 
+    Each process has a path of its own, so that several may write the same file at the same time.
+
     Raises
     ------
     OSError
         If writing fails; an older file stays unchanged.
     """
-    partial = path.with_name(f".{path.name}.part")
+    partial = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
         yield partial
         os.replace(partial, path)

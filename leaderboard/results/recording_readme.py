@@ -20,6 +20,13 @@ __all__ = ["readme", "start_of", "start_text"]
 
 _SIGMA_UNITS = [("m", 1.0)] * 3 + [("m/s", 1.0)] * 3 + [("deg", UNITS["deg"])] * 3
 
+_ESTIMATES = (
+    "A CSV file with a header: `time_s`, and what was estimated of `latitude_deg`, `longitude_deg`, `height_m`, "
+    "`velocity_north_m_s`, `velocity_east_m_s`, `velocity_down_m_s`, `roll_deg`, `pitch_deg`, `yaw_deg`. Standard "
+    "deviations, if there are any: `sigma_north_m`, `sigma_east_m`, `sigma_down_m`, `sigma_velocity_north_m_s` and so "
+    "on, `sigma_attitude_north_deg` and so on. The estimate of an epoch uses measurements until its time only."
+)
+
 
 def start_of(recording: Recording) -> dict[str, Any]:
     """Start, covariance and datasheets, in SI units and radians, plain.
@@ -131,6 +138,14 @@ def readme(recording: Recording) -> str:
         )
         arm = ", ".join(f"{x:g}" for x in sheet.lever_arm)
         lines.append(f"- {sheet.name} ({sheet.kind}): {sheet.rate:g} Hz; sigma {figures}; lever arm {arm} m")
+    lines += ["", "## Estimates", "", _ESTIMATES, ""]
+    if recording.seed == NO_SEED:
+        lines.append(
+            "Return them as `NAME/FOLDER.csv`, with the name of your estimator and that of this folder, which ends in "
+            "the number of the run."
+        )
+    else:
+        lines.append(f"`simnav score SCENARIO --seed {recording.seed} FILE` scores them.")
     if has_truth(recording):
         lines += ["", "## Faults", ""]
         lines += [

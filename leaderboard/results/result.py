@@ -49,6 +49,8 @@ SINCE_VERSIONS = 5
 #: Results that are held in memory at a time where a file is streamed.
 BATCH = 256
 
+#: Ends the label of a row whose estimates were made elsewhere.
+EXTERNAL = " (external)"
 #: Statuses that say nothing about the estimator.
 NO_TRIAL = ("unsuitable", "no-recording")
 

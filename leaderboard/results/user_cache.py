@@ -6,6 +6,8 @@ import contextlib
 import os
 from pathlib import Path
 
+from .files import write_whole
+
 __all__ = ["keep", "user_cache"]
 
 
@@ -16,15 +18,7 @@ def user_cache() -> Path:
 
 
 def keep(path: Path, content: str | bytes) -> None:
-    """Write a file of the cache, if that is possible: a cache that cannot be written costs time only.
-
-    Several processes may write the same file at the same time: each writes one of its own, and moves it there.
-    """
+    """Write a file of the cache, if that is possible: a cache that cannot be written costs time only."""
     with contextlib.suppress(OSError):
         path.parent.mkdir(parents=True, exist_ok=True)
-        partial = path.with_name(f".{path.name}.{os.getpid()}")
-        try:
-            partial.write_bytes(content.encode() if isinstance(content, str) else content)
-            partial.replace(path)
-        finally:
-            partial.unlink(missing_ok=True)
+        write_whole(path, content)

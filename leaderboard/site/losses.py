@@ -8,7 +8,7 @@ from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
-from simnav.leaderboard.ranking.statistics import FAILURE
+from simnav.leaderboard.ranking.lost_runs import LOSS, beside, lost_recordings
 
 from .columns import Column, column_dicts
 from .entries import run_names
@@ -20,13 +20,9 @@ if TYPE_CHECKING:
 
     from .content import ScenarioEntry
 
-__all__ = ["LOSS", "faults_of", "losses"]
-
-#: A run is lost if the error is more than so many times that of the plain EKF.
-LOSS = 1.5
+__all__ = ["faults_of", "losses"]
 
 _SHOWN = 25
-_FAILED = FAILURE * (1.0 - 1e-9)  # the logarithm of the ratio is what is kept
 _COLUMNS = (
     Column("name", "Scenario", "The name leads to the run.", "name", fixed=True),
     Column("run", "Run", "Seed, or recording.", "text"),
@@ -51,35 +47,35 @@ def losses(label: str, other: str, ranking: Ranking, scenarios: Mapping[str, Sce
     Returns
     -------
     dict or None
-        ``limit``: `LOSS`; ``lost``, ``failed``, ``runs``, ``shown``: numbers of runs; ``table``. None where the two
-        have no run in common.
+        ``limit``: the ratio; ``lost``, ``failed``, ``runs``, ``shown``: numbers of runs; ``recorded``: on recorded
+        voyages, against the plain row of each; ``table``. None where the two have no run in common.
     """
     found: list[tuple[float, float, str, str]] = []
     failed = runs = 0
     for table in ranking.scenarios:
-        by = {row.estimator: row for row in table.rows}
-        if label not in by or other not in by:
-            continue
         names = run_names(table)
-        for run, ratio in by[label].ratios.items():
-            beside = by[other].ratios.get(run, math.nan)
-            if not 0.0 < beside < _FAILED:
-                continue
+        for run, ratio, score in beside(table, label, other):
             runs += 1
-            if ratio >= _FAILED:
+            if math.isinf(ratio):
                 failed += 1
-            elif ratio / beside > LOSS * (1.0 + 1e-9):
-                found.append((ratio / beside, ratio, table.scenario, names.get(run, run)))
+            elif ratio > LOSS * (1.0 + 1e-9):
+                found.append((ratio, score, table.scenario, names.get(run, run)))
     if not runs:
         return None
     found.sort(key=lambda f: -f[0])
     shown = found[:_SHOWN]
+    recorded = lost_recordings(label, ranking.scenarios)
     return {
         "limit": LOSS,
         "lost": len(found),
         "failed": failed,
         "runs": runs,
         "shown": len(shown),
+        "recorded": {
+            "lost": recorded.lost,
+            "runs": recorded.runs,
+            "scenarios": [{"name": scenarios[s].name, "page": scenarios[s].page} for s in recorded.scenarios],
+        },
         "table": {
             "name": "lost",
             "title": f"Runs that {label} loses against {other}",

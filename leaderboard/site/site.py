@@ -27,6 +27,7 @@ from simnav.estimator import names
 from simnav.leaderboard.figures import appearance
 from simnav.leaderboard.figures.style import save
 from simnav.leaderboard.ranking import tables
+from simnav.leaderboard.ranking.lost_runs import LOSS
 from simnav.leaderboard.ranking.ranking_figure import ranking_figure
 from simnav.leaderboard.ranking.runs import group
 from simnav.leaderboard.ranking.statistics import FAILURE
@@ -326,7 +327,13 @@ class _Site:
             self._data(f"track-{later['key']}", later)
         index = {"kind": "index", "tracks": headers}
         self._page(
-            "index.html", "index.html", index, tracks=tracks, facts=self._counts(), voyages=side_by_side(self.ranking)
+            "index.html",
+            "index.html",
+            index,
+            tracks=tracks,
+            facts=self._counts(),
+            voyages=side_by_side(self.ranking),
+            loss=LOSS,
         )
         rows = {label: {"data": e.data, "page": e.page} for label, e in self.estimators.items()}
         compared: dict[str, Any] = {"kind": "compare", "rows": rows, "wins": self._wins()}

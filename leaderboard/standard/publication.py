@@ -211,6 +211,6 @@ def _remarks(results: Sequence[Result], without: Collection[tuple[str, str]]) ->
     entrants = [r for r in tried if not r.reference]  # a reference is told the truth, and nothing is kept from it
     if dirty := sum(bool(r.provenance.dirty) for r in tried):
         said.append(f"{dirty} runs were computed with changes that no commit holds, so others cannot repeat them")
-    if free := sum(r.provenance.confinement in ("", "none") for r in entrants):
+    if free := sum(r.provenance.confinement in ("", "none", "external") for r in entrants):
         said.append(f"{free} runs were computed without confinement")
     return tuple(said)

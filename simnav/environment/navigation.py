@@ -357,8 +357,9 @@ def most_samples(scenario: Scenario) -> dict[str, int]:
     if scenario.recorded:  # real instruments are late, and then deliver several at once; the IMU is on a grid
         most = {name: k if name == "imu" else 2 * k + 1 for name, k in most.items()}
     for name, spec in scenario.aids.items():
-        if spec.timing is not None:  # what was delayed by up to the spread, and what was not, may come in one step
-            most[name] = max(most[name], math.ceil(spec.rate * (step + spec.timing.spread)) + 1)
+        spread = spec.latency_spread()
+        if spread is not None:  # what was delayed by up to the spread, and what was not, may come in one step
+            most[name] = max(most[name], math.ceil(spec.rate * (step + spread)) + 1)
     for name, sheet in instruments.items():
         most[name] *= max(1, len(sheet.channels))
     return most

@@ -63,41 +63,83 @@ def _draws(kind: str) -> bool:
     return KINDS[kind].role == "fix" and KINDS[kind].geodetic
 
 
+@kernel()
+def _row(latitude: float, longitude: float, height: float, heading: float, out: Array) -> None:
+    """One row of `rows_of`."""
+    s, up = np.sin(latitude), height
+    if up != up:  # a log may have no reference of it
+        up = 0.0
+    x = 1.0 - ECCENTRICITY_SQUARED * (s * s)
+    prime_vertical = SEMI_MAJOR_AXIS / np.sqrt(x)
+    meridian = prime_vertical * (1.0 - ECCENTRICITY_SQUARED) / x
+    out[0], out[1], out[2] = latitude, longitude, height
+    out[3], out[4] = meridian + up, (prime_vertical + up) * np.cos(latitude)
+    out[5] = heading
+
+
 @kernel(
-    "i8(Tuple((i8, i8[::1], f8[::1], f8[:, ::1])), i8[::1], i8[::1], i8, f8[:, :, ::1], i1[:, :, ::1], "
-    "f8[:, :, :, ::1])"
+    "i8(i8, f8[:, ::1], Tuple((i8[::1], f8[:, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, :, ::1])), "
+    "Tuple((i8[::1], i8[:, ::1], f8[:, ::1], f8[:, :, ::1])), UniTuple(i8[::1], 2), "
+    "Tuple((f8[:, ::1], f8[:, ::1], i1[:, ::1], f8[:, :, ::1], f8[:, :, ::1])), "
+    "Tuple((f8[:, :, ::1], i1[:, :, ::1], f8[:, :, :, ::1])), f8[:, :, ::1], f8[:, ::1])"
 )
-def _place(
-    delivered: tuple[int, Integers, Array, Array], place: Integers, most: Integers, row: int, time: Array,
-    valid: NDArray[np.int8], values: Array,
+def _keep(
+    row: int, truth: Array, imu: tuple[Integers, Array, Array, Array, Array],
+    delivered: tuple[Integers, Integers, Array, Array], slots: tuple[Integers, Integers],
+    samples: tuple[Array, Array, NDArray[np.int8], Array, Array], aids: tuple[Array, NDArray[np.int8], Array],
+    states: Array, rows: Array,
 ) -> int:  # fmt: skip
-    """Put the measurements of one step into a row of padded arrays.
+    """Put the last step of a run into a row of padded arrays.
 
     Return -1, or the number of the first instrument with too many measurements.
 
     Parameters
     ----------
-    delivered : tuple
-        ``count``, ``who``, ``when`` and ``value`` of `simnav.simulation.steps.SteppedRuns`, of one run.
-    place, most : (i,) int arrays
-        For each of i instruments: its number in the padded arrays, and its largest number of measurements in a step.
     row : int
-        Number of the step.
-    time, valid, values : (S, A, K), (S, A, K), (S, A, K, 3) arrays
+        Number of the row.
+    truth : (1, 9) array
+        Position, velocity and attitude at the end of the step.
+    imu : tuple
+        ``samples``, ``imu_time``, ``imu_interval``, ``rate`` and ``force`` of `simnav.simulation.steps.SteppedRuns`.
+    delivered : tuple
+        ``count``, ``who``, ``when`` and ``value`` of the same.
+    slots : two (i,) int arrays
+        For each of i instruments: its number in the padded arrays, and its largest number of measurements in a step.
+    samples : tuple of (S, K, ...) arrays
+        Times, intervals, validity, angular rates and specific forces of at most K IMU samples in S steps; overwritten.
+        No samples are put there if K is zero.
+    aids : (S, A, K), (S, A, K), (S, A, K, 3) arrays
         Times [s], validity (0 or 1) and values of at most K measurements of A instruments in S steps; overwritten.
+    states : (S, 3, 3) array
+        Overwritten with the truth.
+    rows : (1, 6) array
+        Overwritten with the row of `rows_of`.
     """
+    for i in range(3):
+        for j in range(3):
+            states[row, i, j] = truth[0, 3 * i + j]
+    _row(truth[0, 0], truth[0, 1], truth[0, 2], truth[0, 8], rows[0])
+    number, imu_time, imu_interval, rate, force = imu
+    time, length, valid, angular_rate, specific_force = samples
+    if time.shape[1] > 0:
+        for k in range(number[0]):
+            time[row, k], length[row, k], valid[row, k] = imu_time[0, k], imu_interval[0, k], 1
+            for j in range(3):
+                angular_rate[row, k, j], specific_force[row, k, j] = rate[0, k, j], force[0, k, j]
     count, who, when, value = delivered
-    for j in range(count):
-        i: int = who[j]
-        a = place[i]
+    times, there, values = aids
+    place, most = slots
+    for m in range(count[0] if place.size > 0 else 0):
+        n: int = who[0, m]
+        a = place[n]
         k = 0
-        while k < most[i] and valid[row, a, k]:
+        while k < most[n] and there[row, a, k]:
             k += 1
-        if k == most[i]:
-            return i
-        time[row, a, k], valid[row, a, k] = when[j], 1
-        for c in range(3):
-            values[row, a, k, c] = value[j, c]
+        if k == most[n]:
+            return n
+        times[row, a, k], there[row, a, k] = when[0, m], 1
+        for j in range(3):
+            values[row, a, k, j] = value[0, m, j]
     return -1
 
 
@@ -126,20 +168,26 @@ class LiveStretch(Stretch):
         self._aids = [(name, most[name], widths[name]) for name in names]
         self._sides = {name: np.zeros((s, most[name], width)) for name, width in sides.items()}
         columns: dict[str, dict[str, NDArray[Any]]] = {}
-        if imu:
-            columns["imu"] = {
-                "time": np.zeros((s, imu)), "valid": np.zeros((s, imu), np.int8), "length": np.zeros((s, imu)),
-                "angular_rate": np.zeros((s, imu, 3)), "specific_force": np.zeros((s, imu, 3)),
-            }  # fmt: skip
+        self._samples = (
+            np.zeros((s, imu)), np.zeros((s, imu)), np.zeros((s, imu), np.int8), np.zeros((s, imu, 3)),
+            np.zeros((s, imu, 3)),
+        )  # fmt: skip
+        self._one, nothing = np.zeros((1, 6)), np.zeros((1, 0))
+        self._none = np.zeros(1, np.int64), nothing, nothing, nothing[..., None], nothing[..., None]
         super().__init__(np.zeros((s, 2)), columns, np.zeros((s, 3, 3)), [], {}, {})
         self._share_columns()
         own = runs.names[0]
         self._runs = runs
-        self._place = np.array([names.index(name) for name in own], np.int64)
+        self._place = np.array([] if sides else [names.index(name) for name in own], np.int64)
         self._most = np.array([most[name] for name in own], np.int64)
 
     def _share_columns(self) -> None:
-        """The columns of the aiding instruments are views of the arrays that `advance` fills."""
+        """The columns are the arrays that `advance` fills, and views of them."""
+        if self._samples[0].size:
+            when, length, there, rate, force = self._samples
+            self.columns["imu"] = {
+                "time": when, "valid": there, "length": length, "angular_rate": rate, "specific_force": force,
+            }  # fmt: skip
         time, valid, values = self._arrays
         for a, (name, k, d) in enumerate(self._aids):
             self.columns[name] = {"time": time[:, a, :k], "valid": valid[:, a, :k], "value": values[:, a, :k, :d]}
@@ -161,19 +209,17 @@ class LiveStretch(Stretch):
         runs, i = self._runs, len(self.rows)
         runs.advance(_ON)
         self.intervals[i] = runs.interval_of(0)
-        self.truth[i] = runs.truth[0].reshape(3, 3)
-        self.rows.extend(rows_of(self.truth[i : i + 1, 0], self.truth[i : i + 1, 2]))
+        imu: Any = self._none
         if "imu" in self.columns:
-            n, imu = int(runs.samples[0]), self.columns["imu"]
-            imu["time"][i, :n], imu["length"][i, :n] = runs.imu_time[0, :n], runs.imu_interval[0, :n]
-            imu["angular_rate"][i, :n], imu["specific_force"][i, :n] = runs.rate[0, :n], runs.force[0, :n]
-            imu["valid"][i, :n] = 1
+            imu = runs.samples, runs.imu_time, runs.imu_interval, runs.rate, runs.force
+        delivered = runs.count, runs.who, runs.when, runs.value
+        row, aids = self._one, self._arrays
+        slots = self._place, self._most
+        many = _keep(i, runs.truth, imu, delivered, slots, self._samples, aids, self.truth, row)
+        self.rows += row.tolist()
         if self._sides:  # a run with channels has only the block form
             self._place_slots(i)
-            return
-        delivered = runs.count[0], runs.who[0], runs.when[0], runs.value[0]
-        many = _place(delivered, self._place, self._most, i, *self._arrays)
-        if many >= 0:
+        elif many >= 0:
             raise ValueError(
                 f"{runs.names[0][many]} delivered more than {self._most[many]} samples in one step at "
                 f"{self.intervals[i, 1]:.3f} s, which is what its datasheet's rate allows"
@@ -298,15 +344,7 @@ def pack(block: Block, begin: float, most: Mapping[str, int]) -> Stretch:
 @kernel("void(f8[:, :], f8[:, :], f8[:, ::1])")
 def _rows(position: Array, attitude: Array, out: Array) -> None:
     for i in range(out.shape[0]):
-        s, height = np.sin(position[i, 0]), position[i, 2]
-        if height != height:  # a log may have no reference of it
-            height = 0.0
-        x = 1.0 - ECCENTRICITY_SQUARED * (s * s)
-        prime_vertical = SEMI_MAJOR_AXIS / np.sqrt(x)
-        meridian = prime_vertical * (1.0 - ECCENTRICITY_SQUARED) / x
-        out[i, 0], out[i, 1], out[i, 2] = position[i, 0], position[i, 1], position[i, 2]
-        out[i, 3], out[i, 4] = meridian + height, (prime_vertical + height) * np.cos(position[i, 0])
-        out[i, 5] = attitude[i, 2]
+        _row(position[i, 0], position[i, 1], position[i, 2], attitude[i, 2], out[i])
 
 
 def rows_of(position: Array, attitude: Array) -> list[list[float]]:

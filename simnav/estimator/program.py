@@ -45,8 +45,8 @@ class ProgramEstimator(Estimator):
     Parameters
     ----------
     program : str
-        The program with its arguments, as in a shell; the program itself is looked for beside the file of the class
-        first. Default: the class attribute ``program``.
+        The program with its arguments, as in a shell. The program is looked for beside the file of the class first,
+        and runs in that folder, so arguments may name files there. Default: the class attribute ``program``.
     lines : {"csv", "json"}
         Form of the lines.
     patience : float
@@ -80,8 +80,9 @@ class ProgramEstimator(Estimator):
         self._errors = tempfile.TemporaryFile()  # noqa: SIM115 (lives as long as the program)
         try:
             self._process = subprocess.Popen(
-                command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._errors, bufsize=0
-            )
+                command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._errors, bufsize=0,
+                cwd=self._folder(),
+            )  # fmt: skip
         except OSError as error:
             raise EstimatorError(f"the program {command[0]!r} cannot be started: {error.strerror}") from None
         weakref.finalize(self, _kill, self._process)
@@ -99,12 +100,21 @@ class ProgramEstimator(Estimator):
         answer = self._line(f"the estimate at {measurements.time:g} s")
         return _json_estimate(answer) if self._form == "json" else _csv_estimate(answer)
 
+    def _folder(self) -> Path | None:
+        """The folder of the file of a subclass; a class of a notebook has none."""
+        if type(self) is ProgramEstimator:
+            return None
+        try:
+            folder = Path(inspect.getfile(type(self))).resolve().parent
+        except (TypeError, OSError):
+            return None
+        return folder if folder.is_dir() else None
+
     def _found(self, name: str) -> str:
-        with contextlib.suppress(TypeError, OSError):
-            beside = Path(inspect.getfile(type(self))).resolve().parent / name
-            if beside.is_file():
-                return str(beside)
-        return name
+        folder = self._folder()
+        if folder is not None and (folder / name).is_file():
+            return str(folder / name)
+        return str(Path(name).resolve()) if "/" in name and Path(name).is_file() else name
 
     def _end(self) -> None:
         if self._process is not None:

@@ -159,8 +159,9 @@ def described(time: Array) -> str:
         return f"{len(time)} row at {time[0]:.3f} s" if len(time) else "no rows"
     spacing = np.diff(time)
     usual, longest = float(np.median(spacing)), float(spacing.max())
-    text = f"{len(time)} rows from {time[0]:.3f} to {time[-1]:.3f} s, {1.0 / usual:.4g} Hz"
-    if longest > _GAP * usual:
+    rate = f"{1.0 / usual:.4g} Hz" if usual > 0.0 else "most rows are not later than the one before"
+    text = f"{len(time)} rows from {time[0]:.3f} to {time[-1]:.3f} s, {rate}"
+    if longest > _GAP * usual > 0.0:
         k = int(np.argmax(spacing))
         text += f", longest gap {longest:.3g} s after {time[k]:.3f} s"
     return text

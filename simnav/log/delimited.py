@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import contextlib
 import io
-import os
 import re
 import warnings
 from collections.abc import Iterable, Sequence
 from datetime import UTC, datetime
-from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +16,7 @@ from numpy.typing import NDArray
 
 from simnav.log.binary import refuse_binary
 from simnav.log.files import FileSpec
+from simnav.log.kept import kept
 from simnav.log.reader import Rows, register_reader
 from simnav.log.table import LogError, LogWarning, Table, utc_seconds
 from simnav.log.units import factor
@@ -113,6 +112,7 @@ def _time(table: Table, file: FileSpec, column: str) -> Array:
     return moments
 
 
+@kept(64)
 def read_csv(path: Path, comment: str = "") -> Table:
     """Read a table of numbers with or without a header, separated by comma, semicolon, tab or blank.
 
@@ -130,18 +130,6 @@ def read_csv(path: Path, comment: str = "") -> Table:
     LogError
         If the file is absent or empty, or its rows differ in length.
     """
-    try:
-        status = os.stat(path)
-    except OSError:
-        raise LogError(f"{path}: there is no such file") from None
-    try:
-        return _read_csv(path, comment, status.st_mtime_ns, status.st_size)
-    except OSError as error:
-        raise LogError(f"{path} cannot be read: {error.strerror}") from None
-
-
-@lru_cache(maxsize=64)
-def _read_csv(path: Path, comment: str, _mtime: int, _size: int) -> Table:
     import pyarrow as pa
 
     refuse_binary(path, "csv")
@@ -246,7 +234,7 @@ def _end_of_rows(content: bytes, start: int, path: Path, delimiter: str, width: 
     warnings.warn(
         f"{path}: the last row has {cells} cells where the first line has {width}; it is incomplete, and left out",
         LogWarning,
-        4,
+        5,
     )
     return cut + 1
 

@@ -9,11 +9,9 @@ over (its date is 1024 weeks off) does no harm.
 from __future__ import annotations
 
 import math
-import os
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -21,11 +19,12 @@ import numpy as np
 from simnav.log.binary import refuse_binary
 from simnav.log.files import FileSpec
 from simnav.log.growing import GrowingTable
+from simnav.log.kept import kept
 from simnav.log.nmea_sentences import SENTENCES, InvalidError, Row
-from simnav.log.progress import tell
 from simnav.log.reader import Rows, register_reader
 from simnav.log.table import LogError, LogWarning, Table, utc_seconds
 from simnav.spec import closest
+from simnav.watchers import tell
 
 __all__ = ["SENTENCES", "NmeaFile", "read_nmea", "take_variation"]
 
@@ -84,25 +83,6 @@ def _read(path: Path, file: FileSpec, sentence: str | None, talker: str | None) 
     return Rows(table, time, file.clock, np.flatnonzero(np.isfinite(time)))
 
 
-def read_nmea(path: Path) -> NmeaFile:
-    """Read an NMEA log; kept for the life of the process, as long as the file does not change.
-
-    Lines with a bad checksum and lines that cannot be understood are left out, with one `LogWarning` for each kind that
-    counts them; a sentence without a checksum is accepted. A sentence that says that it is invalid (by its quality,
-    status or mode) is left out without a warning, but its time counts.
-
-    Raises
-    ------
-    LogError
-        If the file is absent or has no sentence that is understood.
-    """
-    try:
-        status = os.stat(path)
-    except OSError:
-        raise LogError(f"{path}: there is no such file") from None
-    return _read_nmea(path, status.st_mtime_ns, status.st_size)
-
-
 def _checksum_ok(body: str, given: str) -> bool:
     total = 0
     for c in body:
@@ -138,8 +118,20 @@ def take_variation(row: Row, last: float) -> float:
     return last
 
 
-@lru_cache(maxsize=64)
-def _read_nmea(path: Path, _mtime: int, size: int) -> NmeaFile:
+@kept(64)
+def read_nmea(path: Path) -> NmeaFile:
+    """Read an NMEA log; kept for the life of the process, as long as the file does not change.
+
+    Lines with a bad checksum and lines that cannot be understood are left out, with one `LogWarning` for each kind that
+    counts them; a sentence without a checksum is accepted. A sentence that says that it is invalid (by its quality,
+    status or mode) is left out without a warning, but its time counts.
+
+    Raises
+    ------
+    LogError
+        If the file is absent or has no sentence that is understood.
+    """
+    size = path.stat().st_size
     refuse_binary(path, "nmea")
     rows: dict[tuple[str, str], GrowingTable] = {}
     without: dict[tuple[str, str], list[int]] = {}
@@ -196,7 +188,7 @@ def _read_nmea(path: Path, _mtime: int, size: int) -> NmeaFile:
     for bad, what in ((bad_sum, "have a bad checksum"), (bad_line, "are not understood")):
         if bad:
             warnings.warn(
-                f"{path}: {len(bad)} lines {what} and are left out, the first is line {bad[0]}", LogWarning, 4
+                f"{path}: {len(bad)} lines {what} and are left out, the first is line {bad[0]}", LogWarning, 5
             )
     if not rows and not without:
         raise LogError(f"{path}: there is no NMEA sentence that is understood ({', '.join(SENTENCES)})")

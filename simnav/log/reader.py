@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -87,6 +88,10 @@ class Reader:
             raise LogError(f"{path}: there is no such file") from None
         except (LogError, MemoryError):
             raise
+        except OSError as error:
+            if error.filename is None or Path(os.fsdecode(error.filename)) != path:
+                raise LogError(f"{self._label(path)}: {exception_of(self.function, error)}") from error
+            raise LogError(f"{path} cannot be read: {error.strerror}") from None
         except Exception as error:
             raise LogError(f"{self._label(path)}: {exception_of(self.function, error)}") from error
         if not isinstance(rows, Rows):

@@ -23,6 +23,10 @@ __all__ = ["NAME", "Header", "ScenarioWarning", "headers"]
 
 _GROUP = "simnav.scenarios"
 
+#: Kinds of instruments with channels, and how a scenario names one.
+_WITH_CHANNELS = ("gnss_raw", "dvl_beams", "usbl_fix", "acoustic_range")
+_CHANNELS = re.compile(rf"^[^#\n]*\bkind *= *[\"']({'|'.join(_WITH_CHANNELS)})[\"']", re.MULTILINE)
+
 #: Names of scenarios: kebab-case.
 NAME = re.compile(r"[a-z][a-z0-9]*(-[a-z0-9]+)*")
 
@@ -186,8 +190,8 @@ def _read(path: Path) -> Header | None:
         group=str(table.get("group", "other")),
         training=table.get("training") is True,
         path=path,
-        recorded=re.search(r"^\[log[\].]", text, re.MULTILINE) is not None,
-        channels=re.search(r"^[^#\n]*\bkind *= *[\"'](gnss_raw|dvl_beams)[\"']", text, re.MULTILINE) is not None,
+        recorded="\n[log" in text and re.search(r"^\[log[\].]", text, re.MULTILINE) is not None,
+        channels=any(kind in text for kind in _WITH_CHANNELS) and _CHANNELS.search(text) is not None,
     )
 
 

@@ -8,7 +8,7 @@
 
 Modules: ``registry``; the scores themselves in ``accuracy``, ``outages``, ``consistency``, ``integrity``,
 ``detection``, ``noise_estimation``, ``smoothed`` and ``cost``, registered by ``standard``; ``navigation_error``,
-``scores``, ``plot_series``.
+``scores``, ``plot_series``; ``trajectory_errors`` as programs for odometry report them.
 """
 
 from __future__ import annotations

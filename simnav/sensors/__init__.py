@@ -11,6 +11,7 @@ from __future__ import annotations
 from typing import Annotated
 
 from simnav.kinds import INSTRUMENTS
+from simnav.sensors.acoustic_range import AcousticRange
 from simnav.sensors.channels import ChannelInstrument
 from simnav.sensors.compass import Gyrocompass, MagneticCompass
 from simnav.sensors.depth import Depth
@@ -27,9 +28,11 @@ from simnav.sensors.instrument import AidSpec, Instrument, register_instrument
 from simnav.sensors.magnetic_field import MagneticField
 from simnav.sensors.speed_log import SpeedLog
 from simnav.sensors.terrain import TerrainFix
+from simnav.sensors.usbl_fix import UsblFix
 from simnav.spec import OneOf
 
 __all__ = [
+    "AcousticRange",
     "AidSpec",
     "AnyFault",
     "AnyInstrument",
@@ -54,6 +57,7 @@ __all__ = [
     "MagneticField",
     "SpeedLog",
     "TerrainFix",
+    "UsblFix",
     "build_layers",
     "fault_specs",
     "instrument_specs",

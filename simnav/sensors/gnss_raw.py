@@ -25,7 +25,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from datetime import datetime
 from functools import lru_cache
-from math import radians
+from math import exp, radians, sqrt
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, Self
 
@@ -190,6 +190,13 @@ class GnssRaw(AidSpec):
         Its figures are so many times those of its grade.
     clock_bias : float
         One sigma of the clock's error at the begin of a run [m].
+    noise_time : float
+        Correlation time of the noise of the pseudoranges [s]: tracking loops, and receivers that smooth codes by their
+        carriers, correlate it over ten seconds. Its standard deviation stays that of the datasheet, which does not
+        tell. 0: white noise.
+    galileo_noise : float
+        Noise of Galileo's pseudoranges in units of that of GPS and BeiDou. Its signal E1 has a sharper correlation
+        peak: 0.58 by theory for BOC(1,1) at one spacing of the correlators. The datasheet states the noise of GPS.
     clock_step : float
         The receiver steps its clock by so much whenever its error exceeds half of it [s]; many do so by a millisecond.
         The first readings after a step have a label. 0: the clock runs freely.
@@ -209,7 +216,13 @@ class GnssRaw(AidSpec):
         "clock_bias",
     )  # fmt: skip
 
-    later: ClassVar[Mapping[str, Any]] = {**AidSpec.later, "sea_reflection": 0.0, "clock_step": 0.0}
+    later: ClassVar[Mapping[str, Any]] = {
+        **AidSpec.later,
+        "sea_reflection": 0.0,
+        "clock_step": 0.0,
+        "noise_time": 0.0,
+        "galileo_noise": 1.0,
+    }
 
     kind: Literal["gnss_raw"] = "gnss_raw"
     navigation: str = ""
@@ -239,6 +252,8 @@ class GnssRaw(AidSpec):
     oscillator_factor: NonNegative = 1.0
     clock_bias: NonNegative = quantity("m", 300.0)
     clock_step: NonNegative = quantity("s", 0.0)
+    noise_time: NonNegative = quantity("s", 0.0)
+    galileo_noise: Positive = 1.0
     lever_arm: Vector = quantity("m", ZERO)
 
     @field_validator("epoch")
@@ -335,6 +350,8 @@ class RawReceiver(ChannelInstrument):
         self._last: tuple[TapStates, Sight, Paths | None] | None = None
         #: Number of steps of the clock at the last reading.
         self._steps: float | None = None
+        #: Of each satellite the last noise of the pseudorange, of unit variance; none before the first.
+        self._correlated: Array | None = None
 
     def _seen(self, tap: TapStates) -> tuple[Sight, Paths | None]:
         """The satellites from the antenna at n times, and the ways of their signals; None: nothing is in the way."""
@@ -347,6 +364,16 @@ class RawReceiver(ChannelInstrument):
                 paths = obstacles.paths(position, velocity, seen.elevation, seen.azimuth)
             self._last = tap, seen, paths
         return self._last[1:]
+
+    def ahead(self, time: Array) -> tuple[Array, Array]:
+        """See `ChannelInstrument.ahead`; with ``noise_time`` the noise of pseudoranges is a Gauss-Markov process."""
+        error, variates = super().ahead(time)
+        if self.spec.noise_time and self._noises and len(time):
+            kept = exp(-1.0 / (self.spec.rate * self.spec.noise_time))
+            for k, fresh in enumerate(variates[:, :, 0]):
+                now = fresh if self._correlated is None else kept * self._correlated + sqrt(1.0 - kept * kept) * fresh
+                variates[k, :, 0] = self._correlated = now
+        return error, variates
 
     def sight(self, tap: TapStates) -> Sight:
         """What the satellites look like from the antenna, at n times."""
@@ -467,7 +494,11 @@ class RawReceiver(ChannelInstrument):
 
     def noise_sigma(self, observed: Array, side: Array = NO_SIDE) -> Array:
         """See `ChannelInstrument.noise_sigma`: `reading_sigma` of all readings at once."""
-        return reading_sigma(side, self._sheet)
+        sigma = reading_sigma(side, self._sheet)
+        if self.spec.galileo_noise != 1.0:
+            sigma = sigma.copy()
+            sigma[:, [name[0] == SYSTEMS["galileo"] for name in self.channels], 0] *= self.spec.galileo_noise
+        return sigma
 
     def available(self, tap: TapStates) -> NDArray[np.bool_]:
         """See `ChannelInstrument.available`: where the satellite is above the mask, and its signal strong enough."""

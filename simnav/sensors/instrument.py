@@ -222,6 +222,10 @@ class AidSpec(Spec):
         """
         return {}
 
+    def latency_spread(self) -> float | None:
+        """By how much the latencies of two readings may differ [s]; None: each reading arrives when it is valid."""
+        return None if self.timing is None else self.timing.spread
+
     def origin(self) -> Mapping[str, str]:
         """What an export needs beyond the datasheet, such as the date (`Recording.origins`); nothing by default."""
         return {}

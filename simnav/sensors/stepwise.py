@@ -13,7 +13,9 @@ from simnav.sensors.faults.layer import ADDS, DROPS, HOLDS, STEPS_NOISE, ZEROES
 from simnav.sensors.imu import triad_errors
 from simnav.sensors.observation import noise_scalar, observe_one
 
-__all__ = ["HELD", "UNTOUCHED", "sense", "sense_imu"]
+__all__ = [
+    "BLOCKS", "COMPILED", "DUE", "HELD", "INERTIAL", "UNTOUCHED", "begin_step", "sense", "sense_imu", "sort_out",
+]  # fmt: skip
 
 #: State of a layer that repeats values: the last value, and 1 if there is one; number of the interval, and the repeated
 #: value.
@@ -21,6 +23,77 @@ LAST, HAS_LAST, NUMBER, VALUE = 0, 3, 4, 5
 HELD = 8
 #: Number of the interval of a measurement that a layer does not affect.
 UNTOUCHED = -2
+#: What `sort_out` finds: a run with only the block form; one that is compiled, with an IMU, at the end of a stretch.
+BLOCKS, COMPILED, INERTIAL, DUE = 1, 2, 4, 8
+
+
+@kernel("i8(b1[::1], Tuple((b1[::1], b1[::1], i8[::1], i8[::1])), UniTuple(b1[::1], 3))")
+def sort_out(
+    active: Flags, runs: tuple[Flags, Flags, Integers, Integers], which: tuple[Flags, Flags, Flags]
+) -> int:  # fmt: skip
+    """Find what each of b runs needs in a step.
+
+    Parameters
+    ----------
+    active : (b,) bool array
+        True for each run that is advanced.
+    runs : (b,) bool, (b,) bool, (b,) int and (b,) int arrays
+        Whether a run is compiled and has an IMU; number of its step within the stretch, and steps of the stretch.
+    which : three (b,) bool arrays
+        Overwritten: the runs that are advanced and compiled; those of them with an IMU; those at the end of a stretch.
+
+    Returns
+    -------
+    int
+        `BLOCKS`, `COMPILED`, `INERTIAL` and `DUE`, as far as there is such a run, added.
+    """
+    known, imu, at, end = runs
+    compiled, inertial, due = which
+    found = 0
+    for b in range(active.size):
+        compiled[b] = active[b] and known[b]
+        inertial[b] = compiled[b] and imu[b]
+        due[b] = compiled[b] and at[b] >= end[b]
+        if active[b]:
+            found |= COMPILED if known[b] else BLOCKS
+        if inertial[b]:
+            found |= INERTIAL
+        if due[b]:
+            found |= DUE
+    return found
+
+
+@kernel("i8(b1[::1], Tuple((i8[:, ::1], i8[::1])), UniTuple(i8[::1], 3), UniTuple(i8[::1], 3))")
+def begin_step(
+    compiled: Flags, stretch: tuple[Integers, Integers], counters: tuple[Integers, Integers, Integers],
+    limits: tuple[Integers, Integers, Integers],
+) -> int:  # fmt: skip
+    """Begin a step of b runs. Return the largest number of times in a step at which the state is needed.
+
+    Parameters
+    ----------
+    compiled : (b,) bool array
+        True for each run that is advanced.
+    stretch : (b, s + 1) int and (b,) int arrays
+        Where the times of each step begin within the stretch, and number of IMU samples in a step.
+    counters : three (b,) int arrays
+        Number of the step within the stretch and in the run, increased; number of IMU samples in the step, overwritten.
+    limits : three (b,) int arrays
+        Overwritten: number of the step within the stretch, index of its first time, and index after the last one.
+    """
+    edge, samples_a_step = stretch
+    at, step, samples = counters
+    place, first, last = limits
+    most = 0
+    for b in range(compiled.size):
+        if compiled[b]:
+            k = at[b]
+            place[b], first[b], last[b] = k, edge[b, k], edge[b, k + 1]
+            most = max(most, last[b] - first[b])
+            samples[b] = samples_a_step[b]
+            at[b] = k + 1
+            step[b] += 1
+    return most
 
 
 @kernel(

@@ -109,7 +109,8 @@ class Clock:
         Parameters
         ----------
         stream : AidStream
-            The readings. A fault may have given them stamps; the errors of the clock are added.
+            The readings. A fault may have given them stamps; the errors of the clock are added. If they have times of
+            arrival, the latency comes on top.
         time : (n,) array
             All sample times of the block, delivered or not [s].
         """
@@ -118,12 +119,14 @@ class Clock:
         if self._latency is not None:  # the inverse of the cut exponential distribution
             share = -np.expm1(-TAIL) * self._latency.random(n)
             arrival = arrival - spec.latency_random * np.log1p(-share)
-        set_at = arrival if spec.stamped == "arrival" else time
-        error: Any = self.offset + self.drift * set_at
-        if self._jitter is not None:
-            error = error + spec.jitter * self._jitter.standard_normal(n)
+        jitter = None if self._jitter is None else spec.jitter * self._jitter.standard_normal(n)
         rows = np.searchsorted(time, stream.time - _TOLERANCE)
-        stamp = set_at[rows] + (stream.stamps - stream.time) + error[rows]
+        arrival = arrival[rows] + (stream.arrivals - stream.time)
+        set_at = arrival if spec.stamped == "arrival" else time[rows]
+        error: Any = self.offset + self.drift * set_at
+        if jitter is not None:
+            error = error + jitter[rows]
+        stamp = set_at + (stream.stamps - stream.time) + error
         if spec.resolution:
             stamp = np.round(stamp / spec.resolution) * spec.resolution
-        return replace(stream, stamp=stamp, arrival=arrival[rows])
+        return replace(stream, stamp=stamp, arrival=arrival)

@@ -20,7 +20,18 @@ from simnav.arrivals import Arrivals
 from simnav.recording import AidStream, packets
 from simnav.sensors.faults.layer import DISTURBS_IMU, STEPS_NOISE, FaultLayer
 from simnav.sensors.observation import CompiledInstrument
-from simnav.sensors.stepwise import HELD, UNTOUCHED, sense, sense_imu
+from simnav.sensors.stepwise import (
+    BLOCKS,
+    COMPILED,
+    DUE,
+    HELD,
+    INERTIAL,
+    UNTOUCHED,
+    begin_step,
+    sense,
+    sense_imu,
+    sort_out,
+)
 from simnav.simulation.simulator import TIME_TOLERANCE, Simulator
 from simnav.types import ImuSamples, Measurement, Measurements
 from simnav.world import World, motion
@@ -72,6 +83,9 @@ class SteppedRuns:
         self._compiled, self._stretch = np.zeros(n, np.bool_), np.zeros(n, np.int64)
         self._at, self._end = np.zeros(n, np.int64), np.zeros(n, np.int64)  # within the stretch, and its steps
         self._imu = np.zeros(n, np.bool_)
+        # Of one step: see `simnav.sensors.stepwise.sort_out` and `begin_step`.
+        self._which = (np.zeros(n, np.bool_), np.zeros(n, np.bool_), np.zeros(n, np.bool_))
+        self._limits = (np.zeros(n, np.int64), np.zeros(n, np.int64), np.zeros(n, np.int64))
         self._taps = np.zeros((n, 1, motion.TAP_COLUMNS))
         self._layers = np.zeros(n, np.int64)
         self._room(8)
@@ -173,28 +187,30 @@ class SteppedRuns:
 
     def advance(self, active: NDArray[np.bool_]) -> None:
         """Advance some runs by one step each."""
-        compiled = active & self._compiled
-        for b in np.flatnonzero(active & ~self._compiled).tolist():
-            self._block(b)
-        if not compiled.any():
+        which = self._compiled, self._imu, self._at, self._end
+        compiled, inertial, due = self._which
+        found = sort_out(active, which, self._which)
+        if found & BLOCKS:
+            for b in np.flatnonzero(active & ~self._compiled).tolist():
+                self._block(b)
+        if not found & COMPILED:
             return
-        for b in np.flatnonzero(compiled & (self._at >= self._end)).tolist():
-            self._draw(b)
-        every = np.arange(self.n)
-        first, last = self.edge[every, self._at], self.edge[every, self._at + 1]
-        most = int((last - first).max())
+        if found & DUE:
+            for b in np.flatnonzero(due).tolist():
+                self._draw(b)
+        place, first, last = self._limits
+        stretch = self.edge, self.samples_a_step
+        most = begin_step(compiled, stretch, (self._at, self.step, self.samples), self._limits)
         if most > self._taps.shape[1]:
             self._taps = np.zeros((self.n, most, motion.TAP_COLUMNS))
-        self.samples[compiled] = self.samples_a_step[compiled]
         motion.advance(
             compiled, (self.x, self.index), self.p, self.sizes, (self.rows, self.points),
             (self.phase, self.table, self.eddies), (self.tap_time, first, last, self._taps),
             (self.samples, self.rate, self.force),
         )  # fmt: skip
-        inertial = compiled & self._imu
-        if inertial.any():
+        if found & INERTIAL:
             sense_imu(
-                inertial, self._at, self.samples, (self.matrix, self.bias, self.triads, self.residual),
+                inertial, place, self.samples, (self.matrix, self.bias, self.triads, self.residual),
                 (self.variates, self.instability, self.walk, self.tables), (self.disturbed, self.disturbance),
                 self.clock, (self.imu_time, self.imu_interval, self.rate, self.force),
             )  # fmt: skip
@@ -204,8 +220,6 @@ class SteppedRuns:
             (self._layers, self.operations, self.sizes_of_noise, self.held),
             (self.count, self.who, self.when, self.value, self.faults), self.truth,
         )  # fmt: skip
-        self._at[compiled] += 1
-        self.step[compiled] += 1
 
     def interval_of(self, b: int) -> tuple[float, float]:
         """Beginning and end of the last step of a run [s]."""

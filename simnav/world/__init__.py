@@ -29,6 +29,7 @@ from simnav.world.manoeuvring.vessel import ManoeuvringVessel
 from simnav.world.manoeuvring.workboat import Workboat
 from simnav.world.obstacles import Obstacle, Obstacles
 from simnav.world.sea import Sea
+from simnav.world.sound_speed import SoundSpeedProfile
 from simnav.world.start import Start
 from simnav.world.surroundings import (
     SURROUNDINGS,
@@ -77,6 +78,7 @@ __all__ = [
     "SampledTrajectory",
     "Sea",
     "Ship",
+    "SoundSpeedProfile",
     "Start",
     "Steered",
     "Superstructure",

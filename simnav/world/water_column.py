@@ -22,7 +22,7 @@ from simnav.spec import SpecError, quantity, register_unit
 from simnav.types import Array
 from simnav.world.surroundings import SurroundingSpec, register_surrounding
 
-__all__ = ["Column", "WaterColumn"]
+__all__ = ["Column", "Figures", "WaterColumn"]
 
 register_unit("celsius", 1.0)
 register_unit("g_kg", 1.0)
@@ -37,6 +37,7 @@ def _listed(value: Any) -> Any:
     return tuple(value) if isinstance(value, (list, tuple)) else (value,)
 
 
+#: Numbers; TOML may have one alone.
 Figures = Annotated[tuple[float, ...], BeforeValidator(_listed)]
 
 

@@ -21,9 +21,10 @@ from pathlib import Path
 
 import numpy as np
 
+from simnav.leaderboard.ranking.lost_runs import LOSS
 from simnav.leaderboard.results import store
 from simnav.leaderboard.results.result import Result
-from simnav.leaderboard.site.losses import LOSS, faults_of
+from simnav.leaderboard.site.losses import faults_of
 from simnav.scenario import load
 from tests.agreement.voyages import LARGEST_NEES, percentile_interval
 

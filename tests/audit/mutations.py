@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import random
 import signal
 import tempfile
@@ -14,7 +15,9 @@ from pathlib import Path
 from typing import Any
 
 from simnav.log import LogError
-from tests.cases.log_files import CASES, mutated, read
+from simnav.log.inspection import inspect_log, track_of
+from simnav.satellites.rinex_navigation import NavigationFileError
+from tests.cases.log_files import CASES, OTHERS, damaged, read
 
 __all__ = ["mutations", "parts", "rows"]
 
@@ -25,8 +28,12 @@ _PATIENCE = 10
 
 
 def mutations(form: str, number: int, seed: int = 0) -> Counter[str]:
-    """How many mutated files of a format were read, refused with one sentence, or ended in something else."""
+    """How many mutated files of a format were read, refused with one sentence, or ended in something else.
+
+    Each is also looked at as by ``simnav inspect``; only what should not happen there is counted.
+    """
     found: Counter[str] = Counter()
+    case = CASES.get(form) or OTHERS[form]
 
     def hangs(*_: object) -> None:
         raise TimeoutError("hangs")
@@ -34,40 +41,59 @@ def mutations(form: str, number: int, seed: int = 0) -> Counter[str]:
     before = signal.signal(signal.SIGALRM, hangs)
     try:
         with tempfile.TemporaryDirectory() as folder:
-            good = Path(folder) / f"good{CASES[form].ending}"
-            CASES[form].make(good)
+            good = Path(folder) / f"good{case.ending}"
+            case.make(good)
             content = good.read_bytes()
             for k in range(number):
-                path = Path(folder) / f"{k}{CASES[form].ending}"
-                path.write_bytes(mutated(content, random.Random(f"{form}/{seed}/{k}")))
-                signal.alarm(_PATIENCE)
-                try:
-                    with warnings.catch_warnings():
-                        warnings.simplefilter("ignore")
-                        found["read" if len(read(form, path).table) else "empty"] += 1
-                except LogError as error:
-                    text = str(error)
-                    own = (
-                        ": reader " in text and " in " in text and "line" in text
-                    )  # an exception of the code of a reader
-                    good_sentence = "\n" not in text and len(text) < 1000 and not own
-                    found["refused" if good_sentence else f"no sentence (case {k}): {text[:200]}"] += 1
-                except BaseException as error:
-                    place = traceback.extract_tb(error.__traceback__)[-1]
-                    found[
-                        f"traceback (case {k}): {type(error).__name__} at {Path(place.filename).name}:{place.lineno}"
-                    ] += 1
-                finally:
-                    signal.alarm(0)
+                path = Path(folder) / f"{k}{case.ending}"
+                damaged(case, path, content, random.Random(f"{form}/{seed}/{k}"))
+                found[_outcome(partial(case.reads or partial(_rows, form), path), k)] += 1
+                if case.reads is None:
+                    looked = _outcome(partial(_look, path), k)
+                    if looked not in ("read", "refused"):
+                        found[f"inspect: {looked}"] += 1
                 path.unlink()
     finally:
         signal.signal(signal.SIGALRM, before)
     return found
 
 
+def _rows(form: str, path: Path) -> Any:
+    return read(form, path).table
+
+
+def _look(path: Path) -> Any:
+    streams, failed = inspect_log([path])
+    if failed:
+        raise LogError(failed[0])
+    for stream in streams:
+        json.dumps(stream.to_dict())
+        track_of(stream)
+    return streams or "no stream"  # a bag without messages
+
+
+def _outcome(what: Callable[[], Any], k: int) -> str:
+    """``read``, ``refused``, or what is wrong with case k."""
+    signal.alarm(_PATIENCE)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            return "read" if len(what()) else f"empty (case {k})"
+    except (LogError, NavigationFileError) as error:
+        text = str(error)
+        own = ": reader " in text and " in " in text and "line" in text  # an exception of the code of a reader
+        good_sentence = "\n" not in text and len(text) < 1000 and not own
+        return "refused" if good_sentence else f"no sentence (case {k}): {text[:200]}"
+    except BaseException as error:
+        place = traceback.extract_tb(error.__traceback__)[-1]
+        return f"traceback (case {k}): {type(error).__name__} at {Path(place.filename).name}:{place.lineno}"
+    finally:
+        signal.alarm(0)
+
+
 def parts() -> Mapping[str, Callable[[], Any]]:
-    """One part for each format."""
-    return {form: partial(mutations, form, FILES) for form in CASES}
+    """One part for each format, and for further contents of some."""
+    return {form: partial(mutations, form, FILES) for form in [*CASES, *OTHERS]}
 
 
 def rows(found: Mapping[str, Any]) -> Iterator[tuple[str, str, str, bool]]:

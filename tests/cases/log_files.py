@@ -6,18 +6,28 @@ import json
 import struct
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
 from simnav.log.files import FileSpec
 from simnav.log.reader import READERS, Rows
+from simnav.satellites.rinex_navigation import read_navigation
+from simnav.sensors.gnss_raw import SHIPPED
 
-__all__ = ["CASES", "Case", "mutated", "read"]
+__all__ = ["CASES", "OTHERS", "Case", "damaged", "mutated", "read"]
 
 N = 12
 T = np.arange(N, dtype=np.float64)
 LATITUDE, LONGITUDE, HEIGHT = 54.0 + 1e-5 * T, 7.9 + 2e-5 * T, 0.1 * T
+
+
+#: What is done to the content of each message before it is packed.
+Change: TypeAlias = Callable[[bytes], bytes]
+
+
+def _same(content: bytes) -> bytes:
+    return content
 
 
 class Case(NamedTuple):
@@ -33,12 +43,21 @@ class Case(NamedTuple):
         Keys of `FileSpec`.
     sentence : str or None
         What a channel names.
+    form : str
+        The format, where it is not the name of the case.
+    inner : callable or None
+        Makes the file with another content of its messages, but with right lengths and checksums around them.
+    reads : callable or None
+        Reads the file, where no registered reader does; gives what has a length.
     """
 
     ending: str
     make: Callable[[Path], None]
     keys: Mapping[str, Any] = {}
     sentence: str | None = None
+    form: str = ""
+    inner: Callable[[Path, Change], None] | None = None
+    reads: Callable[[Path], Any] | None = None
 
 
 def _text(text: str) -> Callable[[Path], None]:
@@ -78,7 +97,7 @@ def _sbet(path: Path) -> None:
     path.write_bytes(np.stack(columns, axis=1).astype("<f8").tobytes())
 
 
-def _pd0(path: Path) -> None:
+def _pd0(path: Path, change: Change = _same) -> None:
     content = b""
     for k in range(N):
         fixed = bytearray(59)
@@ -95,7 +114,8 @@ def _pd0(path: Path) -> None:
         for part in parts:
             offsets.append(at)
             at += len(part)
-        body = struct.pack("<2sHBB3H", b"\x7f\x7f", at, 0, 3, *offsets) + b"".join(parts)
+        body = change(struct.pack("<BB3H", 0, 3, *offsets) + b"".join(parts))[:60_000]
+        body = struct.pack("<2sH", b"\x7f\x7f", 4 + len(body)) + body
         content += body + struct.pack("<H", sum(body) & 0xFFFF)
     path.write_bytes(content)
 
@@ -116,6 +136,52 @@ def _n2k() -> str:
         for pgn, source, data in [*messages, *(("129029", 160, f) for f in frames)]:
             lines.append(f"{stamp},2,{pgn},{source},255,{len(data)},{data.hex(',')}")
     return "\n".join(lines) + "\n"
+
+
+def _n2k_others() -> str:
+    messages = {
+        "126992": struct.pack("<BBHI", 1, 0xF0, 16297, 684005000),
+        "127251": struct.pack("<BiBBB", 1, 320_000, 255, 255, 255),
+        "127252": struct.pack("<BhBHH", 1, -45, 255, 0xFFFF, 0xFFFF),
+        "127257": struct.pack("<BhhhB", 1, 12000, -300, 150, 255),
+        "127258": struct.pack("<BBHhH", 1, 0xF8, 16297, 698, 0xFFFF),
+        "128267": struct.pack("<BIhB", 1, 2350, -500, 255),
+        "129026": struct.pack("<BBHHH", 1, 0xFC, 24294, 324, 0xFFFF),
+        "129033": struct.pack("<HIh", 16297, 684005000, 120),
+    }
+    lines = []
+    for k in range(N):
+        for pgn, data in messages.items():
+            lines.append(f"2014-08-15T19:00:{k:02d}.042Z,2,{pgn},36,255,{len(data)},{data.hex(',')}")
+    return "\n".join(lines) + "\n"
+
+
+def _nmea_others() -> str:
+    bodies = [
+        "GPRMC,000000.25,A,2230.0000,S,01745.6000,W,10.0,210.0,010814,12.6,W,A",
+        "GPGLL,2230.0000,S,01745.6000,W,000000.25,A,A",
+        "GNGNS,000000.25,2230.0000,S,01745.6000,W,AN,11,0.9,33.6,-2.6,,",
+        "GPGST,000000.25,1.0,2.0,1.5,30.0,1.2,1.3,2.5", "GPZDA,000000.25,01,08,2014,00,00", "HEHDT,98.3,T",
+        "HCHDM,98.3,M", "HETHS,98.3,A", "TIROT,-12.5,A", "VWVHW,98.3,T,110.9,M,5.0,N,9.3,K",
+        "VDVBW,5.0,0.2,A,5.1,0.1,A,0.1,A,0.1,A", "SDDPT,23.5,-0.5,100.0", "SDDBT,77.1,f,23.5,M,12.8,F", "YXMTW,25.3,C",
+        "PASHR,000000.25,98.30,T,-0.35,1.74,0.05,0.02,0.02,0.1,1,0", "PRDID,-1.74,0.35,98.30",
+        "PUHAW,UVH,-1.5,2.5,98.3", "PNORBT9,1406851200.75,1.234,-1.234,0.5,-0.1,0.02,0.004,23.45,23.4,23.5,23.6",
+    ]  # fmt: skip
+    lines = []
+    for k in range(N):
+        for body in bodies:
+            total = 0
+            for c in body:
+                total ^= ord(c)
+            lines.append(f"2014-08-01T00:00:{k:02d}.5Z ${body}*{total:02X}")
+    return "\n".join(lines) + "\n"
+
+
+def _navigation() -> str:
+    """The first twelve ephemerides of the file that comes with simnav."""
+    lines = SHIPPED.read_text().splitlines(keepends=True)
+    begin = next(k for k, line in enumerate(lines) if line[60:].startswith("END OF HEADER")) + 1
+    return "".join(lines[: begin + 12 * 8])
 
 
 def _pd6() -> str:
@@ -142,15 +208,31 @@ def ubx(group: int, number: int, content: bytes) -> bytes:
     return b"\xb5\x62" + body + bytes((a, b))
 
 
-def _ubx(path: Path) -> None:
+def _pvt(k: int) -> bytes:
+    head = struct.pack("<IH5BBIi", 295218000 + 1000 * k, 2024, 5, 1, 10, 0, k, 7, 25, 500_000_000)
+    place = struct.pack("<4B4i", 3, 0x81, 0, 14, round(LONGITUDE[k] * 1e7), round(LATITUDE[k] * 1e7), 47_100, 3_100)
+    return head + place + struct.pack("<2I5i2IH14x", 14, 22, 1500, -300, 20, 1530, 34_869_000, 50, 100_000, 152)
+
+
+def _ubx(path: Path, change: Change = _same) -> None:
     content = b"$GNGGA,,,,,,0,,,,,,,,*56\r\n"
     for k in range(N):
+        content += ubx(1, 7, change(_pvt(k)))
+        tow = 295218500 + 1000 * k
+        content += ubx(1, 5, change(struct.pack("<I4x3i3I", tow, 150_000, -50_000, 9_000_000, 1000, 1000, 20_000)))
+    path.write_bytes(content)
+
+
+def _ubx_others(path: Path, change: Change = _same) -> None:
+    """A place with high precision, a velocity and a vector between antennas, after the date."""
+    content = ubx(1, 7, _pvt(0))
+    for k in range(N):
         tow = 295218000 + 1000 * k
-        head = struct.pack("<IH5BBIi", tow, 2024, 5, 1, 10, 0, k, 7, 25, 500_000_000)
-        place = struct.pack("<4B4i", 3, 0x81, 0, 14, round(LONGITUDE[k] * 1e7), round(LATITUDE[k] * 1e7), 47_100, 3_100)
-        motion = struct.pack("<2I5i2IH", 14, 22, 1500, -300, 20, 1530, 34_869_000, 50, 100_000, 152)
-        content += ubx(1, 7, head + place + motion + bytes(14))
-        content += ubx(1, 5, struct.pack("<I4x3i3I", tow + 500, 150_000, -50_000, 9_000_000, 1000, 1000, 20_000))
+        place = struct.pack("<4xI4i4b2I", tow, 79_000_000, 540_000_000, 47_100, 3_100, 12, -34, 5, 6, 140, 220)
+        motion = struct.pack("<I3i2Ii2I", tow, 150, -30, 2, 153, 153, 34_869_000, 5, 100_000)
+        vector = struct.pack("<4xI5i4b5I4xI", tow, 100, 50, -2, 112, 2_656_000, 1, 2, 3, 4, 10, 10, 10, 10, 5000, 0x137)
+        for number, message in ((0x14, place), (0x12, motion), (0x3C, vector)):
+            content += ubx(1, number, change(message))
     path.write_bytes(content)
 
 
@@ -196,7 +278,7 @@ def _parquet(path: Path) -> None:
     parquet.write_table(pa.table({"stamp": stamps, "place": place, "mode": ["A"] * N}), path)
 
 
-def _mcap(path: Path) -> None:
+def _mcap(path: Path, change: Change = _same) -> None:
     from mcap.writer import Writer
 
     with open(path, "wb") as stream:
@@ -206,11 +288,59 @@ def _mcap(path: Path) -> None:
         channel = writer.register_channel("/fix", "json", schema)
         for k in range(N):
             message = {"timestamp": {"sec": k, "nsec": 500_000_000}, "latitude": LATITUDE[k], "covariance": [1.0, 2.0]}
-            writer.add_message(channel, 10**9 * k + 7 * 10**8, json.dumps(message).encode(), 10**9 * k)
+            data = change(json.dumps(message).encode())
+            writer.add_message(channel, 10**9 * k + 7 * 10**8, data, 10**9 * k)
         writer.finish()
 
 
-def _bag(path: Path) -> None:
+def _protobuf(path: Path, change: Change = _same) -> None:
+    """Messages with a stamp, a number that keeps its default, and a repeated field."""
+    from google.protobuf import descriptor_pb2, descriptor_pool, message_factory, timestamp_pb2
+    from mcap.writer import Writer
+
+    file = descriptor_pb2.FileDescriptorProto(
+        name="fix.proto", package="test", syntax="proto3", dependency=["google/protobuf/timestamp.proto"]
+    )
+    message = file.message_type.add(name="Fix")
+    kinds = descriptor_pb2.FieldDescriptorProto
+    message.field.add(name="timestamp", number=1, type=kinds.TYPE_MESSAGE, type_name=".google.protobuf.Timestamp")
+    message.field.add(name="latitude", number=2, type=kinds.TYPE_DOUBLE)
+    message.field.add(name="height", number=3, type=kinds.TYPE_DOUBLE)
+    message.field.add(name="covariance", number=4, type=kinds.TYPE_DOUBLE, label=kinds.LABEL_REPEATED)
+    stamp = descriptor_pb2.FileDescriptorProto()
+    timestamp_pb2.DESCRIPTOR.CopyToProto(stamp)
+    pool = descriptor_pool.DescriptorPool()
+    for each in (stamp, file):
+        pool.Add(each)
+    fix = message_factory.GetMessageClass(pool.FindMessageTypeByName("test.Fix"))
+    with open(path, "wb") as stream:
+        writer = Writer(stream)
+        writer.start()
+        data = change(descriptor_pb2.FileDescriptorSet(file=[stamp, file]).SerializeToString())
+        channel = writer.register_channel("/fix", "protobuf", writer.register_schema("test.Fix", "protobuf", data))
+        for k in range(N):
+            one = fix(latitude=LATITUDE[k], covariance=[1.0, 2.0])
+            one.timestamp.seconds, one.timestamp.nanos = k, 500_000_000
+            writer.add_message(channel, 10**9 * k, change(one.SerializeToString()), 10**9 * k)
+        writer.finish()
+
+
+def _cdr(path: Path, change: Change = _same) -> None:
+    """A message of ROS 2 whose type the file defines."""
+    from mcap.writer import Writer
+
+    with open(path, "wb") as stream:
+        writer = Writer(stream)
+        writer.start()
+        text = change(b"float64 latitude\nfloat64[3] sigma\nstring frame\n")
+        channel = writer.register_channel("/fix", "cdr", writer.register_schema("own/msg/Fix", "ros2msg", text))
+        for k in range(N):
+            data = struct.pack("<4B4dI4s", 0, 1, 0, 0, LATITUDE[k], 1.0, 2.0, 3.0, 4, b"gps\0")
+            writer.add_message(channel, 10**9 * k, change(data), 10**9 * k)
+        writer.finish()
+
+
+def _bag(path: Path, change: Change = _same) -> None:
     from rosbags.rosbag1 import Writer
     from rosbags.typesys import Stores, get_typestore
 
@@ -226,7 +356,8 @@ def _bag(path: Path) -> None:
                           latitude=LATITUDE[k], longitude=LONGITUDE[k],
                           altitude=HEIGHT[k],
                           position_covariance=np.arange(9.0), position_covariance_type=2)  # fmt: skip
-            writer.write(connection, 10**9 * (k + 1), store.serialize_ros1(message, fix.__msgtype__))
+            data = change(bytes(store.serialize_ros1(message, fix.__msgtype__)))
+            writer.write(connection, 10**9 * (k + 1), data)
 
 
 _ZERO = np.zeros(N)
@@ -241,25 +372,45 @@ CASES: Mapping[str, Case] = {
     "euroc": Case(".csv", _text(_EUROC)),
     "kf_gins": Case(".txt", _text(_rows(T, *[_ZERO] * 5, _ZERO - 9.8))),
     "sbet": Case(".out", _sbet),
-    "pd0": Case(".pd0", _pd0),
+    "pd0": Case(".pd0", _pd0, inner=_pd0),
     "pd6": Case(".txt", _text(_pd6())),
     "n2k": Case(".raw", _text(_n2k()), sentence="129025"),
-    "ubx": Case(".ubx", _ubx, sentence="NAV-PVT"),
+    "ubx": Case(".ubx", _ubx, sentence="NAV-PVT", inner=_ubx),
     "rinex": Case(".obs", _text(_rinex()), sentence="G05"),
     "mat": Case(".mat", _mat, {"time": "imu.t"}),
     "hdf5": Case(".h5", _hdf5, {"time": "imu/t"}),
     "parquet": Case(".parquet", _parquet, {"time": "stamp"}),
-    "mcap": Case(".mcap", _mcap, {"clock": "sentence"}, "/fix"),
-    "rosbag": Case(".bag", _bag, {"clock": "sentence"}, "/fix"),
+    "mcap": Case(".mcap", _mcap, {"clock": "sentence"}, "/fix", inner=_mcap),
+    "rosbag": Case(".bag", _bag, {"clock": "sentence"}, "/fix", inner=_bag),
+}  # fmt: skip
+#: Further contents of these formats, and files that simnav reads elsewhere.
+OTHERS: Mapping[str, Case] = {
+    "nmea, other sentences": Case(".nmea", _text(_nmea_others()), sentence="HDT", form="nmea"),
+    "n2k, other messages": Case(".raw", _text(_n2k_others()), sentence="127257", form="n2k"),
+    "ubx, other messages": Case(".ubx", _ubx_others, sentence="NAV-VELNED", form="ubx", inner=_ubx_others),
+    "kf_gins, fixes": Case(".txt", _text(_rows(T, LATITUDE, LONGITUDE, HEIGHT, *[_ZERO + 0.1] * 3)),
+                           {"options": {"content": "gnss"}}, form="kf_gins"),
+    "mcap, protobuf": Case(".mcap", _protobuf, {"clock": "sentence"}, "/fix", "mcap", _protobuf),
+    "mcap, ROS 2": Case(".mcap", _cdr, {}, "/fix", "mcap", _cdr),
+    "rinex, navigation": Case(".rnx", _text(_navigation()), reads=lambda path: read_navigation(path).satellites()),
 }  # fmt: skip
 
 
 def read(form: str, path: Path, **keys: Any) -> Rows:
     """Read a file of a format, with the keys of its case."""
-    case = CASES[form]
+    case = CASES.get(form) or OTHERS[form]
+    form = case.form or form
     reader = READERS.get(form)
     assert reader is not None
     return reader.read(path, FileSpec(path=path.name, format=form, **{**case.keys, **keys}), case.sentence)
+
+
+def damaged(case: Case, path: Path, good: bytes, chance: Any) -> None:
+    """Write a mutated file: its bytes, or those of one in five of its messages within right checksums."""
+    if case.inner is None or chance.random() < 0.5:
+        path.write_bytes(mutated(good, chance))
+    else:
+        case.inner(path, lambda content: mutated(content, chance) if chance.random() < 0.2 else content)
 
 
 def mutated(content: bytes, chance: Any) -> bytes:

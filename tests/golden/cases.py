@@ -136,6 +136,15 @@ CASES = {
     ), instruments={"beams": {
         "kind": "dvl_beams", "rate_hz": 2.0, "mounting_deg": 0.1, "false_beams": 0.03, "lever_arm_m": [0.8, 0.0, 0.2],
     }}),
+    "fixes of a ship and ranges to beacons, some of them echoes": Case("usbl-inspection", 16.0, (
+        _fault("bias_step", "usbl", 5.0, 9.0, offset_m=[8.0, -6.0, 0.0]),
+        _fault("outage", "lbl", 7.0, 12.0, channels=["A", "C"]),
+    ), instruments={"lbl": {
+        "kind": "acoustic_range", "rate_hz": 0.5, "latitude_deg": 54.0, "longitude_deg": 4.0,
+        "beacons": ["A", "B", "C"], "north_m": [120.0, -90.0, 20.0], "east_m": [40.0, 150.0, -110.0],
+        "depth_m": [40.0, 42.0, 44.0], "way": "one_way", "clock_s": 0.002, "clock_drift_ppm": 1.0, "sigma_m": 0.1,
+        "sound_speed_percent": 0.1, "beacon_error_m": 0.3, "reflections": 0.1,
+    }}),
     "under water without imu": Case("glider-dive", 60.0, (
         _fault("gross_error", "speed_log", 10.0, 40.0, probability=0.3, size_m_s=[0.5, 1.5]),
         _fault("outage", "gnss", 20.0, 60.0),

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from simnav import compiled
+from simnav import cache_folder, compiled
 
 HELPER = """
 from simnav.compiled import kernel
@@ -136,7 +136,7 @@ def test_a_cache_that_cannot_be_written_falls_back(tmp_path: Path) -> None:
 def test_no_place_to_write_at_all(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     blocked = tmp_path / "blocked"
     blocked.write_text("")
-    monkeypatch.setattr(compiled.tempfile, "gettempdir", lambda: str(blocked))
+    monkeypatch.setattr(cache_folder.tempfile, "gettempdir", lambda: str(blocked))
     monkeypatch.setenv("SIMNAV_CACHE_DIR", str(blocked))
     monkeypatch.setenv("XDG_CACHE_HOME", str(blocked))
     assert compiled.cache_directory() is None

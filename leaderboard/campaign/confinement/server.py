@@ -193,7 +193,7 @@ def _fork(
                 _, _, usage = os.wait4(child, 0)
                 break
             time.sleep(0.001)
-        peak = usage.ru_maxrss * RSS_UNIT - start
+        peak = max(usage.ru_maxrss * RSS_UNIT - start, watch.together)
         killed = ended == "SIGKILL" and out_of_memory_kills() > before
         facts = {"ended": ended, "peak": max(0, peak), "verdict": verdict or ("killed" if killed else "")}
     finally:

@@ -31,12 +31,17 @@ class Watch:
         What all may take beyond that [bytes].
     folder : Path
         Its temporary folder.
+
+    Attributes
+    ----------
+    together : int
+        The most memory that was seen of it and the processes that it started, beyond that of its start [bytes].
     """
 
     def __init__(self, child: int, start: int, memory: int, folder: Path):
         self._child, self._start, self._memory, self._folder = child, start, memory, folder
-        self._next, self._exact = 0.0, 0.0
-        self._files = 0
+        self._next, self._exact, self._counted = 0.0, 0.0, 0.0
+        self._files = self.together = 0
 
     def verdict(self) -> str:
         """``out-of-memory`` or ``error`` (too many processes); empty where all is well."""
@@ -52,6 +57,10 @@ class Watch:
             self._next = time.monotonic() + max(_SECONDS, 20.0 * (time.monotonic() - now))  # a twentieth of the time
         if self._files + max(own, 0) > self._memory:
             return "out-of-memory"
+        if len(processes) > 1 and now >= self._counted:
+            others = sum(_proportional(p) for p in processes if p != self._child)
+            self.together = max(self.together, own + others)
+            self._counted = time.monotonic() + 20.0 * (time.monotonic() - now)
         if len(processes) > 1 and now >= self._exact:
             rough = sum(map(resident, processes)) - self._start
             if rough + self._files > self._memory:  # pages that processes share were counted for each

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator, Sequence
-from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -17,10 +16,11 @@ import numpy as np
 
 from simnav.log.files import FileSpec
 from simnav.log.growing import GrowingTable
-from simnav.log.progress import tell
+from simnav.log.kept import kept
 from simnav.log.reader import Rows, register_reader
 from simnav.log.table import LogError, Table
 from simnav.spec import closest
+from simnav.watchers import tell
 
 __all__ = ["topics_of"]
 
@@ -45,18 +45,17 @@ def read_mcap(path: Path, file: FileSpec, sentence: str | None, talker: str | No
 
 def _rows(path: Path, file: FileSpec, sentence: str | None, form: str) -> Rows:
     topic = sentence or file.options.get("topic")
-    if not path.exists():
-        raise FileNotFoundError
-    status = path.stat()
-    table = _table(path, form, None if topic is None else str(topic), status.st_mtime_ns, status.st_size)
+    if form == "mcap" and path.is_dir():
+        raise LogError(f"{path}: it is a folder; a bag of ROS 2 in a folder is read with format = 'rosbag'")
+    table = _table(path, form, None if topic is None else str(topic))
     clock = "header" if file.clock == "sentence" else "recorded"
     if clock not in table.columns:
         raise LogError(f"{table.source}: its messages have no stamp in a header; say clock = 'logger'")
     return Rows(table, table.column(clock)[1], clock)
 
 
-@lru_cache(maxsize=16)
-def _table(path: Path, form: str, topic: str | None, _mtime: int, _size: int) -> Table:
+@kept(16, folders=True)
+def _table(path: Path, form: str, topic: str | None) -> Table:
     messages = _mcap(path, topic) if form == "mcap" else _bag(path, topic)
     rows = GrowingTable()
     try:

@@ -13,7 +13,6 @@ import math
 import re
 import warnings
 from collections.abc import Callable, Mapping
-from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -21,11 +20,12 @@ import numpy as np
 from simnav.log.binary import refuse_binary
 from simnav.log.files import FileSpec
 from simnav.log.growing import GrowingTable
+from simnav.log.kept import kept
 from simnav.log.nmea import NmeaFile, take_variation
 from simnav.log.nmea_sentences import Row
-from simnav.log.progress import tell
 from simnav.log.reader import Rows, register_reader
 from simnav.log.table import LogError, LogWarning, utc_seconds
+from simnav.watchers import tell
 
 __all__ = ["PGNS", "read_n2k"]
 
@@ -116,6 +116,7 @@ def _read(path: Path, file: FileSpec, sentence: str | None, talker: str | None) 
     return Rows(table, time, file.clock, counts)
 
 
+@kept(64)
 def read_n2k(path: Path) -> NmeaFile:
     """Read a log of NMEA 2000 messages: a table for each (source, PGN).
 
@@ -124,15 +125,7 @@ def read_n2k(path: Path) -> NmeaFile:
     LogError
         If the file is absent or has no message that is understood.
     """
-    try:
-        status = path.stat()
-    except OSError:
-        raise LogError(f"{path}: there is no such file") from None
-    return _read_n2k(path, status.st_mtime_ns, status.st_size)
-
-
-@lru_cache(maxsize=64)
-def _read_n2k(path: Path, _mtime: int, size: int) -> NmeaFile:
+    size = path.stat().st_size
     refuse_binary(path, "n2k")
     tables: dict[tuple[str, str], GrowingTable] = {}
     open_messages: dict[tuple[str, str, int], tuple[int, bytearray]] = {}
@@ -186,7 +179,7 @@ def _read_n2k(path: Path, _mtime: int, size: int) -> NmeaFile:
             table.add({"logger": stamped, "sentence": told, **row}, number)
     if bad:
         warnings.warn(
-            f"{path}: {len(bad)} lines are not understood and are left out, the first is line {bad[0]}", LogWarning, 4
+            f"{path}: {len(bad)} lines are not understood and are left out, the first is line {bad[0]}", LogWarning, 5
         )
     if not tables:
         raise LogError(f"{path}: there is no message of NMEA 2000 that is understood (PGN {', '.join(PGNS)})")

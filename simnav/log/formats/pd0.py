@@ -13,12 +13,12 @@ from __future__ import annotations
 import struct
 import warnings
 from datetime import UTC, datetime
-from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
 
 from simnav.log.files import FileSpec
+from simnav.log.kept import kept
 from simnav.log.reader import Rows, register_reader
 from simnav.log.table import LogError, LogWarning, Table
 
@@ -32,15 +32,12 @@ _DEGREES = np.pi / 180.0
 @register_reader("pd0", title="a PD0 file", inertial=False)
 def read(path: Path, file: FileSpec, sentence: str | None, talker: str | None) -> Rows:
     """Ensembles without bottom track, or whose velocity is missing, have NaN there."""
-    if not path.is_file():
-        raise FileNotFoundError
-    status = path.stat()
-    table = _read(path, status.st_mtime_ns, status.st_size)
+    table = _read(path)
     return Rows(table, table.column("time")[1], "time")
 
 
-@lru_cache(maxsize=16)
-def _read(path: Path, _mtime: int, _size: int) -> Table:
+@kept(16)
+def _read(path: Path) -> Table:
     content = path.read_bytes()
     found: list[dict[str, float]] = []
     numbers: list[int] = []
@@ -75,7 +72,7 @@ def _read(path: Path, _mtime: int, _size: int) -> Table:
             f"{path}: {broken} ensembles of PD0 are damaged or cut off and are left out, the first is at offset "
             f"{first_broken - 1}",
             LogWarning,
-            4,
+            5,
         )
     names = list(dict.fromkeys(name for row in found for name in row))
     columns = {name: np.array([row.get(name, np.nan) for row in found]) for name in names}

@@ -15,15 +15,15 @@ import math
 import re
 import warnings
 from datetime import UTC, datetime
-from functools import lru_cache
 from pathlib import Path
 
 from simnav.log.binary import refuse_binary
 from simnav.log.files import FileSpec
 from simnav.log.growing import GrowingTable
-from simnav.log.progress import tell
+from simnav.log.kept import kept
 from simnav.log.reader import Rows, register_reader
 from simnav.log.table import LogError, LogWarning, Table
+from simnav.watchers import tell
 
 _DEG = math.pi / 180.0
 _NUMBER = re.compile(r"[+-]?\d{1,9}(\.\d*)?", re.ASCII)
@@ -35,16 +35,14 @@ _NONE = -32768.0
 @register_reader("pd6", title="a PD6 file", inertial=False)
 def read(path: Path, file: FileSpec, sentence: str | None, talker: str | None) -> Rows:
     """See the module."""
-    if not path.is_file():
-        raise FileNotFoundError
-    status = path.stat()
-    table = _read(path, status.st_mtime_ns, status.st_size)
+    table = _read(path)
     return Rows(table, table.column("time")[1], "time")
 
 
-@lru_cache(maxsize=16)
-def _read(path: Path, _mtime: int, size: int) -> Table:
+@kept(16)
+def _read(path: Path) -> Table:
     refuse_binary(path, "pd6")
+    size = path.stat().st_size
     rows, bad = GrowingTable(), list[int]()
     row: dict[str, float] = {}
     attitude: dict[str, float] = {}
@@ -75,7 +73,7 @@ def _read(path: Path, _mtime: int, size: int) -> Table:
         rows.add(row, begun)
     if bad:
         warnings.warn(
-            f"{path}: {len(bad)} lines are not understood and are left out, the first is line {bad[0]}", LogWarning, 4
+            f"{path}: {len(bad)} lines are not understood and are left out, the first is line {bad[0]}", LogWarning, 5
         )
     if not len(rows):
         raise LogError(f"{path}: there is no ensemble of PD6 in it (its lines begin with :SA, :TS, :BI, :BS, :BE, :BD)")

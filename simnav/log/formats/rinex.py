@@ -11,7 +11,6 @@ from __future__ import annotations
 import re
 import warnings
 from datetime import UTC, datetime
-from functools import lru_cache
 from pathlib import Path
 from typing import TextIO
 
@@ -21,10 +20,11 @@ from simnav.log.binary import refuse_binary
 from simnav.log.files import FileSpec
 from simnav.log.formats.gps_time import leap_seconds
 from simnav.log.growing import GrowingTable
+from simnav.log.kept import kept
 from simnav.log.nmea import NmeaFile
-from simnav.log.progress import tell
 from simnav.log.reader import Rows, register_reader
 from simnav.log.table import LogError, LogWarning
+from simnav.watchers import tell
 
 __all__ = ["read_rinex"]
 
@@ -43,6 +43,7 @@ def _read(path: Path, file: FileSpec, sentence: str | None, talker: str | None) 
     return Rows(table, table.column("time")[1], "time")
 
 
+@kept(16)
 def read_rinex(path: Path) -> NmeaFile:
     """Read the observations of all satellites, by the key ``("", "G05")``.
 
@@ -51,15 +52,7 @@ def read_rinex(path: Path) -> NmeaFile:
     LogError
         If the file is absent, is no observation file of version 3 or 4, or has no observation.
     """
-    try:
-        status = path.stat()
-    except OSError:
-        raise LogError(f"{path}: there is no such file") from None
-    return _read_rinex(path, status.st_mtime_ns, status.st_size)
-
-
-@lru_cache(maxsize=16)
-def _read_rinex(path: Path, _mtime: int, size: int) -> NmeaFile:
+    size = path.stat().st_size
     refuse_binary(path, "rinex")
     tables: dict[str, GrowingTable] = {}
     bad: list[int] = []
@@ -90,7 +83,7 @@ def _read_rinex(path: Path, _mtime: int, size: int) -> NmeaFile:
         raise LogError(f"{path}: there is no observation after the header")
     if bad:
         warnings.warn(
-            f"{path}: {len(bad)} lines are not understood and are left out, the first is line {bad[0]}", LogWarning, 4
+            f"{path}: {len(bad)} lines are not understood and are left out, the first is line {bad[0]}", LogWarning, 5
         )
     found = {}
     for name, growing in sorted(tables.items()):

@@ -13,17 +13,17 @@ import struct
 import warnings
 from collections.abc import Callable, Mapping
 from datetime import UTC, datetime
-from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
 
 from simnav.log.files import FileSpec
 from simnav.log.growing import GrowingTable
+from simnav.log.kept import kept
 from simnav.log.nmea import NmeaFile
-from simnav.log.progress import tell
 from simnav.log.reader import Rows, register_reader
 from simnav.log.table import LogError, LogWarning
+from simnav.watchers import tell
 
 __all__ = ["read_ubx"]
 
@@ -123,6 +123,7 @@ def _read(path: Path, file: FileSpec, sentence: str | None, talker: str | None) 
     return Rows(table, time, "time", counts)
 
 
+@kept(16)
 def read_ubx(path: Path) -> NmeaFile:
     """Read the messages of a file: a table for each, by the key ``("", "NAV-PVT")``. The line is the message's number.
 
@@ -131,15 +132,6 @@ def read_ubx(path: Path) -> NmeaFile:
     LogError
         If the file is absent or has no message that is read.
     """
-    try:
-        status = path.stat()
-    except OSError:
-        raise LogError(f"{path}: there is no such file") from None
-    return _read_ubx(path, status.st_mtime_ns, status.st_size)
-
-
-@lru_cache(maxsize=16)
-def _read_ubx(path: Path, _mtime: int, _size: int) -> NmeaFile:
     content = path.read_bytes()
     tables: dict[tuple[str, str], GrowingTable] = {}
     at = count = broken = first_broken = 0
@@ -183,7 +175,7 @@ def _read_ubx(path: Path, _mtime: int, _size: int) -> NmeaFile:
             f"{path}: {broken} messages of UBX are damaged or cut off and are left out, the first is at offset "
             f"{first_broken - 1}",
             LogWarning,
-            4,
+            5,
         )
     named = {key: table.table(f"{path} ({key[1]})") for key, table in tables.items()}
     return NmeaFile(str(path), named, {}, tuple(m[0] for m in _MESSAGES.values()))

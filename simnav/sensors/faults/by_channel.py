@@ -70,6 +70,8 @@ def each_channel(stream: AidStream, channels: tuple[str, ...], apply: Callable[[
     order = np.lexsort((columns["channel"], columns["time"]))
     order_of_lost = np.lexsort((columns["dropped_channel"], columns["dropped"]))
     columns = {name: a[order if name in _ROWS else order_of_lost] for name, a in columns.items()}
+    if len(stream.arrival):
+        columns["arrival"] = stream.arrival[stream.places(columns["time"], columns["channel"])]
     return replace(stream, **columns)
 
 
@@ -77,4 +79,4 @@ def _part(stream: AidStream, name: str, rows: NDArray[np.bool_], lost: NDArray[n
     """Some readings of a stream, as a stream of this name without channels."""
     columns: dict[str, Any] = {n: getattr(stream, n)[rows] for n in _ROWS}
     columns |= {n: getattr(stream, n)[lost] for n in _LOST}
-    return replace(stream, name=name, channels=(), **columns)
+    return replace(stream, name=name, channels=(), arrival=np.empty(0), **columns)

@@ -13,7 +13,9 @@ from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
 import simnav  # noqa: F401 (it registers)
 from simnav.environment import spawn_seeds
+from simnav.estimators.learning.bank import take
 from simnav.estimators.learning.pool import Pool
+from simnav.estimators.learning.reference import Linear
 from simnav.estimators.learning.voyage import prepare
 
 TASKS = ("Tuning", "Detection", "Correction", "Guidance")
@@ -188,3 +190,19 @@ def test_the_estimate_of_the_memory_is_an_upper_bound():
     arrays = [*voyage.linear, voyage.edges, voyage.end, voyage.context, voyage.error, voyage.oracle, voyage.faulty]
     taken = sum(array.nbytes for array in arrays)
     assert taken < Pool.cost(options) < 4.0 * taken
+
+
+@pytest.mark.parametrize("moving", [0, 4, 6])
+def test_a_bank_propagates_constant_states_like_all_others(moving):
+    """Phi P Phi' + Q by NumPy; the last states are constant and not multiplied."""
+    n, rng = 6, np.random.default_rng(moving)
+    linear, root, delta = Linear.empty(1, n), rng.normal(size=(n, n)), rng.normal(size=(1, n))
+    phi, before = np.eye(n), delta[0].copy()
+    phi[:moving, :moving] = rng.normal(size=(moving, moving)) * (rng.random((moving, moving)) < 0.6)
+    linear.transition[0], linear.process_noise[0], linear.moves[0] = phi, np.diag(rng.random(n)), True
+    covariance = (root @ root.T)[None].copy()
+    expected = phi @ covariance[0] @ phi.T + 4.0 * linear.process_noise[0]
+    steps = np.ones(1, np.bool_), np.zeros(1, np.int64), np.ones(1, np.int64)
+    take(steps, linear.events, np.zeros(1, np.int64), np.ones((1, 1, 1)), np.array([2.0]), covariance, delta)
+    np.testing.assert_allclose(covariance[0], expected, rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(delta[0], phi @ before, rtol=1e-12, atol=1e-12)

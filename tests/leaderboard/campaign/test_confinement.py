@@ -6,6 +6,7 @@ import json
 import os
 import platform
 import signal
+import sys
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -14,6 +15,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from simnav.compiled import cache_directory
 from simnav.estimator import make
 from simnav.leaderboard.campaign.confinement import attempt as attempt_module
 from simnav.leaderboard.campaign.confinement import bubblewrap, landlock, seccomp
@@ -26,6 +28,7 @@ from simnav.leaderboard.campaign.confinement.attempt import (
     seed_words,
 )
 from simnav.leaderboard.campaign.confinement.limits import resident
+from simnav.leaderboard.campaign.confinement.server import _load_kernels as load_kernels
 from simnav.leaderboard.campaign.confinement.session import EstimatorServer, Limits, NoAnswerError
 from simnav.leaderboard.campaign.entrant import Entrant
 from simnav.leaderboard.campaign.sources import may_call_kernels
@@ -254,6 +257,33 @@ def test_kernels_are_loaded_when_the_first_one_may_call_them(recording: Recordin
         close_server()
 
 
+def test_a_server_loads_no_kernel_that_an_estimator_left(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """In a sandbox estimators run before the kernels are loaded, and have the folder of the kernels in common."""
+    given = cache_directory()
+    assert given is not None
+    monkeypatch.setenv("SIMNAV_CACHE_DIR", str(tmp_path))
+    target = cache_directory()
+    assert target is not None
+    assert tmp_path in target.parents
+    ours = next(path for path in given.rglob("*.nbi"))
+    planted = target / ours.relative_to(given)
+    planted.parent.mkdir(parents=True)
+    planted.write_bytes(b"a compiled function of a stranger")
+    child = os.fork()  # its memory is settled for ever
+    if child == 0:
+        code = 1
+        try:
+            read = []
+            monkeypatch.setattr(
+                "simnav.compiled.Kernel.compile", lambda self: read.append(planted.read_bytes() == ours.read_bytes())
+            )
+            load_kernels(str(given))
+            code = 0 if read and all(read) and not target.exists() else 2
+        finally:
+            os._exit(code)
+    assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 0
+
+
 def test_a_server_that_is_gone_before_its_kernels_are_loaded_is_no_failure_of_an_estimator() -> None:
     server = EstimatorServer("process", loaded=False)
     server.wait_until_ready()
@@ -316,6 +346,33 @@ def test_who_has_not_been_started_has_not_failed(
     finally:
         close_server()
     assert len(lost) == losses
+
+
+PROGRAM = """
+import sys, time
+taken = bytearray(60 << 20)
+for k in range(0, len(taken), 4096): taken[k] = 1
+for line in sys.stdin:
+    if line.startswith("start"): place = ",".join(line.split(",")[3:6])
+    if line.startswith("begin"): time.sleep(0.2), print("ready", flush=True)
+    if line.startswith("step"): print("estimate", line[5:-1], place, ",,,,,", sep=",", flush=True)
+"""
+
+
+@pytest.mark.skipif(platform.system() != "Linux", reason="memory of other processes is seen on Linux only")
+def test_a_program_is_confined_and_its_memory_counts(
+    server: EstimatorServer, recording: Recording, tmp_path: Path
+) -> None:
+    """Its working folder is that of the file which names it; it is not there afterwards."""
+    (tmp_path / "mine.txt").write_text(PROGRAM)
+    (tmp_path / "mine.py").write_text(
+        "from simnav.estimator.program import ProgramEstimator\n"
+        f"class Mine(ProgramEstimator):\n    program = '{sys.executable} -S mine.txt'\n"
+    )
+    there = attempt(server, entrant(str(tmp_path / "mine.py")), recording, Limits(60.0, 1 << 30))
+    assert (there.status, there.reason) == ("ok", "")
+    assert 60 << 20 < there.peak_memory < 120 << 20
+    assert not [p for p in Path("/proc").glob("[0-9]*/cmdline") if b"mine.txt" in p.read_bytes()]
 
 
 def test_time_is_measured_outside(server: EstimatorServer, recording: Recording, tmp_path: Path) -> None:

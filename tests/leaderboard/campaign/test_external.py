@@ -12,6 +12,8 @@ from simnav.leaderboard.campaign.external import add_external
 from simnav.leaderboard.campaign.seal import PUBLIC, make_key
 from simnav.leaderboard.given import results_of
 from simnav.leaderboard.logs import export, score_files
+from simnav.leaderboard.ranking.confinement import confinement_line
+from simnav.leaderboard.ranking.stored_costs import not_measured
 from simnav.leaderboard.results import store
 from simnav.leaderboard.results.errors import RequestError
 from simnav.leaderboard.results.hidden import without_truth
@@ -80,6 +82,12 @@ def test_a_file_gets_the_scores_of_the_run_that_it_came_from(tmp_path, scenario,
         assert found[name] == pytest.approx(wanted[name], rel=1e-6), name
     assert np.isnan(found.get("update_median", np.nan))  # nobody knows how long it took
     assert report.estimators[0].status == "ok"
+    errors = report.trajectories["mine.csv"]
+    assert errors.absolute == pytest.approx(np.hypot(wanted["horizontal_rmse"], wanted["vertical_rmse"]), rel=1e-5)
+    assert errors.aligned < errors.absolute
+    assert [r.pairs for r in errors.over_times] == [20, 0, 0]
+    assert report.shown()[1].title.startswith("Root mean squares")
+    assert report.to_dict()["trajectories"]["mine.csv"]["aligned"] == errors.aligned
 
 
 def test_epochs_without_an_estimate_have_the_last_one(tmp_path, recording):
@@ -167,6 +175,12 @@ def test_external_rows_of_a_sealed_campaign(tmp_path, scenario):
     for r in results:
         assert 1.0 < r.scores["horizontal_rmse"] < 20.0  # the seeds are those of the blind export
         assert r.note.startswith("external")
+        assert r.provenance.confinement == "external"
+    assert confinement_line(results) == "2 results were made elsewhere: nobody knows what their makers saw"
+    assert not_measured(["ekf", "a (external)"]) == (
+        "Cost not measured: ekf; 'simnav bench NAME' measures it. Cost not known, for the estimates were made "
+        "elsewhere: a (external)."
+    )
     with pytest.raises(RequestError, match=r"lacks 1 of 3 runs, such as external-v1-2\.csv"):
         add_external(folder, tmp_path / "returned", [scenario], range(3), PUBLIC)
     with pytest.raises(RequestError, match="has no file of the runs of this campaign"):

@@ -89,3 +89,4 @@ def test_simulated_and_recorded_voyages_side_by_side():
     screen = Console(file=io.StringIO(), width=120)
     screen.print(*voyage_tables([found]))
     assert "rank correlation of 8 rows is 0.98" in screen.file.getvalue()
+    assert "1.5 times the error of the plain row" in " ".join(screen.file.getvalue().split())

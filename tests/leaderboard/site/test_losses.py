@@ -10,8 +10,10 @@ from typing import cast
 import pytest
 
 from simnav.leaderboard.ranking.board import ScenarioRanking
+from simnav.leaderboard.ranking.lost_runs import lost_recordings
 from simnav.leaderboard.ranking.ranking import rank
 from simnav.leaderboard.ranking.runs import group
+from simnav.leaderboard.ranking.statistics import FAILURE
 from simnav.leaderboard.results.result import Result
 from simnav.leaderboard.site.entries import entries, run_names
 from simnav.leaderboard.site.losses import faults_of, losses
@@ -46,6 +48,24 @@ def test_lost_and_failed_runs_are_counted_and_the_worst_comes_first(mixed: list[
     assert rows[0]["name"]["page"] == f"{scenarios[catalogued].page}#row=sw-fgo&seed=4"
     assert rows[0]["wrong"] == "gnss: noise step (160 to 240 s)"
     assert losses("sw-fgo", "no such row", ranking, scenarios) is None
+
+
+def test_lost_recordings_are_those_of_recorded_scenarios_against_their_plain_row() -> None:
+    def table(scenario: str, unit: str, plain: str, **rows: dict[str, float]) -> ScenarioRanking:
+        made = [SimpleNamespace(estimator=name.replace("_", "-"), ratios=ratios) for name, ratios in rows.items()]
+        return cast(ScenarioRanking, SimpleNamespace(scenario=scenario, unit=unit, plain=plain, rows=made))
+
+    runs = ("a", "b", "c", "d")
+    tables = [
+        table("log-v1", "recording", "ship-ekf", ship_ekf=dict.fromkeys(runs, 2.0), ekf=dict.fromkeys(runs, 9.0),
+              mine=dict(zip(runs, (3.0, 3.1, FAILURE, 0.5), strict=True))),
+        table("car-v1", "recording", "ekf", ekf={"x": 1.0, "y": FAILURE}, mine={"x": 1.4, "y": FAILURE}),
+        table("sea-v1", "seed", "ekf", ekf={"0": 1.0}, mine={"0": 5.0}),
+    ]  # fmt: skip
+    found = lost_recordings("mine", tables)
+    assert (found.lost, found.runs, found.scenarios, found.words) == (2, 5, ("log-v1",), "2 of 5")
+    assert lost_recordings("ship-ekf", tables).words == "0 of 4"
+    assert lost_recordings("other", tables).words == ""
 
 
 def test_faults_are_those_that_were_drawn_for_the_seed() -> None:

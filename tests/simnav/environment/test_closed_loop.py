@@ -29,15 +29,11 @@ def sailed(name, offset, heading=0.0, steps=45):
     return info["truth"][0]
 
 
-@pytest.mark.parametrize("name", [*QUICK[::3], "random-ships-v1"])  # the others are of the same kinds
+@pytest.mark.parametrize("name", [*QUICK[::6], "random-ships-v1"])  # the others are of the same kinds
 def test_a_wrong_estimate_takes_her_off_her_track(name):
     right, north, east = sailed(name, (0.0, 0.0)), sailed(name, (300.0, 0.0)), sailed(name, (0.0, 300.0))
     moved = [np.hypot(*relative_position(p, right)[:2]) for p in (north, east)]
     assert max(moved) > 0.5
-
-
-def test_the_catalogue_knows_which_are_logs():
-    assert all(load(h.id).recorded == h.recorded for h in headers() if not h.training)
 
 
 def test_a_wrong_heading_does_too():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 import shutil
 import subprocess
@@ -11,11 +12,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from simnav.estimator import EstimatorError
+from simnav.estimator import Estimator, EstimatorError
+from simnav.estimator.files import class_in_file
 from simnav.estimator.program import ProgramEstimator
 from simnav.scenario import parse
 from simnav.source import record
 from simnav.trial import run_trial
+from simnav.types import Estimate
 
 EXAMPLES = Path(__file__).resolve().parents[3] / "examples" / "programs"
 SCENARIO = """
@@ -72,16 +75,52 @@ def test_lines_of_json(tmp_path, recording):
     assert trial.covariance[0, 0, 0] == 4.0
 
 
-@pytest.mark.skipif(shutil.which("g++") is None, reason="there is no compiler of C++")
-def test_the_example_in_c(tmp_path, recording):
-    subprocess.run(["g++", "-o", tmp_path / "coasting", EXAMPLES / "coasting.cpp"], check=True)
-    trial = run_trial(ProgramEstimator(str(tmp_path / "coasting")), recording)
-    assert (trial.status, len(trial)) == ("ok", 20)
-    # A fix at the end of each step is the estimate, and the velocity is that between two fixes.
-    fixes = recording.data.aids["gnss"].value
-    np.testing.assert_allclose(trial.position, fixes[-20:], atol=1e-12)
-    assert trial.velocity[5, 0] == pytest.approx(6371e3 * (fixes[5, 0] - fixes[4, 0]), rel=1e-6)
+class Coasting(Estimator):
+    """The filter of the examples, in Python."""
+
+    def reset(self, start, instruments):
+        self.state, self.time = np.concatenate([start.position, start.velocity]), start.time
+        self.fixed, self.fixed_at, self.sigma = None, -1.0, 10.0
+
+    def update(self, measurements):
+        for m in measurements:
+            if self.fixed is not None:
+                north, east, _ = (m.value - self.fixed) / (m.time - self.fixed_at)
+                self.state[3:5] = 6371e3 * north, 6371e3 * math.cos(m.value[0]) * east
+            self.state[:3] = self.fixed = m.value
+            self.fixed_at = self.time = m.time
+            self.sigma = 3.0
+        dt, self.time = measurements.time - self.time, measurements.time
+        self.state[0] += self.state[3] * dt / 6371e3
+        self.state[1] += self.state[4] * dt / (6371e3 * math.cos(self.state[0]))
+        self.sigma = math.hypot(self.sigma, 0.5 * dt)
+        variances = [self.sigma**2] * 3 + [1.0] * 3 + [0.0] * 3
+        return Estimate(self.time, position=self.state[:3].copy(), velocity=self.state[3:].copy(),
+                        covariance=np.diag(variances), estimated=np.arange(9) < 6)  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("tool", "run"),
+    [
+        pytest.param(tool, run, marks=pytest.mark.skipif(shutil.which(tool) is None, reason=f"there is no {tool}"))
+        for tool, run in (("g++", "coasting"), ("octave-cli", "octave-cli coasting.m"))
+    ],
+)
+def test_the_examples_compute_what_the_same_filter_does_in_python(clean_registry, tmp_path, tool, run):
+    """A fix comes every second step only; the other estimates are coasted."""
+    recording = record(parse(SCENARIO + "rate_hz = 0.5\n"), 1)
+    for name in ("coasting.py", "coasting.cpp", "coasting.m"):
+        shutil.copy(EXAMPLES / name, tmp_path)
+    if tool == "g++":
+        subprocess.run(["g++", "-o", tmp_path / run, EXAMPLES / "coasting.cpp"], check=True)
+    estimator = class_in_file(tmp_path / "coasting.py", None)(run)
+    trial, wanted = run_trial(estimator, recording), run_trial(Coasting(), recording)
+    assert (trial.status, trial.reason, len(trial)) == ("ok", "", 20)
+    np.testing.assert_allclose(trial.position, wanted.position, rtol=1e-15)
+    np.testing.assert_allclose(trial.velocity[:, :2], wanted.velocity[:, :2], rtol=1e-12)
+    np.testing.assert_allclose(trial.covariance, wanted.covariance, rtol=1e-4)  # it writes six digits
     assert np.isnan(trial.attitude).all()
+    assert np.ptp(trial.covariance[:, 0, 0]) > 0.2
 
 
 @pytest.mark.parametrize(

@@ -14,7 +14,7 @@ from simnav.log.formats.gps_time import leap_seconds
 from simnav.log.inspection import streams_of
 from simnav.log.reader import READERS
 from tests.audit.mutations import mutations
-from tests.cases.log_files import CASES, HEIGHT, LATITUDE, LONGITUDE, N, T, read
+from tests.cases.log_files import CASES, HEIGHT, LATITUDE, LONGITUDE, OTHERS, N, T, read
 
 _NEEDS = {"hdf5": "h5py", "mcap": "mcap", "rosbag": "rosbags"}
 
@@ -35,6 +35,22 @@ def test_mutated_files_are_read_or_refused(form):
     """`python -m tests.audit mutations` tries 3000 of each."""
     found = mutations(form, 12, seed=1)
     assert set(found) <= {"read", "refused"}, found
+
+
+@pytest.mark.parametrize("case", OTHERS)
+def test_further_contents_are_read_or_refused(case):
+    """With other messages inside right checksums, too."""
+    if OTHERS[case].form == "mcap":
+        pytest.importorskip("mcap")
+    found = mutations(case, 12, seed=1)
+    assert set(found) <= {"read", "refused"}, found
+
+
+def test_a_folder_or_nothing_in_place_of_the_file_is_named(form, tmp_path):
+    for path, what in ((tmp_path, "a folder|cannot be read|no such file"), (tmp_path / "x", "no such file")):
+        with pytest.raises(LogError, match=what) as raised:
+            read(form, path)
+        assert ": reader " not in str(raised.value)
 
 
 @pytest.fixture
@@ -257,36 +273,10 @@ def test_bags(good, form):
 
 def test_mcap_with_protobuf(tmp_path):
     """A message with a stamp, a number that keeps its default, and a repeated field."""
-    writer_of = pytest.importorskip("mcap.writer").Writer
-    descriptor = pytest.importorskip("google.protobuf.descriptor_pb2")
-    from google.protobuf import descriptor_pool, message_factory, timestamp_pb2
-
-    file = descriptor.FileDescriptorProto(
-        name="fix.proto", package="test", syntax="proto3", dependency=["google/protobuf/timestamp.proto"]
-    )
-    message = file.message_type.add(name="Fix")
-    kinds, repeated = descriptor.FieldDescriptorProto, descriptor.FieldDescriptorProto.LABEL_REPEATED
-    message.field.add(name="timestamp", number=1, type=kinds.TYPE_MESSAGE, type_name=".google.protobuf.Timestamp")
-    message.field.add(name="latitude", number=2, type=kinds.TYPE_DOUBLE)
-    message.field.add(name="height", number=3, type=kinds.TYPE_DOUBLE)
-    message.field.add(name="covariance", number=4, type=kinds.TYPE_DOUBLE, label=repeated)
-    stamp = descriptor.FileDescriptorProto()
-    timestamp_pb2.DESCRIPTOR.CopyToProto(stamp)
-    pool = descriptor_pool.DescriptorPool()
-    for each in (stamp, file):
-        pool.Add(each)
-    fix = message_factory.GetMessageClass(pool.FindMessageTypeByName("test.Fix"))
+    pytest.importorskip("mcap")
+    pytest.importorskip("google.protobuf")
     path = tmp_path / "a.mcap"
-    with open(path, "wb") as stream:
-        writer = writer_of(stream)
-        writer.start()
-        data = descriptor.FileDescriptorSet(file=[stamp, file]).SerializeToString()
-        channel = writer.register_channel("/fix", "protobuf", writer.register_schema("test.Fix", "protobuf", data))
-        for k in range(N):
-            one = fix(latitude=LATITUDE[k], covariance=[1.0, 2.0])
-            one.timestamp.seconds, one.timestamp.nanos = k, 500_000_000
-            writer.add_message(channel, 10**9 * k, one.SerializeToString(), 10**9 * k)
-        writer.finish()
+    OTHERS["mcap, protobuf"].make(path)
     rows = read("mcap", path)
     assert rows.time == pytest.approx(T + 0.5)
     assert rows.table.column("latitude")[1] == pytest.approx(LATITUDE)

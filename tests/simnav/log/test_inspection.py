@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from simnav.log import LogError, LogSource
-from simnav.log.check import check_log
+from simnav.log.check import check_log, described
 from simnav.log.draft import draft, guesses
 from simnav.log.inspection import inspect_log, streams_of
 from simnav.scenario import load
@@ -90,3 +90,10 @@ def test_what_cannot_be_read_is_said(tmp_path):
     with pytest.raises(LogError, match="there is no such file or folder"):
         inspect_log([tmp_path / "no"])
     assert draft([], "x").startswith("# No columns with latitude")
+
+
+def test_rows_that_are_not_later_than_the_one_before_have_no_rate():
+    assert (
+        described(np.array([3.0, 3.0])) == "2 rows from 3.000 to 3.000 s, most rows are not later than the one before"
+    )
+    assert described(np.array([3.0, 4.0, 9.5])) == "3 rows from 3.000 to 9.500 s, 0.3077 Hz"

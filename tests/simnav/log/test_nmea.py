@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from simnav.log.nmea import SENTENCES, read_nmea
-from simnav.log.progress import watched
 from simnav.log.table import LogError, LogWarning
+from simnav.watchers import watched
 
 
 def checksum(body: str) -> str:

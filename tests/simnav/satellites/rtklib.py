@@ -80,11 +80,13 @@ def point(path: str, week: int, second: float, satellites: Sequence[str], raw: n
     return np.array([solution.rr[k] for k in range(3)])
 
 
-def points(observed: str, path: str, delay: Callable[[str, float], float] | None) -> dict[int, np.ndarray]:
+def points(
+    observed: str, path: str, delay: Callable[[str, float], float] | None, step: int = 1
+) -> dict[int, np.ndarray]:
     """RTKLIB's positions [m] of an observation file of one day, by the seconds since noon, rounded.
 
     Its own model of the troposphere is used, or if `delay` is given, the delay [m] of a satellite at a second of the
-    day is subtracted. An epoch without a solution is left out.
+    day is subtracted. An epoch without a solution is left out; one of ``step`` is solved, by GPS and Galileo.
     """
     observations = rtk.obs_t()
     assert rtk.readrnx(observed, 1, "", observations, rtk.nav_t(), rtk.sta_t()) > 0
@@ -92,14 +94,16 @@ def points(observed: str, path: str, delay: Callable[[str, float], float] | None
     options, table, found = rtk.prcopt_default, navigation(path), {}
     options.mode, options.navsys, options.elmin = rtk.PMODE_SINGLE, rtk.SYS_GPS | rtk.SYS_GAL, 0.0
     options.ionoopt, options.tropopt = rtk.IONOOPT_BRDC, rtk.TROPOPT_SAAS if delay is None else rtk.TROPOPT_OFF
+    letters = {rtk.SYS_GPS: "G", rtk.SYS_GAL: "E"}
     every = [observations.data[k] for k in range(observations.n)]
+    every = [one for one in every if rtk.satsys(one.sat, rtk.Arr1Dint(1)) in letters]
     second = [rtk.time2gpst(one.time, rtk.Arr1Dint(1)) % 86400.0 for one in every]
-    for time in sorted(set(second)):
+    for time in sorted(set(second))[::step]:
         rows = [k for k, other in enumerate(second) if other == time]
         epoch = rtk.Arr1Dobsd_t(len(rows))
         for j, k in enumerate(rows):
             number = rtk.Arr1Dint(1)
-            letter = {rtk.SYS_GPS: "G", rtk.SYS_GAL: "E"}[rtk.satsys(every[k].sat, number)]
+            letter = letters[rtk.satsys(every[k].sat, number)]
             if delay is not None:
                 every[k].P[0] -= delay(f"{letter}{number[0]:02d}", time)
             epoch[j] = every[k]

@@ -1,4 +1,4 @@
-"""How far a long file has been read: readers tell it, and a command shows it."""
+"""What the library tells a command while it works: how far a file has been read, and that kernels are compiled."""
 
 from __future__ import annotations
 
@@ -8,12 +8,13 @@ from contextvars import ContextVar
 from pathlib import Path
 from typing import TypeAlias
 
-__all__ = ["Watcher", "tell", "watched"]
+__all__ = ["Watcher", "announce", "announced", "awaited", "tell", "watched"]
 
 #: Is called with the file, and how many of how many parts of it have been read.
 Watcher: TypeAlias = Callable[[Path, int, int], None]
 
 _WATCHER: ContextVar[Watcher | None] = ContextVar("watcher", default=None)
+_ANNOUNCE: ContextVar[Callable[[], None] | None] = ContextVar("announce", default=None)
 
 
 @contextmanager
@@ -31,3 +32,26 @@ def tell(path: Path, done: int, total: int) -> None:
     watcher = _WATCHER.get()
     if watcher is not None:
         watcher(path, done, total)
+
+
+@contextmanager
+def announced(tell: Callable[[], None]) -> Iterator[None]:
+    """Within this context ``tell`` is called once, before the first kernel that is not in the cache is compiled."""
+    token = _ANNOUNCE.set(tell)
+    try:
+        yield
+    finally:
+        _ANNOUNCE.reset(token)
+
+
+def awaited() -> bool:
+    """Whether somebody waits for the announcement of the first kernel that is compiled."""
+    return _ANNOUNCE.get() is not None
+
+
+def announce() -> None:
+    """Call what waits for the announcement, once."""
+    tell = _ANNOUNCE.get()
+    if tell is not None:
+        _ANNOUNCE.set(None)
+        tell()
