@@ -28,7 +28,7 @@ def serve(scenario: str, epochs: int) -> None:
 
     recording = record(load(scenario), 0)
     steps = [step for step, _ in zip(recording.steps(), range(epochs))]
-    rows = {}
+    rows: dict[str, Any] = {}
     for line in sys.stdin:
         name = line.strip()
         first = name not in rows
