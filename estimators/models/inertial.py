@@ -339,7 +339,7 @@ class InertialModel(ErrorModel):
             return
         self._first = propagate_inertial(
             (self.position, self.velocity, self.dcm, self._memory, self.bias, self._turn, self._clock), self._samples,
-            self._first, until, self._noise, self.transition, self.process_noise, covariance,
+            self._first, until, self._noise, (self.transition, self.process_noise, covariance),
             (self.calibration, self._decay, self._density), elapsed,
         )  # fmt: skip
         self.time = until

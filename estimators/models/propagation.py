@@ -437,13 +437,10 @@ def propagate_covariance(
         covariance[i, i] += noise[i - m]
 
 
-@kernel(
-    f"i8({MOVING}, {SAMPLES}, i8, f8, f8[::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], "
-    "Tuple((f8[::1], f8[::1], f8[::1])), f8)"
-)
+@kernel(f"i8({MOVING}, {SAMPLES}, i8, f8, f8[::1], UniTuple(f8[:, ::1], 3), UniTuple(f8[::1], 3), f8)")
 def propagate_inertial(
-    state: Moving, samples: Samples, first: int, until: float, noise: Array, transition: Array, process_noise: Array,
-    covariance: Array, others: tuple[Array, Array, Array], elapsed: float,
+    state: Moving, samples: Samples, first: int, until: float, noise: Array, matrices: tuple[Array, Array, Array],
+    others: tuple[Array, Array, Array], elapsed: float,
 ) -> int:  # fmt: skip
     """Do `advance_inertial`, `accumulate_error` and `propagate_covariance` in one kernel.
 
@@ -451,18 +448,20 @@ def propagate_inertial(
     ----------
     state, samples, first, until, noise
         As of `advance_inertial`.
-    transition, process_noise : (15, 15) arrays
-        Overwritten, as by `accumulate_error`.
-    covariance, elapsed
-        As of `propagate_covariance`.
+    matrices : two (15, 15) arrays and an (n, n) array
+        Transition matrix and process noise, overwritten as by `accumulate_error`; covariance, as of
+        `propagate_covariance`.
     others : tuple of (n - 15,) arrays
         Values, inverse correlation times and noise densities of the other states, as of `propagate_covariance`.
+    elapsed : float
+        As of `propagate_covariance`.
 
     Returns
     -------
     int
         Index of the first sample that is not completely used.
     """
+    transition, process_noise, covariance = matrices
     blocks = np.empty((int((until - state[6][0]) / BLOCK) + 2, BLOCK_COLUMNS))
     first, count = advance_inertial(state, samples, first, until, noise, blocks)
     accumulate_error(blocks, count, noise, transition, process_noise)
