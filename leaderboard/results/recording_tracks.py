@@ -39,7 +39,7 @@ def track_of(recording: Recording) -> tuple[str, Array, Array]:
         return "truth", recording.data.truth.time[known], recording.data.truth.position[known]
     for each in recording.data.aids.values():
         stream = each.as_delivered()
-        if KINDS[stream.kind].geodetic and not stream.channels and len(stream):
+        if KINDS[stream.kind].geodetic and len(stream.channels) <= 1 and len(stream):
             place = stream.value
             height = place[:, 2:3] if place.shape[1] == 3 else np.zeros((len(place), 1))
             return stream.name, stream.time, np.hstack([place[:, :2], height])

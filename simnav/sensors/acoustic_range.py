@@ -10,7 +10,7 @@ with its drift; one-way only) and c = 1500 m/s. A channel is a beacon.
 
 A range by the two-way travel time is valid when the beacon answers, half way between the interrogation and the answer:
 for a vehicle that keeps its velocity v this leaves an error below v^2 t^2 / (2 range), 1 cm. It arrives when the answer
-has come, t later. A one-way range is valid when it arrives.
+has come, t later; the next interrogation waits for all answers. A one-way range is valid when it arrives.
 """
 
 from __future__ import annotations
@@ -228,6 +228,9 @@ class _AcousticRange(AcousticInstrument):
         # The beacon is the first position: what is heard is the same in both directions.
         path = paths(self.surroundings, np.tile(self.places, (n, 1)), np.repeat(own, c, axis=0))
         there = np.isfinite(path.time) & (path.distance <= spec.reach)
+        if spec.way == "two_way":
+            travel = np.where(there, path.time, np.nan).reshape(n, c)
+            there = there & np.repeat(self.pinged(tap.time, travel), c)
         value = np.where(there, path.ranges(spec.correction, spec.assumed_speed), 0.0).reshape(n, c)
         value *= 1.0 + self.speed_error(tap.time)[:, None]
         if any(block.name == "clock" for block in self.sheet.blocks):

@@ -20,6 +20,7 @@ from math import inf, isfinite
 from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from simnav.geometry.earth import relative_position
@@ -27,6 +28,7 @@ from simnav.labels import REFLECTION, FaultLabel
 from simnav.recording import AidStream
 from simnav.sensors.channels import ChannelInstrument
 from simnav.sensors.instrument import AidSpec
+from simnav.sensors.pacing import Pings
 from simnav.spec import NonNegative, Positive, quantity
 from simnav.timing import TimingSheet
 from simnav.types import Array, Datasheet, TapStates
@@ -120,7 +122,8 @@ class AcousticSpec(AidSpec):
     Attributes
     ----------
     correction : str
-        What the device makes of times and angles (see the module).
+        What the device makes of times and angles: ``profile`` (it traces the ray), ``harmonic`` (mean speed between the
+        depths) or ``fixed``.
     assumed_speed : float
         Speed of sound that a device with ``correction = "fixed"`` assumes [m/s].
     sound_speed : float
@@ -188,6 +191,7 @@ class AcousticInstrument(ChannelInstrument):
         self._chances = [self._stream(c, "reflections") for c in self.channels] if spec.reflections else []
         self._turns = [self._stream(c, "directions_of_reflections") for c in self.channels] if spec.reflections else []
         self._last: tuple[TapStates, Any] | None = None
+        self._pace = Pings()
 
     def heard(self, tap: TapStates) -> Any:
         """What `_hear` computes for a block, once."""
@@ -204,6 +208,19 @@ class AcousticInstrument(ChannelInstrument):
         if self.acoustics.sound_speed:
             error += self.block("sound_speed", time)[:, 0]
         return error
+
+    def pinged(self, time: Array, travel: Array) -> NDArray[np.bool_]:
+        """(n,) mask of the times at which a ping begins: the answers to the one before have come, or are given up.
+
+        Parameters
+        ----------
+        time : (n,) array
+            Sample times [s].
+        travel : (n, c) array
+            Travel times of the sound to each transponder, one way; NaN: none answers [s].
+        """
+        longest = self.acoustics.reach / SOUND_SPEED
+        return self._pace.begin(time, 2.0 * np.where(np.isfinite(travel), travel, longest).max(axis=1))
 
     def echoes(self, tap: TapStates) -> tuple[Array, Array]:
         """(n, c) detours of echoes [m], zero where the direct sound is heard, and (n, c, 2) variates of directions."""

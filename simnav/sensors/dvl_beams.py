@@ -48,6 +48,7 @@ from simnav.sensors.instrument import (
     turn_to_ned,
 )
 from simnav.sensors.janus import absorption, beam_axes, noise_by_range, signal_margin
+from simnav.sensors.pacing import Pings
 from simnav.sensors.processes import GaussMarkov
 from simnav.spec import NonNegative, Positive, Vector, quantity
 from simnav.streams import stream
@@ -75,7 +76,6 @@ _LEVEL = 0.1
 _STRONG = 40.0
 #: The largest noise is that at this ratio [dB].
 _WEAKEST = -6.0
-_TOLERANCE = 1e-9
 #: Keys of the figures of a class.
 _FIGURES = {
     "sigma": "sigma_m_s", "slant": "slant_deg", "minimum_altitude": "minimum_altitude_m",
@@ -331,8 +331,8 @@ class _DvlBeams(ChannelInstrument):
             GaussMarkov(1.0, _BUBBLES, stream(seed, "instrument", name, "bubbles")) if spec.aeration else None
         )
         self._last: tuple[TapStates, _Pings] | None = None
-        # The state from block to block: next ping, missed pings, since when beams are heard while there is no lock.
-        self._next, self._missed, self._heard_since = -inf, 0, inf
+        # The state from block to block: pings, missed ones, since when beams are heard while there is no lock.
+        self._pace, self._missed, self._heard_since = Pings(), 0, inf
 
     def observe(self, tap: TapStates) -> Array:
         """See `ChannelInstrument.observe`."""
@@ -396,10 +396,10 @@ class _DvlBeams(ChannelInstrument):
             nearest = echo.min(axis=1)
             thick = (_LAYER[1] - _LAYER[0]) * nearest * cos(spec.slant) >= _THINNEST
             takes, margin = 2.0 / _SOUND * nearest + spec.overhead, np.full((n, 4), _STRONG)
-            there = np.repeat((self._paced(tap.time, takes) & thick)[:, None], 4, axis=1)
+            there = np.repeat((self._pace.begin(tap.time, takes) & thick)[:, None], 4, axis=1)
         else:
             takes = 2.0 / _SOUND * echo.max(axis=1) + spec.overhead if known else np.zeros(n)
-            there = heard & self._locked(tap.time, self._paced(tap.time, takes), heard)[:, None]
+            there = heard & self._locked(tap.time, self._pace.begin(tap.time, takes), heard)[:, None]
         value, speed = self._along(tap, water if spec.track == "water" else np.zeros((n, 3)))
         relative = 1.0 if not spec.sigma else np.hypot(1.0, spec.speed_noise * speed / spec.sigma)[:, None]
         ratio = noise_by_range(np.maximum(margin, _WEAKEST)) * relative
@@ -461,16 +461,6 @@ class _DvlBeams(ChannelInstrument):
             beam = np.broadcast_to([self.azimuths[j], self.spec.slant], (len(own), 2))
             value[:, j] = np.sum(_directions(beam, self.spec.array, scale)[0] * own, axis=1)
         return value, np.linalg.norm(own, axis=1)
-
-    def _paced(self, time: Array, takes: Array) -> NDArray[np.bool_]:
-        """(n,) mask of the samples at which a ping begins: the one before, which took its time [s], has ended."""
-        begins = np.ones(len(time), np.bool_)
-        for i, (t, length) in enumerate(zip(time.tolist(), takes.tolist(), strict=True)):
-            if t < self._next - _TOLERANCE:
-                begins[i] = False
-            else:
-                self._next = t + length
-        return begins
 
     def _locked(self, time: Array, begins: NDArray[np.bool_], heard: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """(n,) mask of the pings that are delivered: while there is a lock of the bottom."""

@@ -15,8 +15,8 @@ systems deliver.
 
 A fix is valid when the transponder answers. It comes to the vehicle when the answer has gone to the ship, and, by
 sound, the message back: ``latency`` of the table ``timing`` is what the ship's computer and the modem take besides.
-There is no fix beyond the cone of the transceiver or its reach, in a shadow of the sound, or while the transponder is
-not under water.
+The next interrogation waits for the answer. There is no fix beyond the cone of the transceiver or its reach, in a
+shadow of the sound, or while the transponder is not under water.
 
 Figures of classes and their sources are in ``docs/how-to/use-acoustic-positioning.md``.
 """
@@ -162,15 +162,20 @@ class UsblFix(AcousticSpec):
     Attributes
     ----------
     grade : str
-        Class of the instrument (`GRADES`), for the figures that are not given.
-    accuracy, range_noise, cone : float
-        As of `Grade`.
+        Class of the instrument, for the next three figures where they are not given: ``precise``, ``ordinary`` or
+        ``simple``.
+    accuracy : float
+        One sigma of the position in each direction across the line of sight, as a share of the slant range.
+    range_noise : float
+        One sigma of the range [m].
+    cone : float
+        Largest angle from straight down at which there is a fix [rad].
     sigma, bias, bias_instability : tuple of float
         Errors of the position of the transceiver, north-east-down [m].
     alignment : tuple of float
         One sigma of the error of attitude and mounting, constant in a run, about bow, starboard and down [rad].
     attitude_noise : tuple of float
-        One sigma of its white part [rad].
+        One sigma of the white part of the error of the ship's attitude [rad].
     latitude, longitude : float
         Origin of the points [rad].
     north, east : tuple of float
@@ -329,6 +334,7 @@ class _UsblFix(AcousticInstrument):
         path = paths(self.surroundings, place, displace(tap.position, self.lever_displacement(tap)))
         down = np.divide(path.vector[:, 2], path.distance, out=np.ones(n), where=path.distance > 0.0)
         there = np.isfinite(path.time) & (path.distance <= spec.reach) & (down >= np.cos(spec.cone) - 1e-12)
+        there &= self.pinged(tap.time, np.where(there, path.time, np.nan)[:, None])
         axes = _ship_axes(heading)
         seen = np.einsum("nji,nj->ni", axes, path.vectors(spec.correction, spec.assumed_speed))
         seen = np.where(there[:, None], seen, 0.0)

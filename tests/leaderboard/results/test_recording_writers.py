@@ -9,6 +9,7 @@ import pytest
 
 from simnav.leaderboard.results.formats import formats, write
 from simnav.leaderboard.results.hidden import without_truth
+from simnav.leaderboard.results.recording_tracks import track_of
 from simnav.log.delimited import read_csv
 from simnav.log.files import FileSpec
 from simnav.log.nmea import read_nmea
@@ -17,6 +18,7 @@ from simnav.scenario import parse
 from simnav.scoring import score
 from simnav.source import record
 from simnav.trial.estimate_file import trial_of_file
+from tests.cases.positioned_by_sound import positioned_by_sound
 
 TOML = """
 name = "writers"
@@ -162,6 +164,12 @@ def test_tracks_for_maps(tmp_path, recording, told):
     [kml] = write("recording", "kml", given, tmp_path / "a.kml")
     first = ET.parse(kml).getroot().find(".//{*}coordinates").text.split()[0].split(",")
     assert [float(x) for x in first] == pytest.approx([found[0][1], found[0][0], found[0][2]], abs=1e-6)
+
+
+def test_the_fixes_of_a_ship_are_a_track() -> None:
+    ship = without_truth(record(positioned_by_sound("usbl", 10.0), 1))
+    name, time, position = track_of(ship)
+    assert (name, len(time), position.shape) == ("sound", 5, (5, 3))
 
 
 def test_csv_has_a_page_beside_it(tmp_path, recording):

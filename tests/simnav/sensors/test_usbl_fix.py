@@ -14,6 +14,7 @@ from simnav.geometry.rotation import dcm_from_rotation_vector, dcm_from_rpy
 from simnav.kinds import NavigationPoint
 from simnav.sensors import UsblFix
 from simnav.sensors.channels import ChannelInstrument
+from simnav.sensors.faults.by_channel import each_channel
 from simnav.sensors.usbl_fix import GRADES, observe
 from simnav.spec import SpecError
 from simnav.types import Array, TapStates
@@ -112,7 +113,7 @@ def test_the_ship_sails_along_its_way_and_stops() -> None:
 
 
 def test_a_fix_is_late_by_the_way_of_the_sound() -> None:
-    tap = taps(3, (0.0, 0.0, 755.0))
+    tap = taps(3, (0.0, 0.0, 755.0), rate=0.5)
     for returned, times in (("sound", 2.0), ("cable", 1.0)):
         stream = device(returned=returned).sense(tap)
         np.testing.assert_allclose(stream.arrivals - stream.time, times * 750.0 / 1500.0)
@@ -121,16 +122,27 @@ def test_a_fix_is_late_by_the_way_of_the_sound() -> None:
         assert timing.longest >= times * 1000.0 / 1500.0
 
 
+def test_an_interrogation_waits_for_the_answer_to_the_one_before() -> None:
+    stream = device().sense(taps(9, (0.0, 0.0, 695.0), rate=2.0))  # 0.92 s there and back
+    assert stream.time.tolist() == [0.0, 1.0, 2.0, 3.0, 4.0]
+    assert stream.dropped.tolist() == [0.5, 1.5, 2.5, 3.5]
+
+
+def test_fixes_that_a_fault_leaves_arrive_as_before() -> None:
+    stream = device().sense(taps(6, (0.0, 0.0, 705.0)))
+    left = each_channel(stream, (), lambda part: part.rows(part.time > 2.5))
+    assert left.time.tolist() == [3.0, 4.0, 5.0]
+    np.testing.assert_array_equal(left.arrival, stream.arrival[3:])
+
+
 def test_there_is_no_fix_beyond_cone_and_reach_and_above_the_surface() -> None:
-    usbl = device(grade="simple", reach_m=400.0)
     for offset, there in (
         ((100.0, 0.0, 65.0), True), ((105.0, 0.0, 65.0), False), ((0.0, 0.0, 404.0), True), ((0.0, 0.0, 406.0), False),
         ((1.0, 0.0, -0.5), False),
     ):  # fmt: skip
-        assert len(usbl.sense(taps(1, offset))) == there
-    upwards = device(cone_deg=100.0)
-    assert len(upwards.sense(taps(1, (40.0, 0.0, 2.0)))) == 1
-    assert len(upwards.sense(taps(1, (10.0, 0.0, 0.5)))) == 0
+        assert len(device(grade="simple", reach_m=400.0).sense(taps(1, offset))) == there
+    assert len(device(cone_deg=100.0).sense(taps(1, (40.0, 0.0, 2.0)))) == 1
+    assert len(device(cone_deg=100.0).sense(taps(1, (10.0, 0.0, 0.5)))) == 0
 
 
 def test_bent_rays_are_an_error_of_devices_that_do_not_trace_them() -> None:
@@ -166,7 +178,12 @@ def test_echoes_are_gross_errors_with_labels() -> None:
 
 
 def test_the_division_into_blocks_changes_nothing() -> None:
-    table = {"reflections": 0.2, "bias_instability_m": 0.5, "correlation_time_s": 60.0, "attitude_noise_deg": 0.1}
+    table: dict[str, Any] = {
+        "reflections": 0.2,
+        "bias_instability_m": 0.5,
+        "correlation_time_s": 60.0,
+        "attitude_noise_deg": 0.1,
+    }
     tap, parts, usbl = taps(60, (60.0, 20.0, 105.0)), [], device(**table)
     whole = device(**table).sense(tap)
     for rows in (slice(0, 7), slice(7, 8), slice(8, 60)):

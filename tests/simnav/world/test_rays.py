@@ -18,9 +18,9 @@ from simnav.world.sound_speed import Profile
 SUMMER = Profile(np.array([0.0, 20.0, 60.0, 100.0, 300.0]), np.array([1510.0, 1508.0, 1485.0, 1480.0, 1483.0]))
 
 
-def one(profile: Profile, first: float, second: float, distance: float, **more: float) -> tuple[float, float]:
+def one(profile: Profile, first: float, second: float, distance: float, bottom: float = np.inf) -> tuple[float, float]:
     """Time and depression of one ray."""
-    rays = trace(profile, *(np.array([x]) for x in (first, second, distance)), **more)
+    rays = trace(profile, np.array([first]), np.array([second]), np.array([distance]), bottom)
     return float(rays.time[0]), float(rays.depression[0])
 
 
