@@ -233,6 +233,22 @@ def _return(adjoint: Array, U: Array, G: Array, y: Array, m: int, z: Array) -> N
             adjoint[c] += G[a, c] * z[a]
 
 
+@kernel()
+def _add_rows(M: Array, x: Array, total: Array) -> None:
+    """Compute ``total += M' x`` row by row, four at a time: fewer sums go through memory, in the same order."""
+    n = x.size
+    k = 0
+    while k + 3 < n:
+        a, b, c, d = x[k], x[k + 1], x[k + 2], x[k + 3]
+        for j in range(n):
+            total[j] = total[j] + M[k, j] * a + M[k + 1, j] * b + M[k + 2, j] * c + M[k + 3, j] * d
+        k += 4
+    while k < n:
+        for j in range(n):
+            total[j] += M[k, j] * x[k]
+        k += 1
+
+
 @kernel(
     "UniTuple(f8, 2)(Tuple((f8[:, ::1], f8[::1])), Tuple((f8[:, :, ::1], f8[:, :, ::1], f8[:, ::1], f8[::1])), "
     f"{_AIDS}, f8, i8, {_ELIMINATION}, f8[:, ::1], f8[::1])"
@@ -329,17 +345,11 @@ def solve_chain(
     for k in range(count - 1, -1, -1):
         if k < count - 1:
             after[:] = 0.0
-            for r in range(n):
-                x = adjoint[r]
-                for c in range(n):
-                    after[c] += transition[k, r, c] * x
+            _add_rows(transition[k], adjoint, after)
             adjoint[:] = after
         for r in range(n):
             step[k, r] = filtered_shift[k, r]
-        for c in range(n):
-            x = adjoint[c]
-            for r in range(n):
-                step[k, r] += filtered[k, c, r] * x
+        _add_rows(filtered[k], adjoint, step[k])
         size[k] = 0.0
         for r in range(n):
             if not filtered[k, r, r] <= 0.0:

@@ -56,6 +56,20 @@ def _attach(noise: Array, value: Array, full: Array, whitener: Array, values: Ar
     whitening(full, whitener)
 
 
+@kernel("void(f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1])")
+def _begin_motion(
+    transition: Array, noise: Array, factor: Array, jacobian: Array, factor_noise: Array, whitener: Array
+) -> None:
+    """Copy transition matrix and noise of a motion to its factor, with the whitener; after it there is no motion."""
+    n = transition.shape[0]
+    for i in range(n):
+        for j in range(n):
+            factor[i, j] = jacobian[i, j] = transition[i, j]
+            factor_noise[i, j] = noise[i, j]
+            transition[i, j], noise[i, j] = 1.0 if i == j else 0.0, 0.0
+    whitening(factor_noise, whitener)
+
+
 @kernel("void(i8, i8[::1], i8, f8[:, :, ::1], f8[:, :, ::1])")
 def through_motion(first: int, row: Integers, coupled: int, transition: Array, jacobian: Array) -> None:
     """Convert Jacobians with respect to the states at folds to Jacobians with respect to their nodes, in place.
@@ -297,20 +311,14 @@ class Chain(ABC):
         self.folds.add(**{name: getattr(front, name).shape for name in self._kept})
         self.folds.add(**{f"now_{name}": getattr(front, name).shape for name in front.state})
         self.base = self.fold_base = 0
-        self._identity = np.eye(n)
         self._append_node()
-        self._pending()
+        self._transition, self._noise, self.ahead = np.eye(n), np.zeros((n, n)), 0.0
         self.set_prior(covariance, np.zeros(n))
         return covariance
 
     def _append_node(self) -> None:
         front = self.front
         self.nodes.append(time=front.time, **{name: getattr(front, name) for name in self._kept})
-
-    def _pending(self) -> None:
-        """Motion since the newest node: none."""
-        self._transition, self._noise = self._identity.copy(), np.zeros_like(self._identity)
-        self.ahead = 0.0
 
     def set_prior(self, covariance: Array, shift: Array) -> None:
         """Set the prior of the first node: its covariance, and its mean minus the node."""
@@ -356,13 +364,14 @@ class Chain(ABC):
 
     def extend(self) -> None:
         """Make the front a node, with the motion since the newest one as its factor."""
-        self.motions.append(
-            transition=self._transition, jacobian=self._transition, noise=self._noise, begin_shift=0.0, end_shift=0.0,
-            time=self.front.time, weight=1.0,
+        motions = self.motions
+        motions.append(begin_shift=0.0, end_shift=0.0, time=self.front.time, weight=1.0)
+        _begin_motion(
+            self._transition, self._noise, motions.newest("transition"), motions.newest("jacobian"),
+            motions.newest("noise"), motions.newest("whitener"),
         )  # fmt: skip
-        whitening(self._noise, self.motions.newest("whitener"))
+        self.ahead = 0.0
         self._append_node()
-        self._pending()
 
     def predicted_covariance(self, newest: Array) -> Array:
         """Covariance of the front from that of the newest node."""
@@ -424,8 +433,8 @@ class Chain(ABC):
         self.base += count
         self.nodes.drop(count)
         self.motions.drop(count)
-        self.aids.drop(int(np.searchsorted(self.aids["node"], self.base)))
-        folds = int(np.searchsorted(self.folds["node"], self.base))
+        self.aids.drop(int(self.aids["node"].searchsorted(self.base)))
+        folds = int(self.folds["node"].searchsorted(self.base))
         self.fold_base += folds
         self.folds.drop(folds)
 
@@ -448,7 +457,7 @@ class Chain(ABC):
 
     def factors_from(self, node: int) -> tuple[int, int]:
         """The indices of the first motion and aiding factors of a node of the window, or of a later one."""
-        return max(node - 1, 0), int(np.searchsorted(self.aids["node"], self.base + node)) if node else 0
+        return max(node - 1, 0), int(self.aids["node"].searchsorted(self.base + node)) if node else 0
 
     @abstractmethod
     def linearise_motion(self, first: int = 0) -> None:
@@ -467,7 +476,7 @@ class Chain(ABC):
             return
         at_node = aids["fold"] < 0
         self.observe(first, np.where(at_node, row, -1), self.nodes, "", jacobian)
-        self.move_folds(int(np.searchsorted(folds["node"], aids["node"][first])))
+        self.move_folds(int(folds["node"].searchsorted(aids["node"][first])))
         row = np.where(at_node, -1, aids["fold"] - self.fold_base)
         self.observe(first, row, folds, "now_", jacobian)
         add_motion_noise(

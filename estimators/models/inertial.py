@@ -68,6 +68,7 @@ from .measurements import (
     HEADING,
     Aid,
     State,
+    has_heading,
     observe,
 )
 from .own_observation import OwnObservation
@@ -75,7 +76,6 @@ from .propagation import (
     TURN_TIME,
     Samples,
     correct_inertial,
-    propagate_covariance,
     propagate_inertial,
 )
 from .state_blocks import StateBlocks
@@ -87,6 +87,7 @@ __all__ = ["InertialModel", "roll_pitch_yaw"]
 _NAV, _MOTION = 15, 9
 _NO_TIMES, _NO_VECTORS = np.empty(0), np.empty((0, 3))
 _GRAVITY = 9.81
+_FLOAT = np.dtype(np.float64)
 
 
 @kernel("void(f8[:, ::1], f8[::1], f8, f8[:, ::1])")
@@ -327,7 +328,7 @@ class InertialModel(ErrorModel):
             self._samples = (_NO_TIMES, _NO_TIMES, _NO_VECTORS, _NO_VECTORS)
         else:
             self._samples = (imu.time, imu.interval, imu.angular_rate, imu.specific_force)
-            if not all(a.flags.carray and a.dtype == np.float64 for a in self._samples):
+            if not all(a.dtype is _FLOAT and a.flags.carray for a in self._samples):
                 time, interval, rate, force = (np.array(a, dtype=np.float64) for a in self._samples)
                 self._samples = (time, interval, rate, force)
 
@@ -338,12 +339,10 @@ class InertialModel(ErrorModel):
             return
         self._first = propagate_inertial(
             (self.position, self.velocity, self.dcm, self._memory, self.bias, self._turn, self._clock), self._samples,
-            self._first, until, self._noise, self.transition, self.process_noise,
+            self._first, until, self._noise, (self.transition, self.process_noise, covariance),
+            (self.calibration, self._decay, self._density), elapsed,
         )  # fmt: skip
         self.time = until
-        propagate_covariance(
-            covariance, self.transition, self.process_noise, self.calibration, self._decay, self._density, elapsed
-        )
         if self.blocks.clocks:
             self.blocks.carry_values(self.calibration, _NAV, elapsed)
             self.blocks.carry_covariance(covariance, elapsed)
@@ -412,8 +411,8 @@ class InertialModel(ErrorModel):
     def nominal_noise(self, measurement: Measurement) -> Array | None:
         """The noise of the datasheet; None if the noise depends on the state."""
         name = measurement.instrument
-        if name in self._fused and self.aid_parameters[name][0] != HEADING:  # which may say nothing
-            return self.noise[name]
+        if name in self._fused:
+            return None if self.aid_parameters[name][0] == HEADING and not has_heading(self.dcm) else self.noise[name]
         if name in self.own and (more := self.own[name].noise_without_state(measurement.side)) is not None:
             return self.noise[name] + more
         return super().nominal_noise(measurement)

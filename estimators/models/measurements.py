@@ -30,7 +30,7 @@ from simnav.geometry.rotation import cross
 from simnav.types import Array
 
 __all__ = [
-    "AID", "OWN", "STATE", "Aid", "State", "observe", "observe_inertial", "radii", "wrap",
+    "AID", "OWN", "STATE", "Aid", "State", "has_heading", "observe", "observe_inertial", "radii", "wrap",
 ]  # fmt: skip
 
 #: Smallest cosine of the pitch at which there is a heading [-].
@@ -65,6 +65,12 @@ def radii(latitude: float) -> tuple[float, float]:
     x = 1.0 - ECCENTRICITY_SQUARED * sin(latitude) ** 2
     prime = SEMI_MAJOR_AXIS / sqrt(x)
     return prime * (1.0 - ECCENTRICITY_SQUARED) / x, prime
+
+
+@kernel()
+def has_heading(dcm: Array) -> bool:
+    """Whether a (3, 3) attitude is far enough from the vertical for a compass."""
+    return not dcm[0, 0] * dcm[0, 0] + dcm[1, 0] * dcm[1, 0] < LEAST_LEVEL * LEAST_LEVEL
 
 
 @kernel()
@@ -120,10 +126,10 @@ def observe_inertial(aid: Aid, value: Array, state: State, innovation: Array, ja
                 jacobian[2, 2], jacobian[2, 6], jacobian[2, 7] = 1.0, c1, -c0
 
     elif code == HEADING:
+        if not has_heading(dcm):
+            return 0
         c0, c1 = dcm[0, 0], dcm[1, 0]
         level = c0 * c0 + c1 * c1
-        if level < LEAST_LEVEL * LEAST_LEVEL:
-            return 0
         slope = -dcm[2, 0] / level
         jacobian[0, 6], jacobian[0, 7], jacobian[0, 8] = slope * c0, slope * c1, 1.0
         innovation[0] = value[0] - atan2(c1, c0)

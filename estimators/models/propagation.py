@@ -14,10 +14,11 @@ from typing import TypeAlias
 import numpy as np
 
 from simnav.compiled import kernel
+from simnav.estimators.algebra.sparse_product import add_eight, eight_sums
 from simnav.geometry.earth import EQUATORIAL_GRAVITY, ROTATION_RATE, SEMI_MAJOR_AXIS, gravity_scalar, radii_scalar
 from simnav.geometry.rotation import rotate_left, rotation_coefficients
 from simnav.strapdown import mechanize_step
-from simnav.types import Array
+from simnav.types import Array, Integers
 
 __all__ = [
     "BLOCK",
@@ -50,6 +51,8 @@ GRAVITY_FLATTENING = 0.0053024
 #: Columns of a block: duration, time held; latitude, height; velocity; mean DCM; mean specific force, north-east-down;
 #: averaged body rate.
 BLOCK_COLUMNS = 22
+#: Columns of the matrices of a block: the 15 states, and one of zeros, so that they are a multiple of eight.
+WIDTH = 16
 
 #: IMU samples: their times and intervals (k,) [s], angular rates [rad/s] and specific forces [m/s^2] (k, 3).
 Samples: TypeAlias = tuple[Array, Array, Array, Array]
@@ -61,6 +64,7 @@ SAMPLES = "Tuple((f8[::1], f8[::1], f8[:, ::1], f8[:, ::1]))"
 #: the mean rate of the one before; and the rate at the time of the state, extrapolated from both: a mean is half a
 #: sample old, which over the lever arm of a DVL in a seaway would be taken for a misalignment.
 Moving: TypeAlias = tuple[Array, Array, Array, Array, Array, Array, Array]
+MOVING = "Tuple((f8[::1], f8[::1], f8[:, ::1], f8[::1], f8[::1], f8[::1], f8[::1]))"
 
 
 @kernel()
@@ -121,33 +125,35 @@ def _dynamics(F: Array, block: Array, gyro_decay: float, accelerometer_decay: fl
 
 
 @kernel()
-def _advance_rows(F: Array, dt: float, M: Array, first: int, A: Array, B: Array) -> None:
-    """Compute ``M = (I + F dt + F F dt^2 / 2) M`` from a column on; F is sparse, and A, B are work space."""
-    n = M.shape[1]
+def _list_elements(F: Array, dt: float, value: Array, half: Array, column: Integers, count: Integers) -> None:
+    """List the elements of ``F dt`` and of ``F dt / 2`` that are not zero, row by row."""
     for i in range(15):
-        for j in range(first, n):
-            A[i, j] = 0.0
+        q = 0
         for k in range(15):
-            x = F[i, k] * dt
-            if x != 0.0:
-                for j in range(first, n):
-                    A[i, j] += x * M[k, j]
-    for i in range(15):
-        for j in range(first, n):
-            B[i, j] = A[i, j]
-        for k in range(15):
-            x = 0.5 * F[i, k] * dt
-            if x != 0.0:
-                for j in range(first, n):
-                    B[i, j] += x * A[k, j]
-    for i in range(15):
-        for j in range(first, n):
-            M[i, j] += B[i, j]
+            if F[i, k] != 0.0:
+                value[i, q], half[i, q], column[i, q] = F[i, k] * dt, 0.5 * F[i, k] * dt, k
+                q += 1
+        count[i] = q
 
 
 @kernel()
-def _add_noise(M: Array, block: Array, noise: Array) -> None:
-    """Add half the noise of a block, to the columns from 15 on: white, biases, turns, a time without data."""
+def _advance_rows(value: Array, half: Array, column: Integers, count: Integers, M: Array, A: Array) -> None:
+    """Compute ``M = (I + F dt + F F dt^2 / 2) M`` with the lists of `_list_elements`; A is work space."""
+    for i in range(15):
+        for j in range(0, WIDTH, 8):
+            start = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+            s = eight_sums(value, column, i, count[i], M, j, start)
+            A[i, j], A[i, j + 1], A[i, j + 2], A[i, j + 3] = s[0], s[1], s[2], s[3]
+            A[i, j + 4], A[i, j + 5], A[i, j + 6], A[i, j + 7] = s[4], s[5], s[6], s[7]
+    for i in range(15):
+        for j in range(0, WIDTH, 8):
+            start = A[i, j], A[i, j + 1], A[i, j + 2], A[i, j + 3], A[i, j + 4], A[i, j + 5], A[i, j + 6], A[i, j + 7]
+            add_eight(M, i, j, eight_sums(half, column, i, count[i], A, j, start))
+
+
+@kernel()
+def _add_noise(Q: Array, block: Array, noise: Array) -> None:
+    """Add half the noise of a block to Q: white, biases, turns, a time without data."""
     dt, held = 0.5 * block[0], 0.5 * block[1]
     scale, misalignment = noise[6], noise[7]
     t0, t1, t2 = block[19] * block[19], block[20] * block[20], block[21] * block[21]
@@ -157,11 +163,11 @@ def _add_noise(M: Array, block: Array, noise: Array) -> None:
     for i in range(3):
         c0, c1, c2 = block[7 + 3 * i] * g0, block[8 + 3 * i] * g1, block[9 + 3 * i] * g2
         for j in range(3):
-            M[6 + i, 21 + j] += c0 * block[7 + 3 * j] + c1 * block[8 + 3 * j] + c2 * block[9 + 3 * j]
-        M[3 + i, 18 + i] += noise[1] * dt + HELD_VELOCITY * HELD_VELOCITY * held
-        M[6 + i, 21 + i] += HELD_ATTITUDE * HELD_ATTITUDE * held
-        M[9 + i, 24 + i] += noise[3] * dt
-        M[12 + i, 27 + i] += noise[5] * dt
+            Q[6 + i, 6 + j] += c0 * block[7 + 3 * j] + c1 * block[8 + 3 * j] + c2 * block[9 + 3 * j]
+        Q[3 + i, 3 + i] += noise[1] * dt + HELD_VELOCITY * HELD_VELOCITY * held
+        Q[6 + i, 6 + i] += HELD_ATTITUDE * HELD_ATTITUDE * held
+        Q[9 + i, 9 + i] += noise[3] * dt
+        Q[12 + i, 12 + i] += noise[5] * dt
 
 
 @kernel("void(f8[:, ::1], i8, f8[::1], f8[:, ::1], f8[:, ::1])")
@@ -181,28 +187,35 @@ def accumulate_error(blocks: Array, count: int, noise: Array, transition: Array,
     transition, process_noise : (15, 15) arrays
         Overwritten: the error at the end is ``transition`` times the error at the start, plus noise.
     """
-    F, M, A, B = np.zeros((15, 15)), np.zeros((15, 30)), np.empty((15, 30)), np.empty((15, 30))
+    F, Phi, Q, A = np.zeros((15, 15)), np.zeros((15, WIDTH)), np.zeros((15, WIDTH)), np.empty((15, WIDTH))
+    value, half, column, elements = (
+        np.empty((15, 15)),
+        np.empty((15, 15)),
+        np.empty((15, 15), np.int64),
+        np.empty(15, np.int64),
+    )
     for i in range(15):
-        M[i, i] = 1.0
+        Phi[i, i] = 1.0
     for k in range(count):
         block = blocks[k]
         _dynamics(F, block, noise[2], noise[4])
+        _list_elements(F, block[0], value, half, column, elements)
+        _advance_rows(value, half, column, elements, Phi, A)
         # Half of the noise is added before the block and half after it: accurate to second order in its length.
-        _add_noise(M, block, noise)
-        for half in range(2):
-            if half == 1:  # (Phi Q)' to the left of which Phi makes Phi Q Phi'
-                for i in range(15):
-                    for j in range(i):
-                        M[i, 15 + j], M[j, 15 + i] = M[j, 15 + i], M[i, 15 + j]
-            _advance_rows(F, block[0], M, 15 * half, A, B)
+        _add_noise(Q, block, noise)
+        _advance_rows(value, half, column, elements, Q, A)
+        for i in range(15):  # (Phi Q)' to the left of which Phi makes Phi Q Phi'
+            for j in range(i):
+                Q[i, j], Q[j, i] = Q[j, i], Q[i, j]
+        _advance_rows(value, half, column, elements, Q, A)
         for i in range(15):
             for j in range(i):
-                M[j, 15 + i] = M[i, 15 + j]
-        _add_noise(M, block, noise)
+                Q[j, i] = Q[i, j]
+        _add_noise(Q, block, noise)
     for i in range(15):
         for j in range(15):
-            transition[i, j] = M[i, j]
-            process_noise[i, j] = M[i, 15 + j]
+            transition[i, j] = Phi[i, j]
+            process_noise[i, j] = Q[i, j]
 
 
 @kernel()
@@ -264,10 +277,7 @@ def next_stretch(
     return i, stop, whole, hold
 
 
-@kernel(
-    "UniTuple(i8, 2)(Tuple((f8[::1], f8[::1], f8[:, ::1], f8[::1], f8[::1], f8[::1], f8[::1])), "
-    f"{SAMPLES}, i8, f8, f8[::1], f8[:, ::1])"
-)
+@kernel(f"UniTuple(i8, 2)({MOVING}, {SAMPLES}, i8, f8, f8[::1], f8[:, ::1])")
 def advance_inertial(
     state: Moving, samples: Samples, first: int, until: float, noise: Array, blocks: Array
 ) -> tuple[int, int]:
@@ -366,17 +376,6 @@ def advance_inertial(
     return i, count
 
 
-def propagate_inertial(
-    state: Moving, samples: Samples, first: int, until: float, noise: Array, transition: Array, process_noise: Array
-) -> int:
-    """Do `advance_inertial` and `accumulate_error`; return the index of the first sample not completely used."""
-    clock = state[-1]
-    blocks = np.empty((int((until - clock[0]) / BLOCK) + 2, BLOCK_COLUMNS))
-    first, count = advance_inertial(state, samples, first, until, noise, blocks)
-    accumulate_error(blocks, count, noise, transition, process_noise)
-    return first
-
-
 @kernel("void(f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[::1], f8[::1], f8[::1], f8)")
 def propagate_covariance(
     covariance: Array, transition: Array, process_noise: Array, calibration: Array, rate: Array, density: Array,
@@ -436,6 +435,39 @@ def propagate_covariance(
         for j in range(m, n):
             covariance[i, j] *= decay[i - m] * decay[j - m]
         covariance[i, i] += noise[i - m]
+
+
+@kernel(f"i8({MOVING}, {SAMPLES}, i8, f8, f8[::1], UniTuple(f8[:, ::1], 3), UniTuple(f8[::1], 3), f8)")
+def propagate_inertial(
+    state: Moving, samples: Samples, first: int, until: float, noise: Array, matrices: tuple[Array, Array, Array],
+    others: tuple[Array, Array, Array], elapsed: float,
+) -> int:  # fmt: skip
+    """Do `advance_inertial`, `accumulate_error` and `propagate_covariance` in one kernel.
+
+    Parameters
+    ----------
+    state, samples, first, until, noise
+        As of `advance_inertial`.
+    matrices : two (15, 15) arrays and an (n, n) array
+        Transition matrix and process noise, overwritten as by `accumulate_error`; covariance, as of
+        `propagate_covariance`.
+    others : tuple of (n - 15,) arrays
+        Values, inverse correlation times and noise densities of the other states, as of `propagate_covariance`.
+    elapsed : float
+        As of `propagate_covariance`.
+
+    Returns
+    -------
+    int
+        Index of the first sample that is not completely used.
+    """
+    transition, process_noise, covariance = matrices
+    blocks = np.empty((int((until - state[6][0]) / BLOCK) + 2, BLOCK_COLUMNS))
+    first, count = advance_inertial(state, samples, first, until, noise, blocks)
+    accumulate_error(blocks, count, noise, transition, process_noise)
+    calibration, rate, density = others
+    propagate_covariance(covariance, transition, process_noise, calibration, rate, density, elapsed)
+    return first
 
 
 @kernel("void(f8[::1], f8[::1], f8[:, ::1], f8[::1], f8[::1], f8[::1])")

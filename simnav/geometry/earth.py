@@ -180,11 +180,8 @@ def relative_position(position: Array, origin: Array) -> Array:
     position, origin = np.asarray(position), np.asarray(origin)
     meridian, prime_vertical = principal_radii(origin[..., 0])
     east = np.remainder(position[..., 1] - origin[..., 1] + np.pi, 2.0 * np.pi) - np.pi
-    return np.stack(
-        [
-            (position[..., 0] - origin[..., 0]) * (meridian + origin[..., 2]),
-            east * (prime_vertical + origin[..., 2]) * np.cos(origin[..., 0]),
-            origin[..., 2] - position[..., 2],
-        ],
-        axis=-1,
-    )
+    offset = np.empty(np.broadcast(position, origin).shape)
+    offset[..., 0] = (position[..., 0] - origin[..., 0]) * (meridian + origin[..., 2])
+    offset[..., 1] = east * (prime_vertical + origin[..., 2]) * np.cos(origin[..., 0])
+    offset[..., 2] = origin[..., 2] - position[..., 2]
+    return offset

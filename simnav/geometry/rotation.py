@@ -85,13 +85,14 @@ def dcm_from_rpy(rpy: Array) -> Array:
         Groves eq. 2.22, transposed.
     """
     rpy = np.asarray(rpy, dtype=np.float64)
-    (sr, sp, sy), (cr, cp, cy) = np.moveaxis(np.sin(rpy), -1, 0), np.moveaxis(np.cos(rpy), -1, 0)
-    rows = [
-        [cp * cy, sr * sp * cy - cr * sy, cr * sp * cy + sr * sy],
-        [cp * sy, sr * sp * sy + cr * cy, cr * sp * sy - sr * cy],
-        [-sp, sr * cp, cr * cp],
-    ]
-    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+    sine, cosine = np.sin(rpy), np.cos(rpy)
+    sr, sp, sy = sine[..., 0], sine[..., 1], sine[..., 2]
+    cr, cp, cy = cosine[..., 0], cosine[..., 1], cosine[..., 2]
+    dcm = np.empty((*rpy.shape, 3))  # np.stack would take as long as all the rest, ten times over
+    dcm[..., 0, 0], dcm[..., 0, 1], dcm[..., 0, 2] = cp * cy, sr * sp * cy - cr * sy, cr * sp * cy + sr * sy
+    dcm[..., 1, 0], dcm[..., 1, 1], dcm[..., 1, 2] = cp * sy, sr * sp * sy + cr * cy, cr * sp * sy - sr * cy
+    dcm[..., 2, 0], dcm[..., 2, 1], dcm[..., 2, 2] = -sp, sr * cp, cr * cp
+    return dcm
 
 
 def rpy_from_dcm(dcm: Array) -> Array:
@@ -224,20 +225,23 @@ def quaternion_from_dcm(dcm: Array) -> Array:
     """
     c = np.asarray(dcm, dtype=np.float64)
     d0, d1, d2 = c[..., 0, 0], c[..., 1, 1], c[..., 2, 2]
-    squares = np.stack([1 + d0 + d1 + d2, 1 + d0 - d1 - d2, 1 - d0 + d1 - d2, 1 - d0 - d1 + d2], axis=-1)
+    squares = np.empty((*c.shape[:-2], 4))
+    squares[..., 0], squares[..., 1] = 1 + d0 + d1 + d2, 1 + d0 - d1 - d2
+    squares[..., 2], squares[..., 3] = 1 - d0 + d1 - d2, 1 - d0 - d1 + d2
     x, y, z = c[..., 2, 1] - c[..., 1, 2], c[..., 0, 2] - c[..., 2, 0], c[..., 1, 0] - c[..., 0, 1]
     xy, xz, yz = c[..., 1, 0] + c[..., 0, 1], c[..., 0, 2] + c[..., 2, 0], c[..., 2, 1] + c[..., 1, 2]
-    candidates = np.stack(
-        [
-            np.stack([squares[..., 0], x, y, z], axis=-1),
-            np.stack([x, squares[..., 1], xy, xz], axis=-1),
-            np.stack([y, xy, squares[..., 2], yz], axis=-1),
-            np.stack([z, xz, yz, squares[..., 3]], axis=-1),
-        ],
-        axis=-2,
+    candidates = np.empty((*c.shape[:-2], 4, 4))
+    rows = (
+        (squares[..., 0], x, y, z),
+        (x, squares[..., 1], xy, xz),
+        (y, xy, squares[..., 2], yz),
+        (z, xz, yz, squares[..., 3]),
     )
-    largest = np.argmax(squares, axis=-1)[..., None, None]
-    q = np.take_along_axis(candidates, largest, axis=-2)[..., 0, :]
+    for i, row in enumerate(rows):
+        for j, element in enumerate(row):
+            candidates[..., i, j] = element
+    largest = squares.reshape(-1, 4).argmax(axis=-1)
+    q = candidates.reshape(-1, 4, 4)[np.arange(len(largest)), largest].reshape(squares.shape)
     unit: Array = q / np.linalg.norm(q, axis=-1, keepdims=True)
     return unit
 

@@ -89,7 +89,7 @@ class Reader:
         except (LogError, MemoryError):
             raise
         except OSError as error:
-            if error.filename is None or Path(os.fsdecode(error.filename)) != path:
+            if not isinstance(error.filename, (str, bytes)) or Path(os.fsdecode(error.filename)) != path:
                 raise LogError(f"{self._label(path)}: {exception_of(self.function, error)}") from error
             raise LogError(f"{path} cannot be read: {error.strerror}") from None
         except Exception as error:

@@ -25,10 +25,11 @@ def read(path: Path, file: FileSpec, sentence: str | None, talker: str | None) -
         content = parquet.read_table(path, use_threads=False)
         while any(pa.types.is_struct(field.type) for field in content.schema):
             content = content.flatten()
+        names = content.column_names
     except (pa.ArrowException, OSError, MemoryError, ValueError) as error:
         raise LogError(f"{path}: it is no Parquet file, or damaged ({' '.join(str(error).split())[:100]})") from None
     columns: dict[str, NDArray[np.float64] | NDArray[np.object_]] = {}
-    for name, values in zip(content.column_names, content.columns, strict=True):
+    for name, values in zip(names, content.columns, strict=True):
         kind = values.type
         if pa.types.is_timestamp(kind):
             columns[name] = np.asarray(values.cast(pa.timestamp("us", kind.tz), safe=False).cast(pa.int64()).cast(

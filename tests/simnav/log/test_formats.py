@@ -6,7 +6,9 @@ import struct
 import sys
 
 import numpy as np
+import pyarrow as pa
 import pytest
+from pyarrow import parquet
 
 from simnav.log import LogError, LogWarning
 from simnav.log.files import FileSpec
@@ -44,6 +46,14 @@ def test_further_contents_are_read_or_refused(case):
         pytest.importorskip("mcap")
     found = mutations(case, 12, seed=1)
     assert set(found) <= {"read", "refused"}, found
+
+
+def test_a_column_of_parquet_whose_name_is_no_text_is_refused(tmp_path):
+    path = tmp_path / "a.parquet"
+    parquet.write_table(pa.table({"time": [0.0, 1.0], "mode": [1.0, 2.0]}), path, store_schema=False)
+    path.write_bytes(path.read_bytes().replace(b"mode", b"mod\xe9"))
+    with pytest.raises(LogError, match="it is no Parquet file, or damaged"):
+        read("parquet", path)
 
 
 def test_a_folder_or_nothing_in_place_of_the_file_is_named(form, tmp_path):
