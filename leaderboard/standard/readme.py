@@ -65,7 +65,7 @@ def tables(ranking: Ranking, results: Sequence[Result], of: int | None = None) -
         "fault. Recorded voyages have no oracle: there the plain filter on the same run is the divisor. Smaller is "
         "better."
     )
-    older = sorted({(f"`{r.estimator}`", r.superseded) for t in tracks for r in t.rows if r.superseded})
+    older = sorted({(f"`{r.estimator}`", r.superseded) for t in ranking.tracks for r in t.rows if r.superseded})
     if older:
         parts.append(f"Results of an older version, until the next edition: {in_words(older)}.")
     if tracks:
