@@ -14,7 +14,7 @@ from simnav.leaderboard.ranking.board import Ranking, TrackRanking, TrackRow
 from simnav.leaderboard.ranking.ranking_figure import ranking_figure
 from simnav.leaderboard.ranking.ranking_table import gain_cell, ratio
 from simnav.leaderboard.ranking.summary import best_rows, gain_text, limits, sentence, spread
-from simnav.leaderboard.ranking.superseded import in_words
+from simnav.leaderboard.ranking.superseded import in_words, superseded_by
 from simnav.leaderboard.ranking.tables import MISSING
 from simnav.leaderboard.results.errors import RequestError
 from simnav.leaderboard.results.provenance import distinct
@@ -65,8 +65,11 @@ def tables(ranking: Ranking, results: Sequence[Result], of: int | None = None) -
         "fault. Recorded voyages have no oracle: there the plain filter on the same run is the divisor. Smaller is "
         "better."
     )
-    older = sorted({(f"`{r.estimator}`", r.superseded) for t in ranking.tracks for r in t.rows if r.superseded})
-    if older:
+    by_row: dict[str, list[Result]] = {}
+    for r in results:  # also those that suit no scenario of a track, and are on no board
+        by_row.setdefault(r.estimator, []).append(r)
+    found = ((f"`{row}`", superseded_by(row.partition("(")[0], own)) for row, own in sorted(by_row.items()))
+    if older := [(row, versions) for row, versions in found if versions]:
         parts.append(f"Results of an older version, until the next edition: {in_words(older)}.")
     if tracks:
         parts.append("\n".join([
