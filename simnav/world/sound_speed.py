@@ -16,7 +16,7 @@ from pydantic import model_validator
 from simnav.spec import SpecError, quantity
 from simnav.types import Array
 from simnav.world.surroundings import SurroundingSpec, register_surrounding
-from simnav.world.water_column import Figures
+from simnav.world.water_column import Figures, plausible_water
 
 __all__ = ["SLOWEST", "SOUND_SPEED", "Profile", "SoundSpeedProfile", "plausible_speed"]
 
@@ -67,14 +67,9 @@ class SoundSpeedProfile(SurroundingSpec):
                 raise ValueError(
                     f"{key} has {len(given[key])} numbers and depth_m {len(self.depth)}; each depth has one"
                 )
-        if any(b <= a for a, b in zip(self.depth, self.depth[1:], strict=False)) or self.depth[0] < 0.0:
-            raise ValueError(f"depth_m = {list(self.depth)}: depths are ascending, and not below 0")
+        plausible_water(self.depth, self.salinity, self.temperature)
         for speed in self.speed:
             plausible_speed("speed_m_s", speed)
-        if any(not 0.0 <= s <= 42.0 for s in self.salinity):
-            raise ValueError(f"salinity_g_kg = {list(self.salinity)}: sea water has 0 to 42")
-        if any(not -2.0 <= t <= 40.0 for t in self.temperature):
-            raise ValueError(f"temperature_celsius = {list(self.temperature)}: sea water has -2 to 40")
         return self
 
     def build(self, name: str, seed: int) -> Profile:

@@ -22,7 +22,7 @@ from simnav.spec import SpecError, quantity, register_unit
 from simnav.types import Array
 from simnav.world.surroundings import SurroundingSpec, register_surrounding
 
-__all__ = ["Column", "Figures", "WaterColumn"]
+__all__ = ["Column", "Figures", "WaterColumn", "plausible_water"]
 
 register_unit("celsius", 1.0)
 register_unit("g_kg", 1.0)
@@ -39,6 +39,24 @@ def _listed(value: Any) -> Any:
 
 #: Numbers; TOML may have one alone.
 Figures = Annotated[tuple[float, ...], BeforeValidator(_listed)]
+
+
+def plausible_water(depth: Figures, salinity: Figures, temperature: Figures) -> None:
+    """ValueError if depths do not ascend from the surface, or no sea water is so salt, warm or cold.
+
+    Parameters
+    ----------
+    depth : tuple of float
+        Depths, one or more [m].
+    salinity, temperature : tuple of float
+        Absolute salinities [g/kg] and conservative temperatures [degrees Celsius].
+    """
+    if any(b <= a for a, b in zip(depth, depth[1:], strict=False)) or depth[0] < 0.0:
+        raise ValueError(f"depth_m = {list(depth)}: depths are ascending, and not below 0")
+    if any(not 0.0 <= s <= 42.0 for s in salinity):
+        raise ValueError(f"salinity_g_kg = {list(salinity)}: sea water has 0 to 42")
+    if any(not -2.0 <= t <= 40.0 for t in temperature):
+        raise ValueError(f"temperature_celsius = {list(temperature)}: sea water has -2 to 40")
 
 
 @register_surrounding
@@ -67,12 +85,7 @@ class WaterColumn(SurroundingSpec):
                 f"depth_m, salinity_g_kg and temperature_celsius have {len(self.depth)}, {len(self.salinity)} and "
                 f"{len(self.temperature)} numbers; each depth has one of each"
             )
-        if any(b <= a for a, b in zip(self.depth, self.depth[1:], strict=False)) or self.depth[0] < 0.0:
-            raise ValueError(f"depth_m = {list(self.depth)}: depths are ascending, and not below 0")
-        if any(not 0.0 <= s <= 42.0 for s in self.salinity):
-            raise ValueError(f"salinity_g_kg = {list(self.salinity)}: sea water has 0 to 42")
-        if any(not -2.0 <= t <= 40.0 for t in self.temperature):
-            raise ValueError(f"temperature_celsius = {list(self.temperature)}: sea water has -2 to 40")
+        plausible_water(self.depth, self.salinity, self.temperature)
         return self
 
     def build(self, name: str, seed: int) -> Column:
