@@ -13,6 +13,7 @@ McDougall and P. M. Barker, *Getting started with TEOS-10 and the Gibbs Seawater
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
@@ -51,7 +52,7 @@ def plausible_water(depth: Figures, salinity: Figures, temperature: Figures) -> 
     salinity, temperature : tuple of float
         Absolute salinities [g/kg] and conservative temperatures [degrees Celsius].
     """
-    if any(b <= a for a, b in zip(depth, depth[1:], strict=False)) or depth[0] < 0.0:
+    if any(b <= a for a, b in pairwise(depth)) or depth[0] < 0.0:
         raise ValueError(f"depth_m = {list(depth)}: depths are ascending, and not below 0")
     if any(not 0.0 <= s <= 42.0 for s in salinity):
         raise ValueError(f"salinity_g_kg = {list(salinity)}: sea water has 0 to 42")
