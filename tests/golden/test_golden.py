@@ -6,6 +6,7 @@ import copy
 import re
 from collections.abc import Iterable
 from functools import cache
+from inspect import cleandoc
 from pathlib import Path
 from typing import Any
 
@@ -66,7 +67,9 @@ def test_the_cases_have_every_kind_of_fault_and_instrument_and_run_every_row() -
 def test_a_version_has_its_history() -> None:
     for name in filter(own, names()):
         cls = find(name)
-        lines = re.findall(r"^ {0,4}(\d+)$", (cls.__doc__ or "").partition("Versions\n--------")[2], re.MULTILINE)
+        lines = re.findall(
+            r"^ {0,4}(\d+)$", cleandoc(cls.__doc__ or "").partition("Versions\n--------")[2], re.MULTILINE
+        )
         assert [int(n) for n in lines] == list(range(2, cls.version + 1)) or cls.version == 1, (
             f"{name} has version {cls.version}: the section Versions of its docstring says what each version changed"
         )
