@@ -97,7 +97,7 @@ def search(
         require_suited(scenario, requests)
     run = partial(_run, folder=folder, workers=workers, progress=progress)
     points: dict[tuple[str, Choice], Point] = {}
-    for count in sorted({min(runs, 1), runs}):  # what a method lacks shows on the first seed
+    for count in sorted({min(runs, 1), runs}) if settings else ():  # what a method lacks shows on the first seed
         results = run(settings.values(), range(SEARCHED_FROM, SEARCHED_FROM + count), what="search")
         points = {key: _point(key[1], setting, results) for key, setting in settings.items()}
 

@@ -139,8 +139,13 @@ def made_results(monkeypatch):
                         scenario.id, seed, r.label, {}, False, "ok", "", {"horizontal_rmse": value}
                     )
 
+    def load_made(*_, **__):
+        if not kept:
+            raise simnav.RequestError("there are no results")
+        return list(kept.values())
+
     monkeypatch.setattr(searching, "run_campaign", run)
-    monkeypatch.setattr(searching, "load", lambda *_, **__: list(kept.values()))
+    monkeypatch.setattr(searching, "load", load_made)
     return ran
 
 
