@@ -39,8 +39,8 @@ class ClaimRequest:
         default=(),
         metavar="CONDITION",
         help="A choice that is varied, perhaps with values, like lag or lag=0,10,20; several are varied one by one. "
-        "'all' varies all choices of a paper's claim. Default: the stored answer, and nothing is run; a claim of your own is "
-        "judged as it stands.",
+        "'all' varies all choices of a paper's claim. Default: the stored answer, and nothing is run; a claim of your "
+        "own is judged as it stands.",
         more="Of a claim of your own: lag, row.PARAMETER, than.PARAMETER, both.PARAMETER, or a dial or key of the "
         "scenario, each with values.",
     )

@@ -209,7 +209,7 @@ def test_the_contract_test_has_them_among_its_instruments(plugins):
     recording = contract_recording(0)
     assert set(recording.data.aids["janus"].channels) == {"1", "2", "3", "4"}
     beacons = recording.data.aids["moving_beacons"]
-    assert len(beacons) == 6 * len(beacons.channels)  # once in ten seconds
+    assert len(beacons) == 4 * len(beacons.channels)  # once in ten seconds
     assert check("dead-reckoning").passed
 
 

@@ -189,7 +189,7 @@ def test_the_contract_test_has_every_kind(plugins):
     load_plugin(plugins / "beacon.py")
     recording = contract_recording(0)
     assert set(recording.instruments) == {*before, "beacon"} == set(KINDS)
-    assert len(recording.data.aids["beacon"]) == 60
+    assert len(recording.data.aids["beacon"]) == 40
     assert check("ekf").passed
 
 
