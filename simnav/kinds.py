@@ -260,6 +260,7 @@ _IN_ARRAYS = {
     **dict.fromkeys(("", "percent", "ppm"), "-"),
     "hz": "Hz",
     "k": "K",
+    "nt": "T",
 }
 
 

@@ -103,7 +103,8 @@ def main() -> None:
     except Exception as error:  # of the parser: an unknown command or option, a value of the wrong type
         if not hasattr(error, "format_message"):
             raise
-        text = shortened(" ".join(error.format_message().split())) or "see simnav --help"
+        words = " ".join(error.format_message().split()).replace(": Value error, ", ": ", 1)
+        text = shortened(words) or "see simnav --help"
         out = Output(json="--json" in sys.argv[1:])
         out.remark(text)
         out.document({"error": text, "code": USER})

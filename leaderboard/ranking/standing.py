@@ -171,6 +171,7 @@ def standing_table(stand: Standing) -> tables.Fitted:
                      tables.number(r.smoothed_horizontal_rmse) if smoothed else "", ratio, better, p])  # fmt: skip
     mine = stand.estimator
     with_interval = " with its 95 % interval" if any(math.isfinite(r.low) for r in stand.rows) else ""
+    told = any(r.reference for r in stand.rows)
     columns = ["estimator", "failed", "horizontal RMSE [m]", "smoothed [m]", f"{mine} / it", f"{mine} better in", "p"]
     return tables.Fitted(
         f"{stand.scenario}: {mine} {stand.places}",
@@ -182,6 +183,6 @@ def standing_table(stand: Standing) -> tables.Fitted:
         strong=[i for i, r in enumerate(stand.rows) if r.estimator == mine],
         caption=f"Median over the seeds{with_interval}. Ratio: geometric mean over the same seeds; below 1 "
         "the estimator is better; a run that only one of the two failed counts 1000. p: studentised bootstrap. "
-        "Intervals and p-values need 6 seeds. * reference: told the truth.",
+        "Intervals and p-values need 6 seeds." + (" * reference: told the truth." if told else ""),
         explained={"smoothed [m]": "Smoothed: the same of the smoothed trajectories; all else is in real time."},
     )

@@ -464,7 +464,7 @@ def test_the_parser_too_answers_with_one_sentence(tmp_path):
         (["lsit"], "list"),
         (["run"], "SCENARIO"),
         (["run", "open-sea", "--seed", "-1"], "seed"),
-        (["list", "everything"], "scenarios"),
+        (["list", "everything"], "'topic': 'everything' is not one of 'scenarios'"),
     ):
         run = entry(*words, cwd=tmp_path)
         assert run.returncode == 2
