@@ -462,7 +462,7 @@ def _missing(candidate: Candidate, recording: Recording) -> tuple[bool, str]:
     needed: list[str] = []
     for absent in (["imu"], *([n] for n in names), names, [*names, "imu"]):
         # States that an instrument brings along make every epoch dear. They stay where such an instrument is absent.
-        one_of_few = len(absent) == 1 and (absent == ["imu"] or absent[0] in few.instruments)
+        one_of_few = len(absent) == 1 and absent[0] in few.instruments
         trial = run_trial(candidate.factory(), _without(few if one_of_few else beginning, absent))
         label = absent[0] if len(absent) == 1 else "instruments" if "imu" in absent else "aiding instruments"
         if trial.status not in ("ok", "unsuitable"):
