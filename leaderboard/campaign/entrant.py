@@ -34,8 +34,8 @@ class Entrant:
         Declared version of the estimator.
     own : str
         Digest of the user's own code alone; empty for an estimator that comes with simnav.
-    kernels : bool
-        Whether it may call kernels of simnav, which are then loaded before it begins.
+    kernels : tuple of str
+        Modules of simnav whose kernels it may call, which are then loaded before it begins; ``simnav``: all.
     code : bytes
         The class itself, where no other process can import it.
     point : str
@@ -58,7 +58,7 @@ class Entrant:
     learned: Mapping[str, Any] = field(default_factory=dict)
     version: int = 1
     own: str = ""
-    kernels: bool = True
+    kernels: tuple[str, ...] = ("simnav",)
 
     def find(self) -> type[Estimator]:
         """Its class, in the process in which it is run."""

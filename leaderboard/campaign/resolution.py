@@ -62,7 +62,7 @@ def resolve(request: EstimatorRequest, confinement: str, hidden: Sequence[Path])
             told = declared_ranges(made)
             return replace(
                 entrant, reference=is_own_reference(cls.name), source=estimator_source(cls),
-                learned_from=ranges_of(told), learned=record_of(told), version=cls.version,
+                learned_from=ranges_of(told), learned=record_of(told), version=cls.version, kernels=(cls.__module__,),
             )  # fmt: skip
         with contextlib.suppress(Exception):  # the other process says what is wrong
             source = estimator_source(cls)  # here, where the text of a session is known
@@ -73,7 +73,7 @@ def resolve(request: EstimatorRequest, confinement: str, hidden: Sequence[Path])
         found, why = outcome.value, outcome.reason
     else:
         try:
-            server = prepare(confinement, hidden, loaded=False)
+            server = prepare(confinement, hidden, loaded=())
             found, why = describe(server, entrant, Limits(_IMPORT_TIME, _MEMORY)), ""
         except ValueError as error:
             found, why = None, str(error)
@@ -91,7 +91,7 @@ def resolve(request: EstimatorRequest, confinement: str, hidden: Sequence[Path])
         raise RequestError(f"estimator {request.name!r}: {error}") from None
     return replace(
         entrant, source=source or with_library(found["source"]), learned_from=learned_from, learned=learned,
-        version=found["version"], own=found["source"], kernels=found.get("kernels", True),
+        version=found["version"], own=found["source"], kernels=tuple(found.get("kernels", ("simnav",))),
     )  # fmt: skip
 
 

@@ -32,7 +32,7 @@ __all__ = [
     "folder_code",
     "followed",
     "is_installed",
-    "may_call_kernels",
+    "kernel_modules",
 ]
 
 #: Folder of the library. The estimators and scenarios are in it, by symbolic links; so is the leaderboard.
@@ -271,22 +271,26 @@ _WITHOUT_KERNELS = {"simnav.types"} | {
 _ALSO_WITHOUT = {*sys.stdlib_module_names, "numpy", "scipy", "filterpy"} - {"importlib", "runpy"}
 
 
-def may_call_kernels(file: str) -> bool:
-    """Whether an estimator may call kernels of simnav: False if its files import only what surely has none.
+def kernel_modules(file: str) -> list[str]:
+    """Modules of simnav whose kernels an estimator may call: those that its files import.
 
     Parameters
     ----------
     file : str
         The file of the estimator; empty for one that is not in a file.
+
+    Returns
+    -------
+    list of str
+        ``simnav`` alone where that is not known; empty if its files import only what surely has no kernels.
     """
     if not file:
-        return True
+        return ["simnav"]
     walk = _Walk()
     walk.file(Path(file), Path(file).parent)
     walk.run()
-    return any(
-        module not in _WITHOUT_KERNELS and module.partition(".")[0] not in _ALSO_WITHOUT for module in walk.foreign
-    )
+    found = {m for m in walk.foreign if m not in _WITHOUT_KERNELS and m.partition(".")[0] not in _ALSO_WITHOUT}
+    return sorted(found) if all(m.startswith("simnav.") for m in found) else ["simnav"]
 
 
 class _Walk:

@@ -17,6 +17,7 @@ import numpy as np
 
 from simnav.estimator.registry import discover_own
 from simnav.leaderboard.campaign.confinement.attempt import Attempt, close_server, prepare, try_estimator
+from simnav.leaderboard.campaign.confinement.reachable_kernels import reachable_kernels
 from simnav.leaderboard.campaign.confinement.session import Limits
 from simnav.leaderboard.results import store, trials
 from simnav.leaderboard.results.errors import named, printable
@@ -36,7 +37,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Unit", "judged", "run_unit", "start_worker"]
 
-_prepared = False
+_loaded: set[str] = set()  # modules whose kernels are here; "" stands for those of recordings
 _PATIENCE = 5.0  # for a result that is being stored when the worker must end [s]
 _REASON = 2000  # characters of a reason
 _results = threading.Lock()  # held while a result is stored, and for good by who ends the worker
@@ -135,28 +136,30 @@ def start_worker(parent: int) -> None:
 
 
 def _prepare_worker(unit: Unit) -> None:
-    """Start the server of estimators, and load the kernels of this process once."""
-    global _prepared
-    first, _prepared = not _prepared, True
+    """Start the server of estimators, and load the kernels of this process, each once."""
     if unit.confinement != "none":  # it loads its kernels while the first recording is made
-        wanted = any(entrant.kernels and not entrant.reference for entrant, _ in unit.entrants)
+        wanted = {module for entrant, _ in unit.entrants if not entrant.reference for module in entrant.kernels}
         prepare(unit.confinement, unit.seal.unreadable(unit.folder), loaded=wanted)
-    if first:
-        _load_kernels(unit.confinement == "none" or any(entrant.reference for entrant, _ in unit.entrants))
+    here = [entrant for entrant, _ in unit.entrants if entrant.reference or unit.confinement == "none"]
+    _load_kernels({module for entrant in here for module in entrant.kernels})
 
 
-def _load_kernels(estimators: bool) -> None:
-    """Load the kernels of what is made in forks of this process: of recordings, and of references if there are any."""
+def _load_kernels(modules: set[str]) -> None:
+    """Load the kernels of what is made in forks of this process: of recordings, and of estimators if there are any."""
     from simnav.compiled import kernels
 
+    missing = {"", *modules} - _loaded
+    if not missing:
+        return
+    _loaded.update(missing)
     importlib.import_module("simnav.simulation.simulator")
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        if estimators:
+        if modules:
             discover_own()
-        for kernel in kernels():
-            if estimators or not kernel.__module__.startswith("simnav.estimators."):
-                kernel.compile()
+        of_recordings = (k for k in kernels() if not k.__module__.startswith("simnav.estimators."))
+        for kernel in (*of_recordings, *reachable_kernels(modules)):
+            kernel.compile()
 
 
 def _end_with(parent: int) -> None:

@@ -150,7 +150,7 @@ def told(folder: Path, confinement: str) -> dict[str, Any]:
     recording, limits = record(load(_SCENARIO), 0), Limits(60.0, 1 << 30)
 
     def run(name: str) -> dict[str, Any]:
-        entrant = Entrant(f"{file}:{name}", {}, name, False, "", kernels=False)
+        entrant = Entrant(f"{file}:{name}", {}, name, False, "", kernels=())
         made = try_estimator(entrant, recording, limits, confinement, sealed=True)
         assert made.status == "ok", made.reason
         assert made.trial is not None

@@ -172,9 +172,9 @@ def seen(folder: Path, confinement: str) -> dict[str, Any]:
     recording, limits = record(load(_SCENARIO), 0), Limits(60.0, 1 << 30)
 
     def run(name: str) -> dict[str, Any]:
-        server = EstimatorServer(confinement, loaded=False, sealed=True)
+        server = EstimatorServer(confinement, loaded=(), sealed=True)
         try:
-            made = attempt(server, Entrant(f"{file}:{name}", {}, name, False, "", kernels=False), recording, limits)
+            made = attempt(server, Entrant(f"{file}:{name}", {}, name, False, "", kernels=()), recording, limits)
         finally:
             server.close()
         assert made.status == "ok", made.reason

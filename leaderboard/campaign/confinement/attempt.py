@@ -22,6 +22,7 @@ from .cores import own_core
 from .estimator_process import seed_generators
 from .isolation import isolate
 from .limits import interrupted
+from .reachable_kernels import ALL
 from .session import (
     LOST,
     EstimatorServer,
@@ -32,7 +33,7 @@ from .session import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterable, Sequence
 
     from simnav.leaderboard.campaign.entrant import Entrant
     from simnav.recording import Recording
@@ -112,13 +113,15 @@ def chosen_confinement(asked: str = "auto") -> str:
     return "process"
 
 
-def prepare(confinement: str, hidden: Sequence[Path], *, loaded: bool = True, sealed: bool = False) -> EstimatorServer:
+def prepare(
+    confinement: str, hidden: Sequence[Path], *, loaded: Iterable[str] = (ALL,), sealed: bool = False
+) -> EstimatorServer:
     """The server of this process: the one that is there, or a new one.
 
     Parameters
     ----------
     confinement, hidden, loaded, sealed
-        As of `EstimatorServer`. Kernels are not needed to inspect estimators; a server that has none begins to load
+        As of `EstimatorServer`. Kernels are not needed to inspect estimators; a server that lacks some begins to load
         them where they are wanted.
     """
     global _server, _owner
@@ -128,9 +131,8 @@ def prepare(confinement: str, hidden: Sequence[Path], *, loaded: bool = True, se
         _server.close()
         _server = None
     if _server is None:
-        _server, _owner = EstimatorServer(confinement, hidden, loaded=False), os.getpid()
-    if loaded:
-        _server.load()
+        _server, _owner = EstimatorServer(confinement, hidden, loaded=()), os.getpid()
+    _server.load(loaded)
     _server.hidden, _server.sealed = tuple(hidden), sealed
     return _server
 
@@ -262,8 +264,8 @@ def describe(server: EstimatorServer, entrant: Entrant, limits: Limits) -> dict[
     Returns
     -------
     dict
-        ``reference``, ``source`` (a digest), ``version``, whether it may call ``kernels`` of simnav, and
-        ``learned_from`` as it was told, not checked.
+        ``reference``, ``source`` (a digest), ``version``, modules whose ``kernels`` it may call, and ``learned_from``
+        as it was told, not checked.
 
     Raises
     ------
@@ -281,7 +283,11 @@ def describe(server: EstimatorServer, entrant: Entrant, limits: Limits) -> dict[
     source, version = facts.get("source"), facts.get("version")
     if not isinstance(source, str) or len(source) > 200 or not isinstance(version, int) or not 0 < version < 2**31:
         raise ValueError("it says nothing of itself that can be read")
+    kernels = facts.get("kernels")
+    known = (
+        isinstance(kernels, list) and len(kernels) < 100 and all(isinstance(m, str) and len(m) < 200 for m in kernels)
+    )
     return {
         "reference": facts.get("reference") is True, "source": source, "learned_from": facts.get("learned_from", []),
-        "version": version, "kernels": facts.get("kernels") is not False,
+        "version": version, "kernels": tuple(kernels) if known else (ALL,),
     }  # fmt: skip

@@ -14,7 +14,7 @@ from simnav.estimator import Estimator, EstimatorError, UnsuitableScenario
 from simnav.estimator.looking_back import inner_of
 from simnav.leaderboard.campaign.fingerprint import own_code
 from simnav.leaderboard.campaign.request import file_of
-from simnav.leaderboard.campaign.sources import may_call_kernels
+from simnav.leaderboard.campaign.sources import kernel_modules
 from simnav.leaderboard.campaign.training_runs import declared_ranges
 from simnav.leaderboard.results.errors import named
 from simnav.trial import describe_failure
@@ -94,7 +94,7 @@ class _Session:
             cls = entrant.find()
             facts = {
                 "reference": bool(cls.reference), "source": own_code(cls), "learned_from": [],
-                "version": cls.version, "kernels": may_call_kernels(file_of(entrant.name)),
+                "version": cls.version, "kernels": kernel_modules(file_of(entrant.name)),
             }  # fmt: skip
             try:
                 facts["learned_from"] = declared_ranges(entrant.make())

@@ -1,7 +1,7 @@
 """The server of a worker: nothing secret, forks an estimator process for each run.
 
 It is started as ``python -m simnav.leaderboard.campaign.confinement.server DESCRIPTOR``, where the descriptor is a Unix
-socket to the worker. It is asked, in JSON, to load the kernels, to fork (descriptors of the pipes come with it, and of
+socket to the worker. It is asked, in JSON, to load kernels, to fork (descriptors of the pipes come with it, and of
 a control group where there is one), to finish with the process that it forked, and to import libraries before the next
 fork. Kernels are loaded before the first estimator that may call them, and not in the time of any. The server watches
 what the process takes with all that it starts, kills all that is left of it, and is gone when the worker is. If its own
@@ -50,6 +50,7 @@ from .limits import (
     resident,
     use_huge_pages,
 )
+from .reachable_kernels import reachable_kernels
 from .watch import Watch
 
 __all__ = ["COPY_FROM", "main"]
@@ -85,7 +86,7 @@ def _serve(control: socket.socket, own: Path, copied_from: str) -> None:
             if request is None or ("fork" in request and own_settings() != settings):
                 return
             if "load" in request:
-                _load_kernels(copied_from)
+                _load_kernels(copied_from, request["load"])
                 control.sendall(json.dumps({"ready": True}).encode())
             if "fork" in request:
                 if hidden != request["fork"]["hidden"]:
@@ -112,17 +113,17 @@ def _import_estimators() -> None:
     _settle_memory()
 
 
-def _load_kernels(copied_from: str) -> None:
-    """All kernels of simnav's own estimators, from a folder that cannot be written to if there is one."""
-    from simnav.compiled import cache_directory, kernels
+def _load_kernels(copied_from: str, modules: list[str]) -> None:
+    """Kernels that estimators of some modules may call, from a folder that cannot be written to if there is one."""
+    from simnav.compiled import cache_directory
 
-    target = cache_directory()
+    wanted, target = reachable_kernels(modules), cache_directory()
     if copied_from and target is not None:
         shutil.rmtree(target, ignore_errors=True)  # nothing that an estimator may have put there is loaded
-        for part in {k.fingerprint() for kernel in kernels() for k in kernel.tree()}:
+        for part in {k.fingerprint() for kernel in wanted for k in kernel.tree()}:
             with contextlib.suppress(OSError):
                 shutil.copytree(Path(copied_from) / part, target / part)
-    for kernel in kernels():
+    for kernel in wanted:
         kernel.compile()
     if copied_from and target is not None:
         shutil.rmtree(target, ignore_errors=True)

@@ -13,7 +13,7 @@ import struct
 import subprocess
 import sys
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -31,6 +31,7 @@ from .kinds import homes_of_kinds
 from .limits import why_it_died
 from .memory_group import MemoryGroup
 from .messages import LARGEST, Down, Up, command
+from .reachable_kernels import ALL
 from .watch import PROCESSES
 
 if TYPE_CHECKING:
@@ -110,8 +111,8 @@ class EstimatorServer:
         A process of its own, or that in a sandbox of bubblewrap.
     hidden : sequence of Path
         What estimators must not read: the folder of the results, and the file of a secret key.
-    loaded : bool
-        Load all kernels at once; without it they are loaded before the first estimator that may call them.
+    loaded : sequence of str
+        Load the kernels of these modules at once (`reachable_kernels`).
     sealed : bool
         Keep nothing that estimators write from one campaign to the next.
 
@@ -133,7 +134,9 @@ class EstimatorServer:
         If it does not start.
     """
 
-    def __init__(self, confinement: str, hidden: Sequence[Path] = (), *, loaded: bool = True, sealed: bool = False):
+    def __init__(
+        self, confinement: str, hidden: Sequence[Path] = (), *, loaded: Sequence[str] = (ALL,), sealed: bool = False
+    ):
         self._landlock = landlock.available()
         self.confinement = confinement if confinement != "process" or not self._landlock else "landlock"
         self.hidden, self.sealed, self.used = tuple(hidden), sealed, False
@@ -154,10 +157,10 @@ class EstimatorServer:
         finally:
             theirs.close()
         self._control = ours
-        self._awaited, self._started, self._loaded = 1, False, False
+        self._awaited, self._started = 1, False
+        self._loaded: set[str] = set()
         self._group = MemoryGroup()
-        if loaded:
-            self.load()
+        self.load(loaded)
 
     @property
     def process_id(self) -> int:
@@ -200,12 +203,13 @@ class EstimatorServer:
         same = self.confinement == confinement or (confinement == "process" and self.confinement == "landlock")
         return same and (confinement != "bubblewrap" or tuple(hidden) == self.hidden) and self._process.poll() is None
 
-    def load(self) -> None:
-        """Ask for all kernels, once; it begins at once, and `wait_until_ready` waits for the end."""
-        if not self._loaded:
-            self._loaded = True
+    def load(self, modules: Iterable[str]) -> None:
+        """Ask for the kernels of some modules, once; it begins at once, and `wait_until_ready` waits for the end."""
+        missing = sorted(set(modules) - self._loaded)
+        if missing and ALL not in self._loaded:
+            self._loaded.update(missing)
             with contextlib.suppress(OSError):  # it is gone: whoever waits for it is told
-                self._control.sendall(json.dumps({"load": True}).encode())
+                self._control.sendall(json.dumps({"load": missing}).encode())
             self._awaited += 1
 
     def wait_until_ready(self) -> None:

@@ -31,7 +31,7 @@ from simnav.leaderboard.campaign.confinement.limits import resident
 from simnav.leaderboard.campaign.confinement.server import _load_kernels as load_kernels
 from simnav.leaderboard.campaign.confinement.session import EstimatorServer, Limits, NoAnswerError
 from simnav.leaderboard.campaign.entrant import Entrant
-from simnav.leaderboard.campaign.sources import may_call_kernels
+from simnav.leaderboard.campaign.sources import kernel_modules
 from simnav.recording import Recording
 from simnav.scenario import load
 from simnav.source import record
@@ -89,7 +89,7 @@ def entrant(name: str, **parameters: Any) -> Entrant:
 
 
 #: One that loads the few kernels that it calls by itself.
-QUICK = replace(entrant("gnss-only"), kernels=False)
+QUICK = replace(entrant("gnss-only"), kernels=())
 
 
 def same(a: Trial, b: Trial) -> None:
@@ -245,13 +245,13 @@ def test_how_a_process_ended_is_told(server: EstimatorServer, recording: Recordi
 def test_kernels_are_loaded_when_the_first_one_may_call_them(recording: Recording) -> None:
     close_server()
     try:
-        server = prepare("process", (), loaded=False)
+        server = prepare("process", (), loaded=())
         server.wait_until_ready()
         before = resident(server.process_id)
-        assert prepare("process", (), loaded=True) is server
+        assert prepare("process", (), loaded=("simnav",)) is server
         server.wait_until_ready()
         assert resident(server.process_id) > 1.2 * before
-        assert prepare("process", (), loaded=False) is server  # and it keeps them
+        assert prepare("process", (), loaded=()) is server  # and it keeps them
         assert attempt(server, entrant("ekf"), recording, Limits(60.0, 1 << 30)).status == "ok"
     finally:
         close_server()
@@ -277,7 +277,7 @@ def test_a_server_loads_no_kernel_that_an_estimator_left(tmp_path: Path, monkeyp
             monkeypatch.setattr(
                 "simnav.compiled.Kernel.compile", lambda self: read.append(planted.read_bytes() == ours.read_bytes())
             )
-            load_kernels(str(given))
+            load_kernels(str(given), ["simnav"])
             code = 0 if read and all(read) and not target.exists() else 2
         finally:
             os._exit(code)
@@ -285,38 +285,38 @@ def test_a_server_loads_no_kernel_that_an_estimator_left(tmp_path: Path, monkeyp
 
 
 def test_a_server_that_is_gone_before_its_kernels_are_loaded_is_no_failure_of_an_estimator() -> None:
-    server = EstimatorServer("process", loaded=False)
+    server = EstimatorServer("process", loaded=())
     server.wait_until_ready()
     os.kill(server.process_id, signal.SIGKILL)
-    server.load()
+    server.load(["simnav"])
     with pytest.raises(NoAnswerError, match="did not answer"):
         server.wait_until_ready()
     server.close()
 
 
 @pytest.mark.parametrize(
-    ("text", "may"),
+    ("text", "modules"),
     [
-        ("import os, tempfile\nimport numpy as np\nfrom simnav import Estimate, Estimator", False),
-        ("from simnav.types import Instruments\nfrom scipy.linalg import expm", False),
-        ("from beside import nothing", False),
-        ("from beside_too import row", True),
-        ("import simnav", True),
-        ("from simnav import Estimator, make", True),
-        ("from simnav.estimators.rows.kalman import Ekf", True),
-        ("def later():\n    import somebody_elses", True),
-        ("import importlib\nimportlib.import_module('sim' + 'nav')", True),
+        ("import os, tempfile\nimport numpy as np\nfrom simnav import Estimate, Estimator", []),
+        ("from simnav.types import Instruments\nfrom scipy.linalg import expm", []),
+        ("from beside import nothing", []),
+        ("from beside_too import row", ["simnav.estimators"]),
+        ("import simnav", ["simnav"]),
+        ("from simnav import Estimator, make", ["simnav.make"]),
+        ("from simnav.geometry.earth import displace", ["simnav.geometry.earth"]),
+        ("def later():\n    import somebody_elses", ["simnav"]),
+        ("import importlib\nimportlib.import_module('sim' + 'nav')", ["simnav"]),
     ],
 )
-def test_who_may_call_kernels(text: str, may: bool, tmp_path: Path) -> None:
+def test_of_which_modules_an_estimator_may_call_kernels(text: str, modules: list[str], tmp_path: Path) -> None:
     (tmp_path / "beside.py").write_text("import json")
     (tmp_path / "beside_too.py").write_text("import simnav.estimators")
     (tmp_path / "mine.py").write_text(text)
-    assert may_call_kernels(str(tmp_path / "mine.py")) == may
+    assert kernel_modules(str(tmp_path / "mine.py")) == modules
 
 
-def test_who_is_in_no_file_may_call_kernels() -> None:
-    assert may_call_kernels("")
+def test_who_is_in_no_file_may_call_all_kernels() -> None:
+    assert kernel_modules("") == ["simnav"]
 
 
 @pytest.mark.parametrize("losses", [1, 2])
@@ -497,7 +497,7 @@ def test_a_server_whose_limits_were_changed_starts_nobody(recording: Recording) 
     resource = pytest.importorskip("resource")
     if not hasattr(resource, "prlimit"):
         pytest.skip("limits of another process cannot be changed here")
-    server = EstimatorServer("process", loaded=False)
+    server = EstimatorServer("process", loaded=())
     try:
         server.wait_until_ready()
         hard = resource.prlimit(server.process_id, resource.RLIMIT_NOFILE)[1]
@@ -531,7 +531,7 @@ def test_a_sealed_run_has_a_server_of_its_own(recording: Recording) -> None:
         made = attempt_module.try_estimator(QUICK, recording, Limits(60.0, 1 << 30), "process", sealed=True)
         assert made.status == "ok"
         assert attempt_module._server is None
-        servers.add(prepare("process", (), loaded=False, sealed=True).process_id)
+        servers.add(prepare("process", (), loaded=(), sealed=True).process_id)
     close_server()
     assert len(servers) == 2
 

@@ -61,7 +61,7 @@ def recording() -> Recording:
 
 @pytest.fixture(scope="module", params=["counted by the kernel", "counted by the server"])
 def server(request: pytest.FixtureRequest) -> Iterator[EstimatorServer]:
-    made = EstimatorServer("process", loaded=False)
+    made = EstimatorServer("process", loaded=())
     if "server" in request.param:
         made._group.close()
     elif made._group.joining < 0:
