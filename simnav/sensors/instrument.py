@@ -94,6 +94,9 @@ class AidSpec(Spec):
         A table of a scenario file with an instrument of this kind; set by `register_instrument`.
     errors : tuple of str
         Names of the error fields; each may also exist with the prefix ``fixed_``. All are zero for an ideal instrument.
+    charts : tuple of str
+        Names of the parts of the surroundings whose chart (`simnav.world.SurroundingSpec.chart`) estimators receive, in
+        ``Datasheet.details``.
     unstated : tuple of str
         The error fields whose one-sigma figure is in no datasheet. Only the oracles know it, see
         `simnav.scenario.Scenario.actual_sheet`.
@@ -118,6 +121,7 @@ class AidSpec(Spec):
     errors: ClassVar[tuple[str, ...]] = (
         "sigma", "bias", "bias_instability", "scale", "misalignment", "lever_arm_sigma",
     )  # fmt: skip
+    charts: ClassVar[tuple[str, ...]] = ()
     unstated: ClassVar[tuple[str, ...]] = ()
     #: See `simnav.spec.without_later`.
     later: ClassVar[Mapping[str, Any]] = {"processes": (), "lever_arm_sigma": ZERO, "timing": None}
