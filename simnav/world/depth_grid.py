@@ -24,7 +24,9 @@ __all__ = ["DepthGrid", "grid_of"]
 
 #: Steps of Newton's method for a ray that is not vertical, and the least rate of approach to the bottom, in metres of
 #: depth for each metre of the ray.
-_STEPS, _GRAZING = 6, 0.1
+_STEPS, _GRAZING = 8, 0.1
+#: A ray has arrived where the bottom is so near [m].
+_ARRIVED = 1e-6
 #: Charts that are kept as grids.
 _MOST_KEPT = 16
 _kept: dict[int, tuple[Any, DepthGrid]] = {}
@@ -138,12 +140,17 @@ class DepthGrid:
         distance = (found - depth) / np.maximum(ray[:, 2], _GRAZING)
         if level:
             return distance, gradient, np.ones(len(distance), np.bool_)
-        for step in range(_STEPS):
-            found, gradient = self.at(offset + distance[:, None] * ray[:, :2])
-            above = found - depth - distance * ray[:, 2]
-            closing = ray[:, 2] - np.sum(gradient * ray[:, :2], axis=1)
-            if step < _STEPS - 1:
-                distance = distance + above / np.maximum(closing, _GRAZING)
+        above, closing = np.full(len(distance), np.inf), np.empty(len(distance))
+        moving = np.arange(len(distance))
+        for _ in range(_STEPS):  # a ray that has arrived stays as it is, whatever other rays do
+            there, down = distance[moving], ray[moving, 2]
+            found, gradient[moving] = self.at(offset[moving] + there[:, None] * ray[moving, :2])
+            above[moving] = found - depth[moving] - there * down
+            closing[moving] = down - np.sum(gradient[moving] * ray[moving, :2], axis=1)
+            moving = moving[abs(above[moving]) > _ARRIVED]
+            if not len(moving):
+                break
+            distance[moving] += above[moving] / np.maximum(closing[moving], _GRAZING)
         return distance, gradient, (abs(above) < 1e-3) & (closing > _GRAZING)
 
     def chart(self) -> dict[str, Any]:
