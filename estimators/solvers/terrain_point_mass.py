@@ -75,6 +75,7 @@ class TerrainPointMass(KalmanEstimator):
 
     pieces: ClassVar[tuple[str, ...]] = ("model",)
     assimilates: ClassVar[bool] = False
+    slow = True
 
     def __init__(self, model: InertialModel, nodes: int = 20000, outliers: float = 1e-3):
         super().__init__(model)

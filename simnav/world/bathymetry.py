@@ -268,9 +268,9 @@ def _of_file(spec: Bathymetry, modified: int) -> DepthGrid:
             f"nodes of this kind; latitude_deg, longitude_deg and extent_m should take a part of water"
         )
     middle = np.array([0.5 * (latitude[0] + latitude[-1]), 0.5 * (longitude[0] + longitude[-1]), 0.0])
-    meridian, prime = (float(r) for r in principal_radii(middle[0]))
+    along, across = (float(radius) for radius in principal_radii(middle[0]))
     steps = (latitude[-1] - latitude[0]) / (len(latitude) - 1), (longitude[-1] - longitude[0]) / (len(longitude) - 1)
-    spacing = np.array([steps[0] * meridian, steps[1] * prime * cos(middle[0])])
+    spacing = np.array([steps[0] * along, steps[1] * across * cos(middle[0])])
     return DepthGrid(middle, spacing, np.ascontiguousarray(depth))
 
 

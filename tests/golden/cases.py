@@ -148,7 +148,7 @@ CASES = {
     "soundings of an altimeter and a profile, some of them false": Case("terrain-rough", 12.0, (
         _fault("bias_step", "altimeter", 5.0, 8.0, offset_m=3.0),
         _fault("outage", "profile", 4.0, 7.0, channels=["1", "3"]),
-    ), instruments={"profile": {
+    ), slow=True, instruments={"profile": {
         "kind": "multibeam_profile", "rate_hz": 0.25, "beams": 3, "swath_deg": 60.0, "beam_width_deg": 4.0,
         "false_readings": 0.1, "chart_error_m": 0.2, "sound_speed_percent": 0.1, "axis": "vertical",
     }}),
