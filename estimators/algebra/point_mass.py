@@ -8,7 +8,8 @@ its transform at the angles k is ::
     exp(-a (1 - cos k1) - b (1 - cos k2) - c (1 - cos(k1 +- k2))),   c = |s12|, a = s11 - c, b = s22 - c
 
 with the sign of s12. Where a or b is negative the covariance is still exact, and negative masses are left out. Masses
-far below the largest one are dropped, and the lattice is refined or coarsened by factors of two, with the mean kept.
+far below the largest one are dropped. The lattice is refined by a factor of two, with the mean kept, and a noise that
+is wide beside the steps makes a new one.
 
 Source: N. Bergman, *Recursive Bayesian Estimation: Navigation and Tracking Applications*, Linkoping Studies in Science
 and Technology, Dissertations 579, 1999, chapter 5 (the point-mass filter and its adaptive mesh); T. Lindeberg,
@@ -34,8 +35,10 @@ __all__ = ["PointMass"]
 _LEAST = 1e-9
 #: Standard deviations that the lattice of a Gaussian covers on either side, and its steps for each of them.
 _COVERED, _STEPS = 5.0, 3.0
-#: Noise of more than so many steps is added to a coarser lattice; noise below the second figure is left out.
+#: Noise of more than so many steps is added on a new lattice; noise of a square below the second figure is left out.
 _WIDE, _NONE = 3.0, 1e-12
+#: On a new lattice the noise in each direction is at least this part of a step.
+_NARROW = 0.6
 
 
 @dataclass
@@ -128,11 +131,11 @@ class PointMass:
 
     def diffuse(self, covariance: Array) -> None:
         """Add Gaussian noise with a (2, 2) covariance."""
-        s = self._in_steps(covariance)
-        while max(s[0, 0], s[1, 1]) > _WIDE**2:
-            covariance = covariance - 0.5 * self.basis @ self.basis.T  # what a coarser lattice adds
-            self.coarsen()
-            s = self._in_steps(covariance)
+        inverse = np.linalg.inv(self.basis)
+        s = inverse @ covariance @ inverse.T
+        if max(s[0, 0], s[1, 1]) > _WIDE**2:
+            self._spread(covariance)
+            return
         if max(s[0, 0], s[1, 1]) < _NONE:
             return
         pad = 1 + ceil(6.0 * sqrt(max(s[0, 0], s[1, 1])))
@@ -148,9 +151,25 @@ class PointMass:
         self.weight = np.asarray(spread[: weight.shape[0], : weight.shape[1]])
         self.crop()
 
-    def _in_steps(self, covariance: Array) -> Array:
-        inverse = np.linalg.inv(self.basis)
-        return np.asarray(inverse @ covariance @ inverse.T)
+    def _spread(self, covariance: Array) -> None:
+        """Add noise that is wide beside the steps: on a new lattice along its axes, with steps of half its width.
+
+        Across a noise that is narrow the steps stay what they were, and the noise is at least `_NARROW` of them.
+        """
+        square, axes = np.linalg.eigh(covariance)
+        sigma = np.sqrt(np.maximum(square, 0.0))
+        step = np.maximum(0.5 * sigma, np.linalg.norm(axes.T @ self.basis, axis=1))
+        width = np.maximum(sigma, _NARROW * step)
+        index = np.nonzero(self.active)
+        place, weight = self.places(index) @ axes, self.weight[index]
+        first = place.min(axis=0) - _COVERED * width
+        count = np.ceil((place.max(axis=0) + _COVERED * width - first) / step).astype(int) + 1
+        along, across = (
+            np.exp(-0.5 * ((first[k] + step[k] * np.arange(count[k]) - place[:, k : k + 1]) / width[k]) ** 2)
+            for k in range(2)
+        )
+        self.weight, self.origin, self.basis = along.T @ (weight[:, None] * across), axes @ first, axes * step
+        self.crop()
 
     def crop(self) -> None:
         """Drop small masses, and the rows and columns at the edges that have none."""
@@ -171,20 +190,4 @@ class PointMass:
             fine[1::2] = 0.5 * (weight[:-1] + weight[1:])
             weight = fine.T
         self.weight, self.basis = weight, 0.5 * self.basis
-        self.crop()
-
-    def coarsen(self) -> None:
-        """Double the steps; the mass between two nodes that stay goes to both in halves.
-
-        This adds half the square of the steps before to the covariance.
-        """
-        weight = self.weight
-        for _ in range(2):
-            odd = weight.shape[0] % 2
-            padded = np.pad(weight, ((2, 3 - odd), (0, 0)))
-            kept = padded[2:-1:2] + 0.5 * (padded[1:-2:2] + padded[3::2])
-            kept = np.concatenate([0.5 * padded[1:2], kept])
-            weight = kept.T
-        self.origin = self.origin - 2.0 * self.basis @ np.ones(2)
-        self.weight, self.basis = weight, 2.0 * self.basis
         self.crop()

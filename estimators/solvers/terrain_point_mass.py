@@ -170,7 +170,7 @@ class TerrainPointMass(KalmanEstimator):
         assert isinstance(own, OwnObservation)
         observations = KINDS[sheet.kind].observations
         assert observations is not None
-        point = own.point(m.time, *model.state_of_own(), m.side)  # type: ignore[call-arg]
+        point = own.point(m.time, *model.state_of_own(), m.side)
         k = len(place)
 
         def many(array: Array) -> Array:

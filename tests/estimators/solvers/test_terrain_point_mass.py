@@ -57,6 +57,15 @@ def test_it_finds_its_place_over_terrain_and_keeps_the_bound() -> None:
     assert 0.3 < np.sqrt(np.mean(squares) / bound) < 1.8
 
 
+def test_false_soundings_do_not_move_it() -> None:
+    """A quarter of the soundings is of something above the bottom."""
+    recording = record(over_terrain(40.0, position=8.0, sounder={"false_readings": 0.25}), 9)
+    assert 5 < np.count_nonzero(recording.data.aids["sounder"].faults) < 20
+    trial = run("terrain-pmf", recording, nodes=4000)
+    error = errors(trial, recording)[20:, :2]
+    assert np.hypot(*error.T).max() < 5.0
+
+
 def test_it_says_what_it_needs_and_which_parameters_are_wrong() -> None:
     assert ("altimeter", "multibeam_profile") in make("terrain-pmf").needs
     recording, row = record(over_terrain(2.0), 1), make("terrain-pmf")
