@@ -14,7 +14,7 @@ from simnav.scenario.catalogue import headers
 
 
 def test_the_profiles_that_come_with_simnav():
-    assert profiles() == ["coloured", "full", "quick", "robustness", "satellites", "smoke", "standard"]
+    assert profiles() == ["coloured", "full", "quick", "robustness", "satellites", "smoke", "standard", "terrain"]
     known, rows = {h.name: h for h in headers()}, names()
     for name in profiles():
         profile = read_profile(name)
