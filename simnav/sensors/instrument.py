@@ -35,16 +35,7 @@ from simnav.recording import AidStream
 from simnav.sensors.block_values import BlockValues, check_blocks
 from simnav.sensors.error_processes import AnyErrorProcess, TotalError, declared_processes, labels_of, white_of
 from simnav.sensors.errors import InstrumentError, label_of, raised
-from simnav.sensors.figures import (
-    PROCESSES,
-    ZERO,
-    Pair,
-    SigmaPair,
-    SigmaTriple,
-    Triple,
-    figures_of,
-    times_datasheet,
-)  # fmt: skip
+from simnav.sensors.figures import PROCESSES, ZERO, Pair, SigmaPair, SigmaTriple, Triple, figures_of, times_datasheet
 from simnav.sensors.processes import GaussMarkov
 from simnav.sensors.rows import checked_reading, checked_rows
 from simnav.sensors.timing import TimingSpec
