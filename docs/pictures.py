@@ -1,8 +1,8 @@
-"""Pictures of the guides: a voyage on which a receiver is deceived, the first estimator of the tutorial, and a sweep.
+"""Pictures of the documentation: runs, the first estimator of the tutorial, and a sweep.
 
 ``python docs/pictures.py`` draws them. The command ``simnav run gnss-spoofing -e ekf,gnc-fgo --plot`` shows all of the
-first run. The second picture is that of the command in the tutorial, of the file that is printed there. The third
-is made from the sweep that comes with the standard result.
+run on which a receiver is deceived. The estimator of the tutorial, and the scenario of the guide, are those that are
+printed there. The sweep is that of the standard result. Other pictures are a part of what ``simnav run`` draws.
 """
 
 from __future__ import annotations
@@ -14,11 +14,13 @@ import tempfile
 from pathlib import Path
 
 import numpy as np
+from matplotlib.figure import Figure
 from PIL import Image
 
 import simnav
 from simnav.leaderboard.figures.frames import shade
 from simnav.leaderboard.figures.run_figure import fault_spans, fixes, relative_track, true_track
+from simnav.leaderboard.figures.stanford import stanford_diagrams
 from simnav.leaderboard.figures.style import Style, figure, fitted, save, styled
 from simnav.leaderboard.figures.sweep_figure import Line, error_against_dial
 from simnav.leaderboard.standard.drawn import DRAWN
@@ -28,6 +30,13 @@ SCENARIO, ROWS, SEED = "gnss-spoofing", ("ekf", "gnc-fgo"), 0
 DOCS = Path(__file__).parent
 PICTURE = DOCS / "figures" / "faulty-voyage"
 AROUND = 40.0  # metres around the largest error that the map shows
+#: Pictures that are a part of what ``simnav run SCENARIO -e ROWS --plot`` draws: from where to where, as shares of the
+#: height from above.
+PARTS = {
+    "satellites": ("satellites-harbour", ("ekf", "ekf-loose"), (0.685, 1.0)),
+    "acoustic-positioning": ("usbl-inspection", ("ekf", "gnc-fgo"), (0.0, 0.44)),
+    "oracle": ("gnss-multipath", ("ekf", "iae", "oracle"), (0.0, 0.48)),
+}
 
 
 def draw() -> None:
@@ -69,17 +78,40 @@ def draw() -> None:
         save(fig, PICTURE, formats=("png",))
 
 
+def printed(page: str, language: str, name: str, folder: str) -> Path:
+    """The first file of a page, written into a folder."""
+    text = (DOCS / page).read_text(encoding="utf-8")
+    source = re.search(rf"^```{language}\n(.*?)^```", text, re.DOTALL | re.MULTILINE)
+    assert source is not None
+    file = Path(folder) / name
+    file.write_text(source[1], encoding="utf-8")
+    return file
+
+
+def write(fig: Figure, name: str, part: tuple[float, float] = (0.0, 1.0)) -> None:
+    """Write a figure as wide as a page, or a part of its height, with few colours."""
+    (written,) = save(fitted(fig, 220.0), DOCS / "figures" / name, formats=("png",))
+    image = Image.open(written).convert("RGB")
+    image = image.crop((0, int(part[0] * image.height), image.width, int(part[1] * image.height)))
+    image.quantize(128, dither=Image.Dither.NONE).save(written, optimize=True)
+
+
+def draw_parts() -> None:
+    """Runs of guides, Stanford diagrams, and the scenario that a guide prints."""
+    for name, (scenario, rows, part) in PARTS.items():
+        write(simnav.run(scenario, list(rows)).plot(), name, part)
+    found = simnav.run("harbour-multipath", ["ekf", "gnc-fgo", "solution-separation"])
+    write(stanford_diagrams(found.stanford(), title="harbour-multipath-v1"), "integrity")
+    with tempfile.TemporaryDirectory() as folder:
+        file = printed("how-to/write-a-scenario.md", "toml", "channel.toml", folder)
+        write(simnav.run(str(file), ["ship-ekf", "gnss-only"]).plot(), "channel", (0.0, 0.53))
+
+
 def draw_first_estimator() -> None:
     """Run the estimator of the tutorial as the tutorial does, and write the picture."""
-    page = (DOCS / "tutorials" / "first-estimator.md").read_text(encoding="utf-8")
-    source = re.search(r"^```python\n(.*?)^```", page, re.DOTALL | re.MULTILINE)
-    assert source is not None
     with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / "alpha_beta.py"
-        file.write_text(source[1], encoding="utf-8")
-        report = simnav.run("ship-straight", [str(file), "ship-ekf"])
-    (written,) = save(fitted(report.plot(), 220.0), DOCS / "figures" / "first-estimator", formats=("png",))
-    Image.open(written).convert("RGB").quantize(128, dither=Image.Dither.NONE).save(written, optimize=True)
+        file = printed("tutorials/first-estimator.md", "python", "alpha_beta.py", folder)
+        write(simnav.run("ship-straight", [str(file), "ship-ekf"]).plot(), "first-estimator")
 
 
 def draw_sweep() -> None:
@@ -105,4 +137,5 @@ def draw_sweep() -> None:
 if __name__ == "__main__":
     draw()
     draw_first_estimator()
+    draw_parts()
     draw_sweep()

@@ -73,8 +73,8 @@ def draw_place(fig: Figure, place: SubplotSpec, view: SkyView) -> None:
     if by_error:
         decimal_log_ticks(scale.ax.xaxis)
     scale.set_label("Largest error of a range [m]" if by_error else "Satellites received")
-    what = "Obstacles with their heights, and the track" if view.outlines else "Track"
-    ax.set(xlabel=EAST, ylabel=NORTH, title=f"{what}; the circle is the start")
+    what = "Obstacles with heights, and track" if view.outlines else "Track"
+    ax.set(xlabel=EAST, ylabel=NORTH, title=f"{what} (circle: start)")
 
 
 def _frame(ax: Axes, view: SkyView) -> None:
