@@ -24,8 +24,11 @@ __all__ = ["NAME", "Header", "ScenarioWarning", "headers"]
 _GROUP = "simnav.scenarios"
 
 #: Kinds of instruments with channels, and how a scenario names one.
-_WITH_CHANNELS = ("gnss_raw", "dvl_beams", "usbl_fix", "acoustic_range")
-_CHANNELS = re.compile(rf"^[^#\n]*\bkind *= *[\"']({'|'.join(_WITH_CHANNELS)})[\"']", re.MULTILINE)
+_WITH_CHANNELS = ("gnss_raw", "dvl_beams", "usbl_fix", "acoustic_range", "altimeter", "multibeam_profile")
+_ANY_OF_THEM = "|".join(_WITH_CHANNELS)
+_CHANNELS = re.compile(
+    rf"^(?:[^#\n]*\bkind *= *[\"'](?:{_ANY_OF_THEM})[\"']|\[instruments\.(?:{_ANY_OF_THEM})\])", re.MULTILINE
+)
 
 #: Names of scenarios: kebab-case.
 NAME = re.compile(r"[a-z][a-z0-9]*(-[a-z0-9]+)*")

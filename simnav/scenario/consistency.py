@@ -12,7 +12,7 @@ from simnav.scenario.description import SMALLEST, Description
 from simnav.sensors import ImuSpec
 from simnav.spec import SpecError, closest
 from simnav.types import KINDS
-from simnav.world.surroundings import OWN_PARTS
+from simnav.world.surroundings import BATHYMETRY, OWN_PARTS
 
 __all__ = ["check"]
 
@@ -88,10 +88,15 @@ def _check_surroundings(s: Description) -> None:
     for name, spec in s.surroundings.items():
         if not _INSTRUMENT.fullmatch(name):
             raise ValueError(f"surroundings.{name}: a name is of lower-case letters, digits and underscores")
-        own = {"sea": s.sea, "current": s.current, "bottom": s.water_depth}.get(name)
+        own = {"sea": s.sea, "current": s.current, "bottom": s.water_depth, BATHYMETRY: s.water_depth}.get(name)
         if own is not None:
-            raise ValueError(f"surroundings.{name}: {OWN_PARTS[name]} says the same; leave out one of both")
+            own_part = OWN_PARTS["bottom" if name == BATHYMETRY else name]
+            raise ValueError(f"surroundings.{name}: {own_part} says the same; leave out one of both")
         _check_no_subnormal(f"surroundings.{name}", spec.model_dump())
+        try:
+            spec.check(name, s.start)
+        except SpecError as error:
+            raise ValueError(str(error)) from None
 
 
 def _check_no_subnormal(where: str, value: Any) -> None:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import replace
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from pydantic import Field, field_validator, model_validator
@@ -18,7 +19,8 @@ from simnav.sensors.error_processes import in_sea
 from simnav.spec import Positive, Spec, entries, quantity
 from simnav.types import Array, Datasheet, Instruments
 from simnav.world import AnySurrounding, AnyVessel, Current, Manoeuvre, Sea, Ship, Start, Surroundings, Vessel, Voyage
-from simnav.world.surroundings import surround
+from simnav.world.depth_grid import DepthGrid
+from simnav.world.surroundings import BATHYMETRY, surround
 
 __all__ = ["LONGEST", "SMALLEST", "TRAINING_ROOT", "Description", "Dial", "InitialError"]
 
@@ -196,12 +198,26 @@ class Description(Spec):
     def instruments_sheet(self) -> Instruments:
         """The datasheets that an estimator receives."""
         imu, stated = self.imu, () if self.log is None else self.log.stated
-        sheets = [spec.datasheet(name) for name, spec in self.aids.items()]
+        sheets = [self._charted(spec.datasheet(name), spec) for name, spec in self.aids.items()]
         return Instruments(
             [replace(sheet, stated=True) if sheet.name in stated else sheet for sheet in sheets],
             imu=None if imu is None else imu.datasheet(),
             step=self.step,
         )
+
+    def chart(self, part: str) -> Mapping[str, Any] | None:
+        """What navigators know of a part of the surroundings; None: nothing."""
+        spec = self.surroundings.get(part)
+        if part == "bottom" and spec is None:
+            spec = self.surroundings.get(BATHYMETRY)
+            if spec is None and self.water_depth is not None:
+                return DepthGrid.level(self.water_depth).chart()
+        return None if spec is None else spec.chart()
+
+    def _charted(self, sheet: Datasheet, spec: AidSpec) -> Datasheet:
+        """A datasheet with the charts that belong to it."""
+        found = {part: chart for part in spec.charts if (chart := self.chart(part)) is not None}
+        return replace(sheet, details={**sheet.details, **found}) if found else sheet
 
     def actual(self) -> Self:
         """The scenario with the true figures of its instruments, after the factors of ``times_datasheet``."""

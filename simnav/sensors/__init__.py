@@ -12,6 +12,7 @@ from typing import Annotated
 
 from simnav.kinds import INSTRUMENTS
 from simnav.sensors.acoustic_range import AcousticRange
+from simnav.sensors.altimeter import Altimeter
 from simnav.sensors.channels import ChannelInstrument
 from simnav.sensors.compass import Gyrocompass, MagneticCompass
 from simnav.sensors.depth import Depth
@@ -26,6 +27,7 @@ from simnav.sensors.gnss_receiver import GnssReceiver, GnssReceiverVelocity
 from simnav.sensors.imu import Imu, ImuSpec
 from simnav.sensors.instrument import AidSpec, Instrument, register_instrument
 from simnav.sensors.magnetic_field import MagneticField
+from simnav.sensors.multibeam_profile import MultibeamProfile
 from simnav.sensors.speed_log import SpeedLog
 from simnav.sensors.terrain import TerrainFix
 from simnav.sensors.usbl_fix import UsblFix
@@ -34,6 +36,7 @@ from simnav.spec import OneOf
 __all__ = [
     "AcousticRange",
     "AidSpec",
+    "Altimeter",
     "AnyFault",
     "AnyInstrument",
     "ChannelInstrument",
@@ -55,6 +58,7 @@ __all__ = [
     "Instrument",
     "MagneticCompass",
     "MagneticField",
+    "MultibeamProfile",
     "SpeedLog",
     "TerrainFix",
     "UsblFix",

@@ -35,16 +35,7 @@ from simnav.recording import AidStream
 from simnav.sensors.block_values import BlockValues, check_blocks
 from simnav.sensors.error_processes import AnyErrorProcess, TotalError, declared_processes, labels_of, white_of
 from simnav.sensors.errors import InstrumentError, label_of, raised
-from simnav.sensors.figures import (
-    PROCESSES,
-    ZERO,
-    Pair,
-    SigmaPair,
-    SigmaTriple,
-    Triple,
-    figures_of,
-    times_datasheet,
-)  # fmt: skip
+from simnav.sensors.figures import PROCESSES, ZERO, Pair, SigmaPair, SigmaTriple, Triple, figures_of, times_datasheet
 from simnav.sensors.processes import GaussMarkov
 from simnav.sensors.rows import checked_reading, checked_rows
 from simnav.sensors.timing import TimingSpec
@@ -94,6 +85,9 @@ class AidSpec(Spec):
         A table of a scenario file with an instrument of this kind; set by `register_instrument`.
     errors : tuple of str
         Names of the error fields; each may also exist with the prefix ``fixed_``. All are zero for an ideal instrument.
+    charts : tuple of str
+        Names of the parts of the surroundings whose chart (`simnav.world.SurroundingSpec.chart`) estimators receive, in
+        ``Datasheet.details``.
     unstated : tuple of str
         The error fields whose one-sigma figure is in no datasheet. Only the oracles know it, see
         `simnav.scenario.Scenario.actual_sheet`.
@@ -118,6 +112,7 @@ class AidSpec(Spec):
     errors: ClassVar[tuple[str, ...]] = (
         "sigma", "bias", "bias_instability", "scale", "misalignment", "lever_arm_sigma",
     )  # fmt: skip
+    charts: ClassVar[tuple[str, ...]] = ()
     unstated: ClassVar[tuple[str, ...]] = ()
     #: See `simnav.spec.without_later`.
     later: ClassVar[Mapping[str, Any]] = {"processes": (), "lever_arm_sigma": ZERO, "timing": None}

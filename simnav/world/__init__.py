@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Annotated
 
 from simnav.spec import OneOf
+from simnav.world.bathymetry import Bathymetry
 from simnav.world.current import Current
 from simnav.world.given_track import GivenTrack, Limits, Poses
 from simnav.world.given_waypoints import GivenVessel, GivenWaypoints
@@ -58,6 +59,7 @@ __all__ = [
     "AnySurrounding",
     "AnyVessel",
     "Auv",
+    "Bathymetry",
     "Current",
     "Dive",
     "Ferry",

@@ -1,11 +1,12 @@
 """The surroundings of a vessel in one run: sea, current, bottom, and parts that third parties register.
 
 The parts are known by name. An instrument receives all of them at once (`simnav.sensors.Instrument.enter`) and asks
-those that it needs, at its place and time; so a new part changes no signature. simnav has three parts:
+those that it needs, at its place and time; so a new part changes no signature. simnav has three parts with tables of
+their own:
 
 - ``sea``, of the table ``[sea]``: `simnav.world.sea.Waves`
 - ``current``, of the table ``[current]``: `simnav.world.current.WaterFlow`
-- ``bottom``, of the key ``water_depth_m``: `FlatBottom`
+- ``bottom``, of the key ``water_depth_m``: `FlatBottom`; a part with the name ``bathymetry`` takes its place
 
 `register_surrounding` registers a kind of part; a scenario has it by a table ``[surroundings.NAME]``
 (``docs/how-to/add-surroundings.md``).
@@ -38,6 +39,8 @@ __all__ = [
 
 #: Tables and keys of a scenario that make the parts of simnav, by the name of the part.
 OWN_PARTS = {"sea": "[sea]", "current": "[current]", "bottom": "water_depth_m"}
+#: The part that is the bottom, too, unless there is another one.
+BATHYMETRY = "bathymetry"
 
 
 class SurroundingsError(SpecError):
@@ -74,6 +77,23 @@ class SurroundingSpec(Spec):
             `FlatBottom`; what other parts can be asked is between them and the instruments that ask.
         """
         raise NotImplementedError(f"{type(self).__qualname__} has no build()")
+
+    def chart(self) -> Mapping[str, Any] | None:
+        """What navigators know of the part: numbers, texts and arrays; None: nothing.
+
+        The datasheet of an instrument that names the part (`simnav.sensors.AidSpec.charts`) has it in its details.
+        """
+        return None
+
+    def check(self, name: str, start: Start | None) -> None:
+        """Check that the part fits the start of the vessel; nothing by default.
+
+        Raises
+        ------
+        ValueError
+            One sentence that names the key, its value, and what would be right.
+        """
+        return
 
 
 SURROUNDINGS: Registry[type[SurroundingSpec]] = Registry("surrounding", "simnav.surroundings", "simnav.world")
@@ -194,4 +214,7 @@ def surround(
         made["current"] = WaterFlow(current, seed, origin)
     if water_depth is not None:
         made["bottom"] = FlatBottom(water_depth)
-    return Surroundings(made | {name: spec.build(name, seed) for name, spec in parts.items()})
+    made |= {name: spec.build(name, seed) for name, spec in parts.items()}
+    if BATHYMETRY in made:
+        made.setdefault("bottom", made[BATHYMETRY])
+    return Surroundings(made)

@@ -29,6 +29,7 @@ OF_EVERY_SORT = (
     "satellites-open-sea",
     "satellites-spoofing",
     "survey-without-bottom-lock",
+    "terrain-rough",
     "training-poor-imu-faults",
     "training-ships",
     "under-ice-transit",

@@ -145,6 +145,13 @@ CASES = {
         "depth_m": [40.0, 42.0, 44.0], "way": "one_way", "clock_s": 0.002, "clock_drift_ppm": 1.0, "sigma_m": 0.1,
         "sound_speed_percent": 0.1, "beacon_error_m": 0.3, "reflections": 0.1,
     }}),
+    "soundings of an altimeter and a profile, some of them false": Case("terrain-rough", 12.0, (
+        _fault("bias_step", "altimeter", 5.0, 8.0, offset_m=3.0),
+        _fault("outage", "profile", 4.0, 7.0, channels=["1", "3"]),
+    ), slow=True, instruments={"profile": {
+        "kind": "multibeam_profile", "rate_hz": 0.25, "beams": 3, "swath_deg": 60.0, "beam_width_deg": 4.0,
+        "false_readings": 0.1, "chart_error_m": 0.2, "sound_speed_percent": 0.1, "axis": "vertical",
+    }}),
     "under water without imu": Case("glider-dive", 60.0, (
         _fault("gross_error", "speed_log", 10.0, 40.0, probability=0.3, size_m_s=[0.5, 1.5]),
         _fault("outage", "gnss", 20.0, 60.0),
