@@ -37,6 +37,7 @@ _TITLES = {
     "coloured": "Errors as they are at sea",
     "satellites": "Satellites, tightly and loosely coupled",
     "acoustic": "Beams and ranges of sound",
+    "cooperative": "Messages of other vessels",
     "recorded": "Recorded voyages",
     "recordings": "Public recordings",
     "papers": "Scenarios of papers",

@@ -24,7 +24,7 @@ __all__ = ["NAME", "Header", "ScenarioWarning", "headers"]
 _GROUP = "simnav.scenarios"
 
 #: Kinds of instruments with channels, and how a scenario names one.
-_WITH_CHANNELS = ("gnss_raw", "dvl_beams", "usbl_fix", "acoustic_range")
+_WITH_CHANNELS = ("gnss_raw", "dvl_beams", "usbl_fix", "acoustic_range", "vessel_range")
 _CHANNELS = re.compile(rf"^[^#\n]*\bkind *= *[\"']({'|'.join(_WITH_CHANNELS)})[\"']", re.MULTILINE)
 
 #: Names of scenarios: kebab-case.

@@ -29,6 +29,7 @@ from simnav.sensors.magnetic_field import MagneticField
 from simnav.sensors.speed_log import SpeedLog
 from simnav.sensors.terrain import TerrainFix
 from simnav.sensors.usbl_fix import UsblFix
+from simnav.sensors.vessel_range import VesselRange
 from simnav.spec import OneOf
 
 __all__ = [
@@ -58,6 +59,7 @@ __all__ = [
     "SpeedLog",
     "TerrainFix",
     "UsblFix",
+    "VesselRange",
     "build_layers",
     "fault_specs",
     "instrument_specs",

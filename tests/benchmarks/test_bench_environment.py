@@ -91,7 +91,7 @@ def begin(env):
 
 def test_the_scenario_has_every_kind_of_instrument(scenario):
     # Left out: so times compare with those of before.
-    later = {"acoustic_range", "dvl_beams", "dvl_solution", "magnetic_field", "usbl_fix"}
+    later = {"acoustic_range", "dvl_beams", "dvl_solution", "magnetic_field", "usbl_fix", "vessel_range"}
     assert {spec.kind for spec in scenario.aids.values()} == set(KINDS) - later
 
 
