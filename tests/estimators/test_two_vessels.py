@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import re
 from functools import cache
 from typing import Any
 
 import numpy as np
 import pytest
 
+from simnav import kinds
 from simnav.estimator import UnsuitableScenario, make
 from simnav.estimators.adaptations.intersection import share, weaken_position
+from simnav.kinds import KINDS, Kind
+from simnav.plugins import PluginError
 from simnav.recording import Recording
 from simnav.scoring.navigation_error import errors
 from simnav.source import record
@@ -100,3 +104,28 @@ def test_it_needs_messages() -> None:
     without = Instruments([s for s in sheet.values() if s.name != "modem"], sheet.imu, sheet.step)
     with pytest.raises(UnsuitableScenario, match="ekf-ci: it needs vessel_range; there is none"):
         make("ekf-ci").reset(recorded(1).start, without)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        (lambda point, sheet: np.ones(2), r"message_noise of kind 'vessel_range'.*'modem:ship'.*shape \(1, 1\).*\[1.0"),
+        (lambda point, sheet: -np.eye(1), r"a covariance of shape \(1, 1\), not \[\[-1.0\]\]"),
+        (lambda point, sheet: point.side[10:] / point.side[10], "raised IndexError"),
+    ],
+)
+def test_a_wrong_noise_of_a_message_is_named(wrong: Any, message: str) -> None:
+    kind = KINDS["vessel_range"]
+    right = kind.message_noise
+    object.__setattr__(kind, "message_noise", wrong)
+    try:
+        trial = run_trial(make("ekf"), recorded(1))
+    finally:
+        object.__setattr__(kind, "message_noise", right)
+    assert re.search(message, trial.reason)
+
+
+def test_a_compiled_equation_has_no_noise_of_a_message() -> None:
+    depth = KINDS["depth"]
+    with pytest.raises(PluginError, match="message_noise has an equation of its own"):
+        Kind("depth", "depth", depth.components, kinds.DEPTH, message_noise=lambda point, sheet: np.eye(1))
