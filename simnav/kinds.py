@@ -42,6 +42,7 @@ __all__ = [
     "Component",
     "Datasheet",
     "Kind",
+    "MessageNoise",
     "NavigationPoint",
     "NavigationPoints",
     "Observation",
@@ -203,6 +204,11 @@ Observations = Callable[[NavigationPoints, "Datasheet"], tuple[Array, Mapping[st
 #: elevation.
 ReadingSigma = Callable[[Array, "Datasheet"], Array]
 
+#: The (d, d) covariance that the error of another navigator adds to the noise of a reading at a state: the side
+#: information says where the other one believes itself to be, and how sure it is. Such errors last from one message to
+#: the next, and may be those of this vessel: see `simnav.estimators.adaptations.intersection`.
+MessageNoise = Callable[[NavigationPoint, "Datasheet"], Array]
+
 
 @dataclass(frozen=True)
 class Component:
@@ -319,6 +325,9 @@ class Kind:
         The sigma of a reading from its side information (`ReadingSigma`). None: it is that of the datasheet.
     observations : callable or None
         The equation for many readings at one time (`Observations`), for a kind whose equation is a function.
+    message_noise : callable or None
+        What the errors of another navigator, whose estimate is in the side information, add to the noise of a reading
+        (`MessageNoise`), for a kind whose equation is a function.
 
     Raises
     ------
@@ -337,6 +346,7 @@ class Kind:
     side: tuple[Component, ...] = ()
     reading_sigma: ReadingSigma | None = None
     observations: Observations | None = None
+    message_noise: MessageNoise | None = None
     _limits: tuple[float, ...] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -369,6 +379,8 @@ class Kind:
             raise PluginError("a kind with a reading_sigma has an equation of its own: a function, not a compiled one")
         if self.observations is not None and not callable(self.equation):
             raise PluginError("a kind with observations has an equation of its own: a function, not a compiled one")
+        if self.message_noise is not None and not callable(self.equation):
+            raise PluginError("a kind with a message_noise has an equation of its own: a function, not a compiled one")
         if self.geodetic and self.values[:2] != ("latitude", "longitude"):
             raise PluginError("the first components of a geodetic kind are latitude and longitude")
         # An angle equal to its limit is still plausible; another quantity equal to its limit is not.

@@ -56,6 +56,10 @@ class Adaptation:
     inflates : bool
         True if all of P is multiplied by ``inflation``. A window has no covariance of a prediction, and refuses such
         an adaptation.
+    inflates_position : bool
+        True if the covariance of the horizontal position is multiplied by ``inflation``, and what is known beside it
+        and independently of it is kept (`simnav.estimators.adaptations.intersection.weaken_position`). ``inflates`` is
+        then true as well.
     inflates_motion : bool
         Whether the covariance of the motion is inflated, and no other (`ErrorModel.loosen`). A window weighs motion by
         its own residuals, and leaves this out.
@@ -65,6 +69,7 @@ class Adaptation:
 
     inflation: float = 1.0
     inflates: bool = False
+    inflates_position: bool = False
     inflates_motion: bool = False
     reads_truth: ClassVar[bool] = False
 

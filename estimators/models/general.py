@@ -118,10 +118,15 @@ class GeneralModel(PointModel, MovingModel):
         if own is None:
             reading = equation_of(sheet).read(point, sheet, errors)
         else:
-            reading = own.read(point._replace(blocks=own.blocks(extra), channel=own.channel, side=side))
+            reading = own.read(self._point(own, x, time, extra, side))
         if reading is None or "bias" not in errors:
             return reading
         return KINDS[sheet.kind].add_error(reading, errors["bias"])
+
+    def _point(self, own: OwnObservation, x: Array, time: float, extra: Array, side: Array) -> NavigationPoint:
+        """The state at which a function predicts a reading."""
+        point = self.navigation(x, time)
+        return point._replace(blocks=own.blocks(extra), channel=own.channel, side=side)
 
     def observes(self, instrument: Datasheet) -> bool:
         """Whether the model uses an instrument."""
@@ -233,6 +238,8 @@ class GeneralModel(PointModel, MovingModel):
         noise, own = self._white[name], self.own.get(name)
         if own is not None and (more := own.reading_noise(measurement.side)) is not None:
             noise = noise + more
+        if own is not None and own.kind.message_noise is not None:
+            noise = noise + own.message_noise(self._point(own, self.x, self.time, self.extra, measurement.side))
         return Linearised(*found, noise)
 
     def correct(self, dx: Array) -> None:

@@ -231,8 +231,8 @@ class OwnObservation:
     def spread(self, own: Array, point: NavigationPoint) -> Array | None:
         """The (d, d) covariance that a reading has beyond the noise of the datasheet; None if there is nothing.
 
-        It is the noise of the blocks that have no state, and the difference of this reading's own noise
-        (`simnav.kinds.Kind.reading_sigma`) from that of the datasheet.
+        It is the noise of the blocks that have no state, the difference of this reading's own noise
+        (`simnav.kinds.Kind.reading_sigma`) from that of the datasheet, and the noise of a message (`message_noise`).
 
         Parameters
         ----------
@@ -243,6 +243,9 @@ class OwnObservation:
             time.
         """
         more = self.reading_noise(point.side)
+        if self.kind.message_noise is not None:
+            said = self.message_noise(point)
+            more = said if more is None else more + said
         if not len(self._free):
             return more
         noise = np.zeros((len(own), len(own))) if more is None else more
@@ -254,8 +257,8 @@ class OwnObservation:
 
     @property
     def has_noise(self) -> bool:
-        """Whether blocks without states add to the noise of a reading."""
-        return bool(len(self._free))
+        """Whether the noise of a reading depends on the state: by blocks without states, or by a message."""
+        return bool(len(self._free)) or self.kind.message_noise is not None
 
     def noise_without_state(self, side: Array) -> Array | None:
         """The (d, d) covariance of `spread` where it depends on the side information only; None if it does not.
@@ -285,6 +288,22 @@ class OwnObservation:
         more = np.zeros((d, d))
         more.flat[:: d + 1] = sigma**2 - self._variance
         return more
+
+    def message_noise(self, point: NavigationPoint) -> Array:
+        """The (d, d) covariance that the error of another navigator adds to a reading (`simnav.kinds.MessageNoise`)."""
+        function, d = self.kind.message_noise, len(self.kind.components)
+        assert function is not None
+        try:
+            noise = np.asarray(function(point, self._given), dtype=np.float64)
+        except Exception as error:
+            message = f"message_noise of kind {self.sheet.kind!r} raised {type(error).__name__}: {error}"
+            raise ValueError(message) from error
+        if noise.shape != (d, d) or not (isfinite(noise.sum()) and noise.diagonal().min() >= 0.0):
+            raise ValueError(
+                f"message_noise of kind {self.sheet.kind!r}, for the instrument {self.sheet.name!r}, should return a "
+                f"covariance of shape {(d, d)}, not {noise.tolist()}"
+            )
+        return noise
 
     def place(self, own: Array, jacobian: Array, offset: int) -> None:
         """Write the columns of the blocks into a (d, n) Jacobian; ``offset`` is the index of the first value in it."""

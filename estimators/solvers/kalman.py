@@ -25,6 +25,7 @@ from typing import ClassVar
 import numpy as np
 
 from simnav.estimators.adaptations.base import Adaptation, Innovation
+from simnav.estimators.adaptations.intersection import weaken_position
 from simnav.estimators.composition import Solver
 from simnav.estimators.models.base import ErrorModel, Linearised, Observation
 from simnav.estimators.models.channels import owners, summary
@@ -215,6 +216,9 @@ class KalmanEstimator(Solver):
             noise, inflation = chosen, self.adaptation.inflation
             if inflation != 1.0 and not self.adaptation.inflates:
                 self.model.loosen(self.covariance, inflation, self._first_variances)
+                residual, cross, predicted, _ = self._observe(m) or observation
+            elif inflation != 1.0 and self.adaptation.inflates_position:
+                weaken_position(self.covariance, inflation)
                 residual, cross, predicted, _ = self._observe(m) or observation
             elif inflation != 1.0:
                 for matrix in (self.covariance, cross, predicted):

@@ -38,6 +38,7 @@ _TITLES = {
     "satellites": "Satellites, tightly and loosely coupled",
     "acoustic": "Beams and ranges of sound",
     "terrain": "Soundings and a chart",
+    "cooperative": "Messages of other vessels",
     "recorded": "Recorded voyages",
     "recordings": "Public recordings",
     "papers": "Scenarios of papers",

@@ -24,7 +24,15 @@ __all__ = ["NAME", "Header", "ScenarioWarning", "headers"]
 _GROUP = "simnav.scenarios"
 
 #: Kinds of instruments with channels, and how a scenario names one.
-_WITH_CHANNELS = ("gnss_raw", "dvl_beams", "usbl_fix", "acoustic_range", "altimeter", "multibeam_profile")
+_WITH_CHANNELS = (
+    "gnss_raw",
+    "dvl_beams",
+    "usbl_fix",
+    "acoustic_range",
+    "vessel_range",
+    "altimeter",
+    "multibeam_profile",
+)
 _ANY_OF_THEM = "|".join(_WITH_CHANNELS)
 _CHANNELS = re.compile(
     rf"^(?:[^#\n]*\bkind *= *[\"'](?:{_ANY_OF_THEM})[\"']|\[instruments\.(?:{_ANY_OF_THEM})\])", re.MULTILINE

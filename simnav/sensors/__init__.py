@@ -31,6 +31,7 @@ from simnav.sensors.multibeam_profile import MultibeamProfile
 from simnav.sensors.speed_log import SpeedLog
 from simnav.sensors.terrain import TerrainFix
 from simnav.sensors.usbl_fix import UsblFix
+from simnav.sensors.vessel_range import VesselRange
 from simnav.spec import OneOf
 
 __all__ = [
@@ -62,6 +63,7 @@ __all__ = [
     "SpeedLog",
     "TerrainFix",
     "UsblFix",
+    "VesselRange",
     "build_layers",
     "fault_specs",
     "instrument_specs",

@@ -39,6 +39,7 @@ from simnav.kinds import Component, Datasheet, Kind, NavigationPoint, geodetic_c
 from simnav.recording import AidStream
 from simnav.sensors.acoustics import AcousticInstrument, AcousticSpec, paths
 from simnav.sensors.instrument import ZERO, Instrument, SigmaTriple, Triple, register_instrument
+from simnav.sensors.way import Way, check_way
 from simnav.spec import NonNegative, Vector, quantity
 from simnav.types import NO_SIDE, Array, TapStates
 from simnav.world.water_column import Figures
@@ -236,16 +237,7 @@ class UsblFix(AcousticSpec):
                 f"transceiver_depth_m = {self.transceiver_depth:g}: the transceiver should be below the surface, so "
                 "the depth above 0"
             )
-        if not len(self.north) == len(self.east) > 0:
-            raise ValueError(
-                f"north_m has {len(self.north)} numbers and east_m {len(self.east)}; each point of the way has one of "
-                "each"
-            )
-        if len(self.north) > 1 and not self.speed:
-            raise ValueError("speed_m_s = 0: a ship with a way of several points needs a speed")
-        steps = np.hypot(np.diff(self.north), np.diff(self.east))
-        if (steps == 0.0).any():
-            raise ValueError("north_m and east_m: two points of the way that follow each other are the same")
+        check_way(self.north, self.east, self.speed)
         return self
 
     def channels(self) -> tuple[str, ...]:
@@ -288,19 +280,13 @@ class _UsblFix(AcousticInstrument):
         super().__init__(spec, name, seed)
         self.spec = spec
         self.origin = np.array([spec.latitude, spec.longitude, -spec.transceiver_depth])
-        self.points = np.stack([spec.north, spec.east], axis=1)
-        legs = np.diff(self.points, axis=0)
-        lengths = np.hypot(legs[:, 0], legs[:, 1])
-        self.begins = np.concatenate([[0.0], np.cumsum(lengths)])
-        self.courses = np.arctan2(legs[:, 1], legs[:, 0]) if len(legs) else np.array([spec.heading])
+        self.way = Way(spec.north, spec.east, spec.speed, spec.heading)
         self._angles = self._stream("transponder", "angles")
 
     def ship(self, time: Array) -> tuple[Array, Array]:
         """(n, 3) true positions of the transceiver and (n,) headings of the ship at n times."""
-        run = np.minimum(self.spec.speed * time, self.begins[-1])
-        north, east = (np.interp(run, self.begins, self.points[:, k]) for k in (0, 1))
-        leg = np.clip(np.searchsorted(self.begins, run, side="right") - 1, 0, len(self.courses) - 1)
-        return displace(self.origin, np.stack([north, east, np.zeros(len(time))], axis=1)), self.courses[leg]
+        offset, heading = self.way.at(time)
+        return displace(self.origin, np.column_stack([offset, np.zeros(len(time))])), heading
 
     def observe(self, tap: TapStates) -> Array:
         """See `ChannelInstrument.observe`."""

@@ -99,6 +99,7 @@ def test_the_scenario_has_every_kind_of_instrument(scenario):
         "magnetic_field",
         "multibeam_profile",
         "usbl_fix",
+        "vessel_range",
     }
     assert {spec.kind for spec in scenario.aids.values()} == set(KINDS) - later
 

@@ -11,6 +11,7 @@ __all__ = ["OF_EVERY_SORT", "used"]
 
 OF_EVERY_SORT = (
     "auv-akit-twin",
+    "auv-and-ship",
     "coastal-voyage",
     "coloured-fixes",
     "depth-in-the-tide",

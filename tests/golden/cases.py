@@ -152,6 +152,20 @@ CASES = {
         "kind": "multibeam_profile", "rate_hz": 0.25, "beams": 3, "swath_deg": 60.0, "beam_width_deg": 4.0,
         "false_readings": 0.1, "chart_error_m": 0.2, "sound_speed_percent": 0.1, "axis": "vertical",
     }}),
+    "messages of a ship and of a second vehicle, some of them lost": Case("auv-and-ship", 16.0, (
+        _fault("bias_step", "modem", 5.0, 9.0, offset_m=6.0),
+        _fault("outage", "second", 7.0, 12.0),
+    ), instruments={"modem": {
+        "kind": "vessel_range", "rate_hz": 0.5, "way": "one_way", "latitude_deg": 54.5, "longitude_deg": 5.0,
+        "north_m": [120.0, -90.0], "east_m": [40.0, 150.0], "speed_m_s": 2.0, "repeats": True, "age_s": 1.0,
+        "position_noise_m": 0.4, "wander_m": 1.0, "wander_time_s": 100.0, "clock_s": 0.0002, "clock_drift_ppm": 0.2,
+        "sigma_m": 0.15, "sound_speed_percent": 0.1, "losses": 0.2, "reflections": 0.1,
+    }, "second": {
+        "kind": "vessel_range", "vessel": "auv-2", "rate_hz": 0.5, "latitude_deg": 54.5, "longitude_deg": 5.0,
+        "north_m": [-60.0, 200.0], "east_m": [80.0, 80.0], "speed_m_s": 1.5, "depth_m": 40.0, "sigma_m": 0.15,
+        "navigation": "dead_reckoning", "position_noise_m": 0.5, "drift_percent": [0.3, 0.8], "walk_m_sqrt_s": 0.03,
+        "fixes_s": [10.0],
+    }}),
     "under water without imu": Case("glider-dive", 60.0, (
         _fault("gross_error", "speed_log", 10.0, 40.0, probability=0.3, size_m_s=[0.5, 1.5]),
         _fault("outage", "gnss", 20.0, 60.0),

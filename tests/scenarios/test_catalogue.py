@@ -74,6 +74,7 @@ def test_every_scenario_tells_its_reader_what_it_is(header: Header):
         "satellites",
         "acoustic",
         "terrain",
+        "cooperative",
     }
     assert scenario.track in tracks | {"training"}
     assert scenario.training == header.training == (scenario.track == "training")
@@ -259,6 +260,7 @@ def test_the_catalogue_is_packaged():
         "satellites",
         "acoustic",
         "terrain",
+        "cooperative",
     ],
 )
 def test_a_track_has_an_estimator_that_suits_all_of_it(track: str):

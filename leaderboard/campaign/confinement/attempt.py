@@ -283,11 +283,9 @@ def describe(server: EstimatorServer, entrant: Entrant, limits: Limits) -> dict[
     source, version = facts.get("source"), facts.get("version")
     if not isinstance(source, str) or len(source) > 200 or not isinstance(version, int) or not 0 < version < 2**31:
         raise ValueError("it says nothing of itself that can be read")
-    kernels = facts.get("kernels")
-    known = (
-        isinstance(kernels, list) and len(kernels) < 100 and all(isinstance(m, str) and len(m) < 200 for m in kernels)
-    )
+    said = facts.get("kernels")
+    known = isinstance(said, list) and len(said) < 100 and all(isinstance(m, str) and len(m) < 200 for m in said)
     return {
         "reference": facts.get("reference") is True, "source": source, "learned_from": facts.get("learned_from", []),
-        "version": version, "kernels": tuple(kernels) if known else (ALL,),
+        "version": version, "kernels": tuple(said or ()) if known else (ALL,),
     }  # fmt: skip

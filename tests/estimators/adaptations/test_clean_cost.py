@@ -14,6 +14,7 @@ import pytest
 
 from simnav.estimator import find, make, names
 from simnav.estimators.models.ship import ShipModel
+from simnav.estimators.models.suitable import WithMessages
 from simnav.estimators.solvers.imm import ImmEstimator
 from simnav.estimators.solvers.window import WindowEstimator
 from simnav.recording import Recording
@@ -28,7 +29,7 @@ SCORES = ("horizontal_rmse", "vertical_rmse", "velocity_horizontal_rmse", "headi
 def plain(name: str) -> str:
     """The row that it is but for its adaptation or weighting; empty for one that has none."""
     recipe = getattr(find(name), "recipe", {})
-    if not recipe or find(name).loose:  # no receiver here
+    if not recipe or find(name).loose or recipe["model"].make is WithMessages:  # no receiver here, and no other vessel
         return ""
     if not {"adaptation", "weighting"} & set(recipe) and recipe["solver"].make is not ImmEstimator:
         return ""
