@@ -19,6 +19,7 @@ from typing import Any, Literal, NamedTuple, get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from simnav.array_units import in_arrays
 from simnav.blocks import StateBlock
 from simnav.compiled import Array, kernel
 from simnav.declared_process import DeclaredProcess
@@ -255,32 +256,6 @@ class Component:
         return f"{value} (error: {self.error} [{in_arrays(self.error_unit)}])"
 
 
-#: Units in which arrays are, for those of files that differ; others of `simnav.spec.UNITS` are SI themselves.
-_IN_ARRAYS = {
-    **dict.fromkeys(("deg", "arcsec", "mrad"), "rad"),
-    **dict.fromkeys(("mm", "cm", "km"), "m"),
-    **dict.fromkeys(("min", "h"), "s"),
-    **dict.fromkeys(("ug", "mg", "g", "mm_s2", "m_s2"), "m/s²"),
-    **dict.fromkeys(("m_s", "mm_s", "cm_s", "kn"), "m/s"),
-    **dict.fromkeys(("deg_s", "deg_min", "deg_h"), "rad/s"),
-    **dict.fromkeys(("", "percent", "ppm"), "-"),
-    "hz": "Hz",
-    "k": "K",
-    "nt": "T",
-}
-
-
-def in_arrays(unit: str) -> str:
-    """The unit in which arrays have a value that is in ``unit`` in files.
-
-    >>> in_arrays("deg"), in_arrays("m_s"), in_arrays("m"), in_arrays("kpa")
-    ('rad', 'm/s', 'm', 'kpa in SI')
-    """
-    if unit in _IN_ARRAYS:
-        return _IN_ARRAYS[unit]
-    return unit if unit in ("m", "s") else f"{unit} in SI"
-
-
 def geodetic_components(*, height: bool) -> tuple[Component, ...]:
     """Components of a position: latitude, longitude and, with ``height``, height. Errors are north-east-down [m]."""
     horizontal = (
@@ -375,12 +350,9 @@ class Kind:
                     f"the equation {self.equation!r} gives {EQUATIONS[self.equation]}: {d} components, "
                     f"not {len(self.components)}"
                 )
-        if self.reading_sigma is not None and not callable(self.equation):
-            raise PluginError("a kind with a reading_sigma has an equation of its own: a function, not a compiled one")
-        if self.observations is not None and not callable(self.equation):
-            raise PluginError("a kind with observations has an equation of its own: a function, not a compiled one")
-        if self.message_noise is not None and not callable(self.equation):
-            raise PluginError("a kind with a message_noise has an equation of its own: a function, not a compiled one")
+        for name in ("reading_sigma", "observations", "message_noise"):
+            if getattr(self, name) is not None and not callable(self.equation):
+                raise PluginError(f"a kind with {name} has an equation of its own: a function, not a compiled one")
         if self.geodetic and self.values[:2] != ("latitude", "longitude"):
             raise PluginError("the first components of a geodetic kind are latitude and longitude")
         # An angle equal to its limit is still plausible; another quantity equal to its limit is not.

@@ -69,7 +69,7 @@ class Standing:
         Versioned id of the scenario, and label of the estimator.
     place : int or None
         The best place among the rows that are no references that it may have: one more than there are rows that are
-        better with a p-value below 5 %. None where the scenario does not suit the estimator.
+        better with a p-value below 5 %. None where the scenario does not suit the estimator, and of a reference.
     last : int or None
         The last place that it may have: so many rows are not worse with such a p-value.
     of : int
@@ -89,7 +89,8 @@ class Standing:
     def places(self) -> str:
         """The places that it may have among all, in words."""
         if self.place is None or self.last is None:
-            return "does not suit it"
+            ran = any(r.estimator == self.estimator for r in self.rows)
+            return "is a reference and has no place" if ran else "does not suit it"
         if self.place == self.last:
             return f"is {self.place} of {self.of}"
         return f"may be {self.place} to {self.last} of {self.of}"

@@ -62,6 +62,13 @@ def test_where_it_does_not_suit_there_is_no_place() -> None:
     assert (found.place, found.last, found.places) == (None, None, "does not suit it")
 
 
+def test_a_reference_has_no_place_but_a_ratio() -> None:
+    told = [replace(r, reference=True) for r in runs("oracle", 1.0, SPREAD)]
+    found = standing(group([*told, *runs("ekf", 1.2, SPREAD)])["pond-v1"], "oracle", "pond-v1")
+    assert (found.place, found.places) == (None, "is a reference and has no place")
+    assert found.verdict("ekf").startswith("oracle is a reference and has no place on pond-v1; its error is 0.8")
+
+
 def test_the_error_of_a_smoother_stands_beside_that_in_real_time() -> None:
     late = [replace(r, scores=dict(r.scores) | {"smoothed_horizontal_rmse": 0.7}) for r in runs("rts", 1.0, SPREAD)]
     table = standing_table(standing(group([*runs("ekf", 1.2, SPREAD), *late])["pond-v1"], "rts", "pond-v1"))
