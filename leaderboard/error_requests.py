@@ -46,7 +46,8 @@ class RealismRequest:
     instrument: Sequence[str] | str | None = option(
         "--instrument",
         default=None,
-        help="Names of instruments, separated by commas, or imu. Default: all but the imu.",
+        help="Names of instruments, separated by commas, or imu; NAME=OTHER where the log has another name. Default: "
+        "all but the imu.",
         cli=list[str] | None,
     )
     runs: int = option("--runs", "-n", default=12, least=3, help="Number of simulated runs.")

@@ -5,10 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 from simnav.recording import AidStream, Block
+from simnav.timing import TIME_TOLERANCE
 
 __all__ = ["Arrivals"]
-
-_TOLERANCE = 0.5e-6  # as `simnav.recording.packets`
 
 
 class Arrivals:
@@ -25,6 +24,6 @@ class Arrivals:
             if waiting is None and not len(stream.arrival):
                 continue
             whole = stream if waiting is None else AidStream.concatenate([waiting, stream])
-            late = whole.arrivals > block.end + _TOLERANCE
+            late = whole.arrivals > block.end + TIME_TOLERANCE
             aids[name], self._waiting[name] = whole.rows(~late), whole.rows(late)
         return replace(block, aids=aids)

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from simnav.declared_process import DeclaredProcess, Factor
 from simnav.labels import FaultLabel
-from simnav.timing import TimingSheet
+from simnav.timing import TIME_TOLERANCE, TimingSheet
 from simnav.types import (
     Array,
     Datasheet,
@@ -388,8 +388,7 @@ def packets(data: Block, ends: Array) -> Iterator[Measurements]:
     Measurements
         The packet of each step: the IMU samples within it, and the aiding measurements that arrive within it.
     """
-    # Times are multiples of the sample interval up to rounding: half a microsecond decides.
-    edges = np.asarray(ends) + 0.5e-6
+    edges = np.asarray(ends) + TIME_TOLERANCE
     streams = list(data.aids.values())
     every = [m for s in streams for m in s.measurements()]
     step = np.concatenate([np.searchsorted(edges, s.arrivals) for s in streams] or [np.empty(0, np.intp)])

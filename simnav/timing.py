@@ -16,7 +16,10 @@ from dataclasses import dataclass
 from math import exp
 from typing import Literal
 
-__all__ = ["TAIL", "Stamped", "TimingSheet"]
+__all__ = ["TAIL", "TIME_TOLERANCE", "Stamped", "TimingSheet"]
+
+#: Times closer than this are one and the same [s]: they are multiples of the sample interval up to rounding.
+TIME_TOLERANCE = 0.5e-6
 
 #: When the stamp is set.
 Stamped = Literal["validity", "arrival"]

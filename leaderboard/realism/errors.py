@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from simnav.kinds import Kind
 from simnav.log.source import LogSource
 from simnav.scenario import Scenario
 from simnav.scenario.residuals import ErrorSeries, instrument_of
@@ -19,8 +20,11 @@ from simnav.types import KINDS
 __all__ = ["ErrorSeries", "comparable", "simulated_errors"]
 
 
-def comparable(simulated: Scenario, recorded: Scenario) -> list[str]:
-    """The instruments that are measured in a log, and that a simulated scenario has under the same name and kind.
+def comparable(simulated: Scenario, recorded: Scenario) -> list[tuple[str, str]]:
+    """Pairs of a simulated instrument and of one that is measured in a log, which measure the same.
+
+    Their kinds are predicted by the same equation and have the same components: a velocity that is solved from beams
+    is like that of a DVL.
 
     Raises
     ------
@@ -29,14 +33,20 @@ def comparable(simulated: Scenario, recorded: Scenario) -> list[str]:
     """
     if recorded.log is None:
         raise SpecError(f"{recorded.id} has no [log]: it is no recording with which a simulation can be compared")
+    logged = recorded.log.instruments
+    measured = {name: spec for name, spec in recorded.aids.items() if logged[name].source != "reference"}
     return [
-        name
-        for name, spec in recorded.aids.items()
-        if recorded.log.instruments[name].source != "reference"
-        and name in simulated.aids
-        and simulated.aids[name].kind == spec.kind
-        and not simulated.aids[name].channels()
+        (name, other)
+        for other, there in measured.items()
+        for name, here in simulated.aids.items()
+        if not here.channels() and _same(here.definition, there.definition)
     ]
+
+
+def _same(one: Kind, other: Kind) -> bool:
+    return one is other or (
+        one.equation == other.equation and one.equation is not None and one.components == other.components
+    )
 
 
 def simulated_errors(scenario: Scenario, name: str, seeds: Iterable[int]) -> list[ErrorSeries]:

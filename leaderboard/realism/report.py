@@ -181,7 +181,8 @@ def realism_of(scenario: Scenario, log: Scenario, instruments: Sequence[str], ru
     log : Scenario
         The recording.
     instruments : sequence of str
-        Names of instruments; empty: all that both have, but for the IMU.
+        Names of instruments, or pairs like ``velocity=dvl`` where the recording has another name; empty: all that both
+        have under one name, but for the IMU.
     runs : int
         Number of simulated runs.
     seed : int
@@ -193,25 +194,31 @@ def realism_of(scenario: Scenario, log: Scenario, instruments: Sequence[str], ru
         If there is no instrument that both have, or there are too few readings.
     """
     both = comparable(scenario, log)
-    known = [*both, *(["imu"] if scenario.imu is not None and log.log is not None and log.log.imu is not None else [])]
+    known = {here if here == there else f"{here}={there}": (here, there) for here, there in both}
+    if scenario.imu is not None and log.log is not None and log.log.imu is not None:
+        known["imu"] = "imu", "imu"
     for name in instruments:
         if name not in known:
             raise SpecError(
-                f"{name!r} is not measured in {log.id} and simulated in {scenario.id} as the same kind"
-                f"{closest(name, known)}"
+                f"{name!r} is not measured in {log.id} and simulated in {scenario.id} with the same equation"
+                f"{closest(name, list(known))}"
             )
-    names = list(instruments) or both
+    names = list(instruments) or [here for here, there in both if here == there]
     if not names:
-        raise SpecError(f"{scenario.id} simulates no instrument, by name and kind, that {log.id} measures")
+        pairs = [f"--instrument {name}" for name in known if name != "imu"]
+        raise SpecError(
+            f"{scenario.id} simulates no instrument, by name and equation, that {log.id} measures"
+            + (f"; give a pair of names: {' or '.join(pairs)}" if pairs else "")
+        )
     seeds = range(seed, seed + runs)
     return RealismReport(
-        scenario.id, log.id, [(_imu if name == "imu" else _aid)(scenario, log, name, seeds) for name in names]
+        scenario.id, log.id, [(_imu if name == "imu" else _aid)(scenario, log, *known[name], seeds) for name in names]
     )
 
 
-def _aid(scenario: Scenario, log: Scenario, name: str, seeds: range) -> InstrumentRealism:
-    real, simulated = residuals(log, name), simulated_errors(scenario, name, seeds)
-    return compared(name, log.aids[name].definition, real, simulated)
+def _aid(scenario: Scenario, log: Scenario, name: str, measured: str, seeds: range) -> InstrumentRealism:
+    real, simulated = residuals(log, measured), simulated_errors(scenario, name, seeds)
+    return compared(name, log.aids[measured].definition, real, simulated)
 
 
 def compared(name: str, kind: Kind, real: Sequence[ErrorSeries], simulated: Sequence[ErrorSeries]) -> InstrumentRealism:
@@ -223,7 +230,7 @@ def compared(name: str, kind: Kind, real: Sequence[ErrorSeries], simulated: Sequ
     )  # fmt: skip
 
 
-def _imu(scenario: Scenario, log: Scenario, name: str, seeds: range) -> InstrumentRealism:
+def _imu(scenario: Scenario, log: Scenario, name: str, _: str, seeds: range) -> InstrumentRealism:
     assert log.log is not None
     real = [_samples(LogSource(log, k)) for k in range(len(list_recordings(log.log)))]
     simulated = [_of(record(scenario, seed).data.imu) for seed in seeds]

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from simnav.compiled import Integers, kernel
 from simnav.geometry.earth import ECCENTRICITY_SQUARED, SEMI_MAJOR_AXIS
+from simnav.timing import TIME_TOLERANCE
 from simnav.types import KINDS, Array
 
 if TYPE_CHECKING:
@@ -324,7 +325,7 @@ def _too_many(name: str, count: int, most: int, time: float) -> ValueError:
 def pack(block: Block, begin: float, most: Mapping[str, int]) -> Stretch:
     """Sort the data of a block into its steps, the first of which begins at ``begin``."""
     truth, n = block.truth, len(block.truth)
-    edges = truth.time + 0.5e-6  # as `simnav.recording.packets`
+    edges = truth.time + TIME_TOLERANCE
     columns: dict[str, dict[str, NDArray[Any]]] = {}
     cuts: dict[str, NDArray[np.intp]] = {}
     parts: dict[str, tuple[NDArray[np.intp], dict[str, Array]]] = {}

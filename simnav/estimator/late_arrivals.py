@@ -26,6 +26,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Literal
 
 from simnav.estimator.contract import Estimator, EstimatorError
+from simnav.timing import TIME_TOLERANCE
 from simnav.types import Estimate, Instruments, Measurement, Measurements
 
 if TYPE_CHECKING:
@@ -51,8 +52,6 @@ Manner = Literal["replay", "arrival", "skip"]
 MANNERS: tuple[Manner, ...] = ("replay", "arrival", "skip")
 #: How far back it goes where no datasheet says how late readings may be [s].
 REACH = 5.0
-
-_TOLERANCE = 0.5e-6  # as `simnav.recording.packets`
 #: A reading that is older than the begin of its step by less than this counts as of that time [s].
 _LATE = 1e-4  # as `simnav.estimators.solvers.admission`
 #: Two stamps of an instrument that are equal are this far apart [s].
@@ -210,7 +209,7 @@ class LateArrivals:
             time = m.time
             if time > end + _LATE:
                 self._waiting.append(m._replace(value=m.value.copy(), side=m.side.copy()))
-            elif time > start + _TOLERANCE or (not self._history and time >= start - _LATE):
+            elif time > start + TIME_TOLERANCE or (not self._history and time >= start - _LATE):
                 present.append(m)
             elif self.manner == "arrival":
                 while any(other.source == m.source and other.time == start for other in present):
@@ -219,7 +218,7 @@ class LateArrivals:
                 present.append(m._replace(time=start))
                 start = measurements.start
                 self.used += 1
-            elif self.manner == "replay" and self._history and time > self._history[0].packet.start + _TOLERANCE:
+            elif self.manner == "replay" and self._history and time > self._history[0].packet.start + TIME_TOLERANCE:
                 late.append(m)
                 self.used += 1
             else:
@@ -279,7 +278,7 @@ class LateArrivals:
         """Put late readings into their steps, and process these and all later ones again."""
         steps, first = self._history, len(self._history)
         for m in late:
-            k = next(k for k in reversed(range(len(steps))) if m.time > steps[k].packet.start + _TOLERANCE)
+            k = next(k for k in reversed(range(len(steps))) if m.time > steps[k].packet.start + TIME_TOLERANCE)
             old = steps[k].packet
             aids = sorted([*old.aids, m._replace(value=m.value.copy(), side=m.side.copy())], key=self._place)
             steps[k].packet = Measurements(old.start, old.time, old.imu, aids)

@@ -24,6 +24,7 @@ from simnav.log.table import LogError, LogWarning
 from simnav.recording import AidStream, Block, ImuLabels
 from simnav.sensors import build_layers, labels
 from simnav.streams import stream as random_stream
+from simnav.timing import TIME_TOLERANCE
 from simnav.types import KINDS, Array, ImuSamples, NavigationStates, ReferenceStates, TapStates
 from simnav.world.initial_state import draw_start
 
@@ -36,9 +37,6 @@ if TYPE_CHECKING:
     from simnav.world import Surroundings
 
 __all__ = ["LogSource"]
-
-#: Half a microsecond decides on which side of an edge a time lies, as in `simnav.recording.packets`.
-_TOLERANCE = 0.5e-6
 #: Below this speed the course says nothing about the heading [m/s].
 _LEAST_SPEED = 1.0
 #: A vessel moves if it has this speed over so long [s].
@@ -198,7 +196,7 @@ class LogSource:
                 self._imu, self._imu_labels = layer.apply_imu(self._imu, self._imu_labels)
 
     def _length(self, wanted: float, available: float) -> float:
-        if wanted <= available + _TOLERANCE:
+        if wanted <= available + TIME_TOLERANCE:
             return float(wanted)
         steps = math.floor(available / self.step + 1e-9)
         if steps < 1:
@@ -234,7 +232,7 @@ class LogSource:
             where = log.instruments[name]
             sheet = self.instruments[name]
             if where.source == "reference":
-                first = 1 if spec.phase <= _TOLERANCE else 0
+                first = 1 if spec.phase <= TIME_TOLERANCE else 0
                 count = math.floor((self.duration - spec.phase) * spec.rate + 1e-9) + 1
                 time = spec.phase + np.arange(first, count) / spec.rate
                 try:
@@ -245,7 +243,7 @@ class LogSource:
                 continue
             series = read_channel(log, where.channel(), spec.kind, self.recording)
             time = series.time - self._begin
-            inside = (time > _TOLERANCE) & (time <= self.duration + _TOLERANCE)
+            inside = (time > TIME_TOLERANCE) & (time <= self.duration + TIME_TOLERANCE)
             if not inside.any():
                 raise LogError(
                     f"{series.source}: none of the {len(time)} measurements of {name!r} lies within the run; they are "
@@ -274,13 +272,13 @@ class LogSource:
         """The next stretch of the run, up to a time [s] (at most the duration)."""
         until = min(float(until), self.duration)
         begin, self._now = self._now, until
-        if until < begin - _TOLERANCE:
+        if until < begin - TIME_TOLERANCE:
             raise ValueError(f"the run is at {begin:g} s and cannot go back to {until:g} s")
         first, last = (math.floor(t / self.step + 1e-6) for t in (begin, until))
         aids = {n: _cut(s, begin, until) for n, s in self._aids.items()}
         imu, labels = None, None
         if self._imu is not None:
-            a, b = np.searchsorted(self._imu.time, [begin + _TOLERANCE, until + _TOLERANCE], side="right")
+            a, b = np.searchsorted(self._imu.time, [begin + TIME_TOLERANCE, until + TIME_TOLERANCE], side="right")
             imu = self._imu[a:b]
             if self._imu_labels is not None:
                 labels = ImuLabels(self._imu_labels.faults[a:b], self._imu_labels.fault_error[a:b])
@@ -289,7 +287,7 @@ class LogSource:
 
 
 def _cut(s: AidStream, begin: float, until: float) -> AidStream:
-    edges = [begin + _TOLERANCE, until + _TOLERANCE]
+    edges = [begin + TIME_TOLERANCE, until + TIME_TOLERANCE]
     a, b = np.searchsorted(s.time, edges, side="right")
     c, d = np.searchsorted(s.dropped, edges, side="right")
     return replace(s.rows(slice(a, b)), dropped=s.dropped[c:d])
@@ -312,7 +310,7 @@ def _reference(log: RecordedSpec, recording: str, imu: ImuSeries | None) -> tupl
 def _begin(log: RecordedSpec, recording: str, reference: Reference, imu: ImuSeries | None) -> float:
     """The first epoch of the reference that the IMU covers and at which all that it has is there."""
     earliest = float(reference.time[0] if imu is None else imu.edge[0]) + skip_of(log, recording)
-    time = reference.time[reference.time >= earliest - _TOLERANCE]
+    time = reference.time[reference.time >= earliest - TIME_TOLERANCE]
     if imu is not None:
         time = time[time < imu.edge[-1]]
     states = reference.states(time)
@@ -347,7 +345,7 @@ def _regrid(imu: ImuSeries, begin: float, rate: float, duration: float) -> tuple
     grid = np.arange(count + 1) / rate
     edge = imu.edge - begin
     interval = np.full(count, 1.0 / rate)
-    first = int(np.searchsorted(edge, -_TOLERANCE))
+    first = int(np.searchsorted(edge, -TIME_TOLERANCE))
     here = edge[first : first + count + 1]
     if len(here) == count + 1 and np.max(np.abs(here - grid)) < 1e-6:
         mean, resampled = imu.mean[first : first + count], False

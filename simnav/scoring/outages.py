@@ -11,14 +11,13 @@ from simnav.recording import Recording
 from simnav.scoring.navigation_error import horizontal
 from simnav.scoring.registry import Better, ScoringInput, register_score
 from simnav.sensors.faults import effect_of
+from simnav.timing import TIME_TOLERANCE
 from simnav.types import Array
 
 __all__ = ["RECOVERY_THRESHOLD", "Outage", "outage_scores", "outages"]
 
 #: Horizontal error [m] below which an estimate has recovered: the 10 m of IMO A.1046(27).
 RECOVERY_THRESHOLD = 10.0
-
-_TOLERANCE = 0.5e-6  # s; times are multiples of the sample interval up to rounding
 
 
 @dataclass(frozen=True)
@@ -76,7 +75,7 @@ def outages(error: Array, recording: Recording, *, threshold: float = RECOVERY_T
     spans = sorted((start, end, f.instruments) for f in recording.faults for start, end in _gaps(f, recording))
     result = []
     for start, end, instruments in spans:
-        first, stop = (int(i) for i in np.searchsorted(time, [start - _TOLERANCE, end - _TOLERANCE]))
+        first, stop = (int(i) for i in np.searchsorted(time, [start - TIME_TOLERANCE, end - TIME_TOLERANCE]))
         if first >= stop:  # after the last epoch, or between two
             continue
         level = max(threshold, float(h[first - 1])) if first > 0 and np.isfinite(h[first - 1]) else threshold
@@ -85,7 +84,7 @@ def outages(error: Array, recording: Recording, *, threshold: float = RECOVERY_T
         under = np.flatnonzero(h[stop - 1 :] <= level)
         back = float(time[stop - 1 + under[0]]) if len(under) else np.inf
         wait = max(0.0, min(back, limit) - end) if stop < len(time) else float("nan")
-        result.append(Outage(instruments, start, end, float(h[stop - 1]), level, wait, back <= limit + _TOLERANCE))
+        result.append(Outage(instruments, start, end, float(h[stop - 1]), level, wait, back <= limit + TIME_TOLERANCE))
     return result
 
 
@@ -100,7 +99,7 @@ def _gaps(fault: FaultLabel, recording: Recording) -> list[tuple[float, float]]:
             continue
         # A channel alone is no outage while others are there.
         dropped = np.setdiff1d(stream.dropped, stream.time) if stream.channels else stream.dropped
-        lost = dropped[(dropped >= fault.start - _TOLERANCE) & (dropped < fault.end)]
+        lost = dropped[(dropped >= fault.start - TIME_TOLERANCE) & (dropped < fault.end)]
         following, index = np.unique(np.searchsorted(stream.time, lost), return_index=True)
         found += [
             (float(lost[i]), float(stream.time[j]) if j < len(stream) else np.inf)

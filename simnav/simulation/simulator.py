@@ -19,14 +19,12 @@ from simnav.sensors.channels import ChannelInstrument
 from simnav.sensors.faults import build_layers, labels
 from simnav.sensors.timing import Clock
 from simnav.spec import SpecError
+from simnav.timing import TIME_TOLERANCE
 from simnav.types import KINDS, Array, InitialState, NavigationStates
 from simnav.world import Steered, Surroundings, Trajectory, WorldBlock
 from simnav.world.initial_state import draw_start
 
-__all__ = ["TIME_TOLERANCE", "Simulator", "ideal", "sample_times", "simulate", "simulate_many"]
-
-#: Times closer than this are one and the same [s].
-TIME_TOLERANCE = 0.5e-6
+__all__ = ["Simulator", "ideal", "sample_times", "simulate", "simulate_many"]
 #: Rate of the truth where no IMU sets it [Hz].
 _RATE_WITHOUT_IMU = 20.0
 #: Tap of the ends of the steps; no instrument can have this name.

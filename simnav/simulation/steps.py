@@ -32,7 +32,8 @@ from simnav.sensors.stepwise import (
     sense_imu,
     sort_out,
 )
-from simnav.simulation.simulator import TIME_TOLERANCE, Simulator
+from simnav.simulation.simulator import Simulator
+from simnav.timing import TIME_TOLERANCE
 from simnav.types import ImuSamples, Measurement, Measurements
 from simnav.world import World, motion
 

@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simnav.recording import AidStream, Block
+from simnav.timing import TIME_TOLERANCE
 from simnav.types import Array, Estimate, ImuSamples, Measurement, Measurements
 
 __all__ = [
@@ -94,8 +95,7 @@ class PacketEncoder:
         numbers = [_numbers(s) for s in streams]
         self._ends = [float(t) for t in ends]
         self._start = float(data.start)
-        # Times are multiples of the sample interval up to rounding: half a microsecond decides.
-        edges = np.asarray(ends) + 0.5e-6
+        edges = np.asarray(ends) + TIME_TOLERANCE
         times = np.concatenate([s.stamps for s in streams]) if streams else np.empty(0)
         step = np.concatenate([np.searchsorted(edges, s.arrivals) for s in streams] or [np.empty(0, np.intp)])
         order = np.lexsort((times, step))  # stable: ties keep the scenario's order of instruments

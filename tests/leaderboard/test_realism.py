@@ -14,7 +14,7 @@ import simnav
 from simnav.kinds import KINDS
 from simnav.leaderboard.cli import app
 from simnav.leaderboard.realism.classifier import area, judge
-from simnav.leaderboard.realism.errors import ErrorSeries
+from simnav.leaderboard.realism.errors import ErrorSeries, comparable
 from simnav.leaderboard.realism.features import feature_names, windows_of
 from simnav.leaderboard.realism.fit import fitted
 from simnav.leaderboard.realism.report import RealismReport, compared
@@ -130,9 +130,19 @@ def test_bad_requests_are_answered_with_a_sentence():
     assert "'sextant' is not measured in ship-nbp1406-v1" in said(
         "ship-nbp1406-twin", "ship-nbp1406", "--instrument", "sextant"
     )
-    assert "simulates no instrument, by name and kind, that auv-akit-v1 measures" in said(
+    assert "simulates no instrument, by name and equation, that auv-akit-v1 measures" in said(
         "ship-nbp1406-twin", "auv-akit"
     )
+
+
+def test_a_velocity_solved_from_beams_is_like_that_of_a_dvl():
+    beams = simnav.load("lawnmower-beams")
+    recorded = simnav.load("auv-akit")
+    assert ("solution", "dvl") in comparable(beams, recorded)
+    assert not any(here in ("beams", "imu") for here, _ in comparable(beams, recorded))
+    result = CliRunner().invoke(app, ["realism", "lawnmower-beams", "auv-akit", "--instrument", "beams=dvl"])
+    assert result.exit_code == 2
+    assert "did you mean 'solution=dvl'?" in " ".join(result.stderr.split()) or "solution=dvl" in result.stderr
 
 
 def test_without_scikit_learn_the_message_says_what_to_install(monkeypatch: pytest.MonkeyPatch):

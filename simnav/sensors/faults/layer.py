@@ -19,6 +19,7 @@ from simnav.recording import AidStream, ImuLabels
 from simnav.sensors.faults.by_channel import each_channel
 from simnav.sensors.faults.fault import FaultError, FaultSpec
 from simnav.streams import stream as random_stream
+from simnav.timing import TIME_TOLERANCE
 from simnav.types import KINDS, Array, ImuSamples
 
 __all__ = [
@@ -27,14 +28,10 @@ __all__ = [
     "DROPS",
     "HOLDS",
     "STEPS_NOISE",
-    "TOLERANCE",
     "ZEROES",
     "Activity",
     "FaultLayer",
 ]
-
-#: Tolerance for times, which are multiples of the sample interval up to rounding: half a microsecond [s].
-TOLERANCE = 0.5e-6
 
 #: The action of a layer on a measurement, for layers that depend on the times only (`FaultLayer.ahead`): it adds an
 #: error; adds noise up to a new sigma; removes the measurement; repeats an earlier one; sets it to zero; disturbs the
@@ -93,10 +90,14 @@ class Activity:
             return None
         if self._random:
             self._extend(float(time[-1]))
-        if len(self.starts) == 0 or time[-1] < self.starts[0] - TOLERANCE or time[0] >= self.ends[-1] - TOLERANCE:
+        if (
+            len(self.starts) == 0
+            or time[-1] < self.starts[0] - TIME_TOLERANCE
+            or time[0] >= self.ends[-1] - TIME_TOLERANCE
+        ):
             return None
-        number = np.searchsorted(self.starts - TOLERANCE, time, side="right") - 1
-        rows = np.flatnonzero((number >= 0) & (time < (self.ends - TOLERANCE)[number]))
+        number = np.searchsorted(self.starts - TIME_TOLERANCE, time, side="right") - 1
+        rows = np.flatnonzero((number >= 0) & (time < (self.ends - TIME_TOLERANCE)[number]))
         return (rows, number[rows]) if len(rows) else None
 
 

@@ -29,9 +29,11 @@ SCORES = ("horizontal_rmse", "vertical_rmse", "velocity_horizontal_rmse", "headi
 def plain(name: str) -> str:
     """The row that it is but for its adaptation or weighting; empty for one that has none."""
     recipe = getattr(find(name), "recipe", {})
-    if not recipe or find(name).loose or recipe["model"].make is WithMessages:  # no receiver here, and no other vessel
+    if not recipe or find(name).loose:  # no receiver here
         return ""
     if not {"adaptation", "weighting"} & set(recipe) and recipe["solver"].make is not ImmEstimator:
+        return ""
+    if recipe["model"].make is WithMessages:  # no other vessel here
         return ""
     window, ship = issubclass(recipe["solver"].make, WindowEstimator), recipe["model"].make is ShipModel
     return {(False, False): "ekf", (False, True): "ship-ekf", (True, False): "sw-fgo", (True, True): "ship-fgo"}[
