@@ -20,6 +20,7 @@ from simnav.sensors.derived import DerivedInstrument
 from simnav.sensors.dvl import Dvl
 from simnav.sensors.dvl_beams import DvlBeams
 from simnav.sensors.dvl_solution import DvlSolution
+from simnav.sensors.dvl_water_solution import DvlWaterSolution
 from simnav.sensors.faults import AnyFault, FaultLayer, FaultSpec, build_layers, fault_specs, labels, register_fault
 from simnav.sensors.gnss import GnssPosition, GnssVelocity
 from simnav.sensors.gnss_raw import GnssRaw
@@ -46,6 +47,7 @@ __all__ = [
     "Dvl",
     "DvlBeams",
     "DvlSolution",
+    "DvlWaterSolution",
     "FaultLayer",
     "FaultSpec",
     "GnssPosition",

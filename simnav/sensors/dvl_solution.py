@@ -2,14 +2,17 @@
 
 It takes the readings of the instrument ``beams`` (`simnav.sensors.dvl_beams`), with all their faults, and solves each
 ping by least squares (`simnav.sensors.janus.solve_beams`). There is a reading with four beams, unless their error
-velocity is too large, and with three, unless ``three_beams`` is false. The beams have bottom track. The faults of a
-reading are those of its beams; its ``fault_error`` is the difference from the solution of the same beams without them.
+velocity is too large, and with three, unless ``three_beams`` is false. The faults of a reading are those of its beams;
+its ``fault_error`` is the difference from the solution of the same beams without them.
+
+`DvlSolution` takes beams with bottom track; beams with water track are solved by
+`simnav.sensors.dvl_water_solution.DvlWaterSolution`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
@@ -25,7 +28,7 @@ from simnav.sensors.janus import JanusSolution, solve_beams
 from simnav.spec import NonNegative, Positive, Vector, quantity
 from simnav.types import Array, Datasheet
 
-__all__ = ["DvlSolution", "solutions"]
+__all__ = ["BeamSolution", "DvlSolution", "solutions"]
 
 #: Times closer than this are one and the same [s].
 _SAME = 1e-6
@@ -72,39 +75,26 @@ def _solved(stream: AidStream, value: Array, ping: Integers) -> JanusSolution:
     return solve_beams(radial, side[:, 0], side[:, 1], sigma)
 
 
-@register_instrument(
-    Kind(
-        "velocity over the ground of the transducer that the beams give, in body axes",
-        "velocity",
-        speed_components("forward", "starboard", "down"),
-        kinds.BODY_VELOCITY,
-    ),
-    example={"sigma_m_s": [0.003, 0.003, 0.001]},
-)
-class DvlSolution(AidSpec):
-    """Velocity over the ground in body axes, solved from the beams of another instrument.
+class BeamSolution(AidSpec):
+    """What the solutions of both tracks have in common.
 
     Attributes
     ----------
     beams : str
-        Name of the instrument of kind ``dvl_beams`` with bottom track.
+        Name of the instrument of kind ``dvl_beams``.
     error_velocity : float
         Four beams with a larger error velocity give no reading [m/s].
     three_beams : bool
         Whether three beams give a reading. They have no error velocity.
-    sigma, scale, misalignment, lever_arm
-        What the datasheet says about the velocity; the error itself comes from the beams.
+    track : str
+        What the beams hear: ``bottom`` or ``water``.
     """
 
-    kind: Literal["dvl_solution"] = "dvl_solution"
+    track: ClassVar[Literal["bottom", "water"]] = "bottom"
+
     beams: str = "dvl_beams"
     error_velocity: Positive = quantity("m_s", 0.1)
     three_beams: bool = Field(True, description="whether three beams are enough")
-    sigma: SigmaTriple = quantity("m_s")
-    bias: SigmaTriple = quantity("m_s", ZERO)
-    scale: NonNegative = quantity("percent", 0.0)
-    misalignment: SigmaTriple = quantity("deg", ZERO)
-    lever_arm: Vector = quantity("m", ZERO)
 
     def sources(self) -> Mapping[str, str]:
         """See `AidSpec.sources`."""
@@ -118,16 +108,16 @@ class DvlSolution(AidSpec):
 class _Solver(DerivedInstrument):
     """Parameters as of `Instrument`."""
 
-    def __init__(self, spec: DvlSolution, name: str, seed: int):
+    def __init__(self, spec: BeamSolution, name: str, seed: int):
         super().__init__(spec, name, seed)
         self.spec = spec
 
     def derive(self, time: Array, streams: Mapping[str, AidStream], sheets: Mapping[str, Datasheet]) -> AidStream:
         """See `DerivedInstrument.derive`."""
         spec, source = self.spec, streams[self.spec.beams]
-        if sheets[spec.beams].details["track"] != "bottom":
+        if sheets[spec.beams].details["track"] != spec.track:
             raise InstrumentError(
-                f"instrument {self.name!r} of kind {self.kind!r}: it needs beams with track = 'bottom', but "
+                f"instrument {self.name!r} of kind {self.kind!r}: it needs beams with track = {spec.track!r}, but "
                 f"{spec.beams!r} has {sheets[spec.beams].details['track']!r}"
             )
         ping = _pings(source, time)
@@ -143,3 +133,29 @@ class _Solver(DerivedInstrument):
         return AidStream(
             self.name, self.kind, time[:count][good], found.velocity[good], faults[good], wrong[good], sigma[good], lost
         )
+
+
+@register_instrument(
+    Kind(
+        "velocity over the ground of the transducer that the beams give, in body axes",
+        "velocity",
+        speed_components("forward", "starboard", "down"),
+        kinds.BODY_VELOCITY,
+    ),
+    example={"sigma_m_s": [0.003, 0.003, 0.001]},
+)
+class DvlSolution(BeamSolution):
+    """Velocity over the ground in body axes, solved from the beams of another instrument with bottom track.
+
+    Attributes
+    ----------
+    sigma, scale, misalignment, lever_arm
+        What the datasheet says about the velocity; the error itself comes from the beams.
+    """
+
+    kind: Literal["dvl_solution"] = "dvl_solution"
+    sigma: SigmaTriple = quantity("m_s")
+    bias: SigmaTriple = quantity("m_s", ZERO)
+    scale: NonNegative = quantity("percent", 0.0)
+    misalignment: SigmaTriple = quantity("deg", ZERO)
+    lever_arm: Vector = quantity("m", ZERO)

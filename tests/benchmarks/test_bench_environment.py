@@ -96,6 +96,7 @@ def test_the_scenario_has_every_kind_of_instrument(scenario):
         "altimeter",
         "dvl_beams",
         "dvl_solution",
+        "dvl_water_solution",
         "magnetic_field",
         "multibeam_profile",
         "usbl_fix",

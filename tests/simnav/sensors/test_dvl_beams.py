@@ -14,11 +14,12 @@ from simnav.blocks import NAVIGATION
 from simnav.geometry.rotation import dcm_from_rotation_vector, dcm_from_rpy
 from simnav.kinds import NavigationPoint
 from simnav.recording import AidStream
-from simnav.sensors import DvlBeams, DvlSolution
+from simnav.sensors import DvlBeams, DvlSolution, DvlWaterSolution
 from simnav.sensors.channels import ChannelInstrument
 from simnav.sensors.derived import DerivedInstrument
 from simnav.sensors.dvl_beams import CLASSES, observe
-from simnav.sensors.dvl_solution import solutions
+from simnav.sensors.dvl_solution import BeamSolution, solutions
+from simnav.sensors.dvl_water_solution import observe as through_water
 from simnav.sensors.errors import InstrumentError
 from simnav.sensors.janus import absorption, beam_axes, noise_by_range, solve_beams
 from simnav.spec import SpecError
@@ -67,9 +68,11 @@ def slant_of(dvl: ChannelInstrument) -> float:
     return spec.slant
 
 
-def solved(stream: AidStream, dvl: ChannelInstrument, time: Array, **more: Any) -> AidStream:
+def solved(
+    stream: AidStream, dvl: ChannelInstrument, time: Array, kind: type[BeamSolution] = DvlSolution, **more: Any
+) -> AidStream:
     """What the second instrument of the device makes of a stream."""
-    spec = DvlSolution.from_toml({"sigma_m_s": 0.003, "beams": "dvl", "rate_hz": 5.0} | more)
+    spec = kind.from_toml({"sigma_m_s": 0.003, "beams": "dvl", "rate_hz": 5.0} | more)
     made = spec.build("solved", 1)
     assert isinstance(made, DerivedInstrument)
     return made.derived(time, {"dvl": stream}, {"dvl": dvl.sheet})
@@ -164,6 +167,37 @@ def test_the_equation_predicts_the_reading_and_its_derivatives(array: str, track
             for k, e in enumerate(h * np.eye(len(value))):
                 slope = (at(row, **{name: e})[0] - reading)[0] / h
                 assert slope == pytest.approx(jacobian[name][0, k], abs=0.03)  # mounting: to first order
+
+
+@pytest.mark.parametrize("array", ["piston", "phased"])
+def test_the_equation_of_a_solved_water_track(array: str) -> None:
+    table = {"mounting_deg": 1.0, "sound_speed_percent": 1.0, "lever_arm_m": [1.0, -0.5, 0.4], "array": array}
+    flow = WaterFlow(Current(speed=0.5, direction=0.7), 1, np.array([*START[:2], 0.0]))
+    noise = {"sigma_m_s": 0.0, "speed_noise_percent": 0.0, "track": "water"}
+    dvl = device(table | noise, current=flow)
+    tap = taps(1, (1.5, 0.6, -0.2), (0.1, -0.05, 0.8))
+    tap = replace(tap, angular_rate=np.array([[0.02, -0.01, 0.05]]))
+    sheet = DvlWaterSolution.from_toml({"sigma_m_s": 0.01} | table).datasheet("velocity")
+    blocks = {b.name: dvl.block(b.name, tap.time)[0] for b in dvl.sheet.blocks}
+    blocks["current"] = flow.velocity(tap.position, tap.time)[0, :2]
+    point = NavigationPoint(
+        1.0, tap.position[0], tap.velocity[0], dcm_from_rpy(tap.attitude)[0], tap.angular_rate[0], blocks
+    )
+    reading, jacobian = through_water(point, sheet)
+    found = solved(dvl.sense(tap), dvl, tap.time, DvlWaterSolution, error_velocity_m_s=1.0)
+    np.testing.assert_allclose(reading, found.value[0], atol=1e-12)
+    assert {b.name for b in sheet.blocks} == set(blocks) == set(jacobian) - {NAVIGATION}
+    for k, e in enumerate(1e-6 * np.eye(3)):
+        turned = dcm_from_rotation_vector(e) @ point.dcm
+        moves = point._replace(velocity=point.velocity + e), point._replace(dcm=turned)
+        for first, moved in zip((3, 6), moves, strict=True):
+            slope = (through_water(moved, sheet)[0] - reading) / 1e-6
+            np.testing.assert_allclose(slope, jacobian[NAVIGATION][:, first + k], atol=1e-5)
+    for name, value in blocks.items():
+        for k, e in enumerate(1e-6 * np.eye(len(value))):
+            moved = point._replace(blocks=blocks | {name: value + e})
+            slope = (through_water(moved, sheet)[0] - reading) / 1e-6
+            np.testing.assert_allclose(slope, jacobian[name][:, k], atol=0.03)  # mounting: to first order
 
 
 def test_the_division_into_blocks_changes_nothing() -> None:
@@ -291,10 +325,15 @@ def test_water_track_is_relative_to_the_layer_and_needs_one() -> None:
     stream = water.sense(taps(3, height=0.0))
     # The layer is 16 to 64 m deep; at 40 m the current is 0.5 - 0.4 m/s.
     np.testing.assert_allclose((solver(slant_of(water)) @ by_ping(stream).T)[0], 1.9, atol=1e-3)
+    velocity = solved(stream, water, taps(3).time, DvlWaterSolution)
+    np.testing.assert_allclose(velocity.value, np.tile([1.9, 0.0, 0.0], (3, 1)), atol=1e-3)
     assert len(device({"track": "water"}, depth=3.0).sense(taps(3, height=0.0))) == 0
     assert len(device({"track": "water"}, depth=4000.0).sense(taps(3, height=0.0))) == 12
     with pytest.raises(InstrumentError, match="'solved' of kind 'dvl_solution': it needs beams with track = 'bottom'"):
         solved(stream, water, taps(3).time)
+    bottom = device({}, depth=80.0)
+    with pytest.raises(InstrumentError, match="of kind 'dvl_water_solution': it needs beams with track = 'water'"):
+        solved(bottom.sense(taps(3)), bottom, taps(3).time, DvlWaterSolution)
 
 
 @pytest.mark.parametrize(
