@@ -14,9 +14,8 @@ __all__ = ["AnfisEkf", "AnfisFgo", "AnfisFgoMotion"]
 class AnfisFgo(ShipFgo, adaptation=Anfis):
     """ANFIS-FGO, a reconstruction: ``ship-fgo``, the noise of each fix chosen by a neuro-fuzzy network.
 
-    It does not notice that it is lost on a ship without an IMU whose instruments are wrong: 7 runs of the board
-    (version 1 of the row) have more than ten times the error of the plain row, and nothing warns (``python -m
-    tests.audit silence``).
+    It does not notice that it is lost on a ship without an IMU whose instruments are wrong, in several faults at a time
+    or with a wrong datasheet (``python -m tests.audit silence`` counts such runs).
 
     The section on the network is missing from the text at hand; see ``docs/explanation/anfis.md``. Source: Jiang et
     al., *An improved factor graph optimization algorithm enhanced with ANFIS for ship GNSS/DR integrated navigation*,
@@ -42,6 +41,9 @@ class AnfisFgoMotion(ShipFgo, adaptation=piece(Anfis, features="motion")):
     network can learn no more than the mean. Source: *GNSS/DR integrated navigation for ships*, the paper that proposes
     ANFIS-FGO.
 
+    It does not notice that it is lost on a ship without an IMU whose instruments are wrong, in several faults at a time
+    or with a wrong datasheet (``python -m tests.audit silence`` counts such runs).
+
     Versions
     --------
     2
@@ -58,9 +60,8 @@ class AnfisFgoMotion(ShipFgo, adaptation=piece(Anfis, features="motion")):
 class AnfisEkf(ShipEkf, adaptation=Anfis):
     """The network of ``anfis-fgo`` (a reconstruction) in ``ship-ekf``: what it does without the graph.
 
-    It does not notice that it is lost on a ship without an IMU whose instruments are wrong: 8 runs of the board
-    (version 1 of the row) have more than ten times the error of the plain row, and nothing warns (``python -m
-    tests.audit silence``).
+    It does not notice that it is lost on a ship without an IMU whose instruments are wrong, in several faults at a time
+    or with a wrong datasheet (``python -m tests.audit silence`` counts such runs).
 
     Source: *GNSS/DR integrated navigation for ships*, the paper that proposes ANFIS-FGO.
 

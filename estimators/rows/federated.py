@@ -41,8 +41,7 @@ class Federated(Row, solver=piece(FederatedEstimator, reset_locals=True), model=
 class FederatedNoReset(Row, solver=piece(FederatedEstimator, reset_locals=False), model=InertialModel):
     """Federated Kalman filter whose local filters are never told what the others saw.
 
-    It does not notice that it is lost from a poorly known heading: two runs of the board (version 1 of the row)
-    have more than ten times the error of the plain row, and nothing warns (``python -m tests.audit silence``).
+    It does not notice that it is lost from a poorly known heading (``python -m tests.audit silence`` counts such runs).
 
     Its covariance is an upper bound, not the error's: conservative where the sensors differ. Source: N. A. Carlson,
     *Federated square root filter for decentralized parallel processes*, IEEE Trans. Aerospace and Electronic Systems

@@ -85,9 +85,10 @@ class Kf9(Row, solver=piece(LinearKalmanEstimator, defaults={"feedback": 1.0}), 
     """Linear 9-state error-state KF, closed loop: the estimated error is fed back once a second.
 
     The states and fixed sigmas of ``ekf-9``. All measurements of a second are linearised about the same nominal
-    trajectory, which is corrected afterwards. Source: P. S. Maybeck, *Stochastic Models, Estimation, and Control*, vol.
-    1, 1979, section 6.3; the states are those of M. Guo, B. Wang, L. Wei et al., *Robust INS/GNSS/DVL integrated
-    navigation for MASS based on gradient-adaptive factor graph optimization*, 2026.
+    trajectory, which is corrected afterwards. Like ``ekf-9`` it does not notice that its sigmas are too large for good
+    instruments. Source: P. S. Maybeck, *Stochastic Models, Estimation, and Control*, vol. 1, 1979, section 6.3; the
+    states are those of M. Guo, B. Wang, L. Wei et al., *Robust INS/GNSS/DVL integrated navigation for MASS based on
+    gradient-adaptive factor graph optimization*, 2026.
     """
 
 
@@ -116,7 +117,8 @@ class ShipEkf(Row, solver=KalmanEstimator, model=ShipModel):
 class ShipEkfStanding(Row, solver=KalmanEstimator, model=StandingShip):
     """``ship-ekf`` without dead reckoning: where there is no fix, the position stays where it is.
 
-    For comparison only: its error at the end of an outage is the distance that the ship made. One reading of the
+    For comparison only: its error at the end of an outage is the distance that the ship made, and it does not notice
+    that. One reading of the
     outages in the figures of *GNSS/DR integrated navigation for ships*, the paper that proposes ANFIS-FGO.
     """
 
@@ -125,9 +127,9 @@ class ShipEkfStanding(Row, solver=KalmanEstimator, model=StandingShip):
 class GnssOnly(Row, solver=KalmanEstimator, model=KinematicModel):
     """GNSS alone: fixes (and velocities, if any) smoothed by a constant-velocity Kalman filter.
 
-    Between fixes and in an outage the ship goes on as she went. It does not notice a turn there: of 240 runs of the
-    board with more than ten times the error of ``ekf``, 4 % do not admit it. Source: Y. Bar-Shalom, X. R. Li and T.
-    Kirubarajan, *Estimation with Applications to Tracking and Navigation*, 2001, section 6.2.
+    Between fixes and in an outage the ship goes on as she went. It does not notice a turn there (``python -m
+    tests.audit silence`` counts such runs). Source: Y. Bar-Shalom, X. R. Li and T. Kirubarajan, *Estimation with
+    Applications to Tracking and Navigation*, 2001, section 6.2.
     """
 
 

@@ -26,7 +26,8 @@ class Ukf(Row, solver=SigmaPointEstimator, model=InertialPoints):
 class Ukf9(Row, solver=SigmaPointEstimator, model=NineStatePoints):
     """9-state UKF: the states and fixed sigmas of ``ekf-9``, moments by sigma points.
 
-    The points and weights are those of ``ukf``, because the paper prints none. Source: M. Guo, B. Wang, L. Wei et al.,
+    The points and weights are those of ``ukf``, because the paper prints none. Like ``ekf-9`` it does not notice that
+    its sigmas are too large for good instruments. Source: M. Guo, B. Wang, L. Wei et al.,
     *Robust INS/GNSS/DVL integrated navigation for MASS based on gradient-adaptive factor graph optimization*, 2026.
     """
 

@@ -9,7 +9,7 @@ more than `LOST` times that of the plain row on the same recording. It is admitt
 - the protection level: the error exceeds it in at most `EXCEEDED` of the epochs.
 
 Promised is, for each row, that at least 99 % of its lost runs are admitted. A row that cannot promise it says on its
-page when it is lost and why it does not notice; those rows are in `EXPLAINED`, with the sentence that has to be there.
+page when it does not notice that it is lost (`explained`).
 """
 
 from __future__ import annotations
