@@ -22,8 +22,8 @@ __all__ = ["SCENARIOS", "Unmeasured", "multiples_of"]
 
 #: Where costs are measured, if no scenario was asked for. An estimator runs on the first that suits it of those with
 #: the same plain row: a ship with an IMU, GNSS and DVL; one without an IMU; an AUV whose positions are terrain fixes; a
-#: ship with a receiver and its raw observations; an AUV with messages of a ship.
-SCENARIOS = ("open-sea", "fishing-vessel", "auv-soft-mud", "satellites-open-sea", "auv-and-ship")
+#: ship with a receiver and its raw observations; an AUV with messages of a ship; an AUV with soundings and a chart.
+SCENARIOS = ("open-sea", "fishing-vessel", "auv-soft-mud", "satellites-open-sea", "auv-and-ship", "terrain-rough")
 
 _TRIED = 3  # epochs after which an estimator is asked whether it smooths
 

@@ -17,7 +17,6 @@ second-order statistics*, Journal of Geophysical Research 93(B11), 1988; here in
 from __future__ import annotations
 
 import numpy as np
-from scipy import fft
 
 from simnav.types import Array
 
@@ -51,6 +50,8 @@ def relief(
     (r, c) array
         [m]
     """
+    from scipy import fft  # loaded only where there is a relief
+
     rows, columns = (fft.next_fast_len(2 * n, real=True) for n in shape)
     kn = 2.0 * np.pi * fft.fftfreq(rows, spacing[0])
     ke = 2.0 * np.pi * fft.rfftfreq(columns, spacing[1])

@@ -21,7 +21,7 @@ ROWS = [name for name in names() if name not in GTSAM]
 def recordings():
     return [
         record(load(name).model_copy(update={"duration": 20.0}), 3)
-        for name in ("auv-survey", "ship-field", "satellites-open-sea", "auv-and-ship")
+        for name in ("auv-survey", "ship-field", "satellites-open-sea", "auv-and-ship", "terrain-rough")
     ]
 
 

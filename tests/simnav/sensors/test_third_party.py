@@ -90,7 +90,7 @@ def test_mistakes_are_named_as_everywhere(plugins, text, old, new, message):
 
 
 def test_without_its_file_the_kind_is_unknown(text):
-    with pytest.raises(SpecError, match="kind = 'beacon' is unknown; valid here: acoustic_range, depth"):
+    with pytest.raises(SpecError, match="kind = 'beacon' is unknown; valid here: acoustic_range, altimeter, depth"):
         parse(text.replace('plugins = ["beacon.py", "echo.py"]', ""), source="lagoon.toml")
 
 
