@@ -245,7 +245,11 @@ def _of_file(spec: Bathymetry, modified: int) -> DepthGrid:
         meridian, prime = principal_radii(spec.latitude)
         reach = 0.5 * spec.extent[0] / meridian, 0.5 * spec.extent[1] / (prime * cos(spec.latitude))
         rows = abs(latitude - spec.latitude) <= reach[0]
-        columns = abs(np.remainder(longitude - spec.longitude + pi, 2.0 * pi) - pi) <= reach[1]
+        longitude = longitude + 2.0 * pi * np.round((spec.longitude - longitude) / (2.0 * pi))  # also across its edge
+        order = np.argsort(longitude, kind="stable")
+        order = order[np.append(np.diff(longitude[order]) > 1e-9, True)]  # 0 and 360 degrees are one place
+        longitude, value = longitude[order], value[:, order]
+        columns = abs(longitude - spec.longitude) <= reach[1]
         if rows.sum() < 2 or columns.sum() < 2:
             raise SpecError(
                 f"{path}: it spans {_span(latitude)} N, {_span(longitude)} E: the place latitude_deg = "

@@ -142,6 +142,17 @@ def test_files_of_both_formats_give_the_same_grid(tmp_path: Path, relief_of_file
     assert part.depth.shape == (8, 10)
 
 
+def test_a_part_may_lie_across_the_edge_of_a_world(tmp_path: Path) -> None:
+    latitude, longitude = np.arange(50.0, 52.1, 0.5), np.arange(0.0, 360.1, 0.5)
+    depth = 100.0 + 10.0 * (np.remainder(longitude + 180.0, 360.0) - 180.0)  # deeper to the east of Greenwich
+    path = netcdf(tmp_path / "world.nc", latitude, longitude, -np.tile(np.maximum(depth, 1.0), (len(latitude), 1)))
+    place = {"latitude_deg": 51.0, "longitude_deg": 0.0, "extent_m": [130e3, 300e3]}
+    grid = Bathymetry.from_toml({"file": str(path), **place}).grid()
+    assert grid.depth[0].tolist() == [80.0, 85.0, 90.0, 95.0, 100.0, 105.0, 110.0, 115.0, 120.0]
+    west = np.array([[np.radians(51.0), np.radians(-1.0), 0.0]])
+    assert grid.at(grid.offset(west))[0][0] == pytest.approx(90.0, abs=0.01)
+
+
 @pytest.mark.parametrize(
     ("change", "words"),
     [
