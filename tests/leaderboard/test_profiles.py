@@ -47,11 +47,11 @@ def test_standard_has_the_same_seeds_for_all_rows_of_a_track():
     assert 20 <= len(chosen) <= 25
     loose = {n for n in names() if getattr(find(n), "loose", False)}
     special = {"satellites": loose, "acoustic": loose, "cooperative": {"ekf-ci"}, "terrain": {"terrain-pmf"}}
-    few = {"papers", "long", "coloured", "robustness", *special}
+    few = {"papers": 10, "long": 10, "coloured": 8, "robustness": 8} | dict.fromkeys(special, 8) | {"terrain": 6}
     assert {row for _, row in most} - {"terrain-pmf"} == {n for n in names() if not describe(n).slow}
     for (scenario, row), runs in most.items():
         track = known[scenario].track
-        assert runs == (30 if track not in few else 6 if scenario == "twelve-hours" else 10)
+        assert runs == (6 if scenario == "twelve-hours" else few.get(track, 30))
         assert track not in few or row in chosen | special.get(track, set())
 
 
