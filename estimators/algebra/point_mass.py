@@ -25,7 +25,6 @@ from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import fft
 
 from simnav.types import Array
 
@@ -131,6 +130,8 @@ class PointMass:
 
     def diffuse(self, covariance: Array) -> None:
         """Add Gaussian noise with a (2, 2) covariance."""
+        from scipy import fft  # a quarter of a second, which each process of estimators would pay
+
         inverse = np.linalg.inv(self.basis)
         s = inverse @ covariance @ inverse.T
         if max(s[0, 0], s[1, 1]) > _WIDE**2:

@@ -7,6 +7,7 @@ import sys
 import threading
 import time
 from collections.abc import Iterator
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
@@ -18,7 +19,7 @@ from simnav.leaderboard.results.provenance import here
 from simnav.scenario import parse
 from tests.cases import ship
 
-pytest.importorskip("distributed", reason="the extra 'distributed' is not installed")
+pytestmark = pytest.mark.skipif(not find_spec("distributed"), reason="the extra 'distributed' is not installed")
 
 SHIP = ship("tiny-ship", 60.0)
 
