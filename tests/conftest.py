@@ -5,9 +5,11 @@ from __future__ import annotations
 import gc
 import os
 import sys
+from collections.abc import Generator
 from pathlib import Path
 
 import pytest
+from _pytest.doctest import DoctestModule
 from hypothesis import settings
 
 from simnav.estimator import names, registry
@@ -36,6 +38,14 @@ os.environ.pop("COLUMNS", None)
 # How long an example takes depends on the machine, and is nothing that a test asserts.
 settings.register_profile("simnav", deadline=None)
 settings.load_profile("simnav")
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_collect_file(file_path: Path) -> Generator[None, list[pytest.Collector], list[pytest.Collector]]:
+    """Test modules have no doctests, and need not be searched for them by each worker."""
+    found = yield
+    test = file_path.name.startswith("test_")
+    return [one for one in found if not (test and isinstance(one, DoctestModule))]
 
 
 def pytest_collection_finish() -> None:
