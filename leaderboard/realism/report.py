@@ -211,9 +211,10 @@ def realism_of(scenario: Scenario, log: Scenario, instruments: Sequence[str], ru
             + (f"; give a pair of names: {' or '.join(pairs)}" if pairs else "")
         )
     seeds = range(seed, seed + runs)
-    return RealismReport(
-        scenario.id, log.id, [(_imu if name == "imu" else _aid)(scenario, log, *known[name], seeds) for name in names]
-    )
+    found = [
+        _imu(scenario, log, name, seeds) if name == "imu" else _aid(scenario, log, *known[name], seeds) for name in names
+    ]
+    return RealismReport(scenario.id, log.id, found)
 
 
 def _aid(scenario: Scenario, log: Scenario, name: str, measured: str, seeds: range) -> InstrumentRealism:
@@ -230,7 +231,7 @@ def compared(name: str, kind: Kind, real: Sequence[ErrorSeries], simulated: Sequ
     )  # fmt: skip
 
 
-def _imu(scenario: Scenario, log: Scenario, name: str, _: str, seeds: range) -> InstrumentRealism:
+def _imu(scenario: Scenario, log: Scenario, name: str, seeds: range) -> InstrumentRealism:
     assert log.log is not None
     real = [_samples(LogSource(log, k)) for k in range(len(list_recordings(log.log)))]
     simulated = [_of(record(scenario, seed).data.imu) for seed in seeds]
