@@ -212,7 +212,8 @@ def realism_of(scenario: Scenario, log: Scenario, instruments: Sequence[str], ru
         )
     seeds = range(seed, seed + runs)
     found = [
-        _imu(scenario, log, name, seeds) if name == "imu" else _aid(scenario, log, *known[name], seeds) for name in names
+        _imu(scenario, log, name, seeds) if name == "imu" else _aid(scenario, log, *known[name], seeds)
+        for name in names
     ]
     return RealismReport(scenario.id, log.id, found)
 
