@@ -85,7 +85,9 @@ def test_any_row_is_loosely_coupled_on_request(recording):
 
 def test_a_loosely_coupled_row_needs_a_receiver():
     instruments = record(raw_gnss(2.0), 1).instruments
-    assert lacking(make("ekf-loose").needs, instruments) == "it needs gnss_receiver or dvl_solution; there is none"
+    assert lacking(make("ekf-loose").needs, instruments) == (
+        "it needs gnss_receiver or dvl_solution or terrain_match; there is none"
+    )
     assert not lacking(make("ekf").needs, instruments)
     with pytest.raises(UnsuitableScenario):
         make("ekf-loose").reset(record(raw_gnss(2.0), 1).start, instruments.without({"gnss"}))
