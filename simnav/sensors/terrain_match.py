@@ -85,7 +85,8 @@ class TerrainMatch(AidSpec):
     remove_offset : bool
         Whether a common difference of the depths is taken away: a tide, or the bias of a depth sensor.
     largest_difference : float
-        There is no fix where the mean absolute difference between profile and chart is larger [m].
+        There is no fix where the difference between profile and chart is larger: the mean of the smallest four fifths
+        of the absolute differences [m].
     uniqueness : float
         There is no fix where the difference is more than this times that of the best place elsewhere; 1: that is not
         asked.
@@ -114,8 +115,8 @@ class TerrainMatch(AidSpec):
     window: Positive = quantity("s", 50.0)
     least_soundings: int = Field(20, ge=6)
     remove_offset: bool = True
-    largest_difference: Positive = quantity("m", 1.0)
-    uniqueness: float = Field(0.75, gt=0.0, le=1.0)
+    largest_difference: Positive = quantity("m", 0.3)
+    uniqueness: float = Field(0.6, gt=0.0, le=1.0)
     latitude: float | None = quantity("deg", None, ge=-np.pi / 2, le=np.pi / 2)
     longitude: float | None = quantity("deg", None)
     first_search: Positive = quantity("m", 300.0)
@@ -202,10 +203,11 @@ class _Readings(NamedTuple):
         return cls(stream.time, stream.value, stream.fault_error, stream.faults, *own)
 
     def joined(self, later: _Readings) -> _Readings:
-        return _Readings(*(np.concatenate(pair) for pair in zip(self, later, strict=True)))
+        columns: list[tuple[Array, Array]] = list(zip(self, later, strict=True))  # type: ignore[arg-type]
+        return _Readings._make(np.concatenate(pair) for pair in columns)
 
     def rows(self, part: slice | NDArray[Any]) -> _Readings:
-        return _Readings(*(array[part] for array in self))
+        return _Readings._make(array[part] for array in self)
 
     def until(self, time: float) -> _Readings:
         return self.rows(slice(0, int(np.searchsorted(self.time, time + _SAME))))

@@ -1,13 +1,13 @@
 """Where on a chart a profile of depths fits: terrain contour matching.
 
 A profile is a number of soundings whose places are known relative to the vehicle as it is now. It is laid on the chart
-with the vehicle at each node of a search area. The mean absolute difference between the depths of the profile and those
-of the chart says how well it fits there (with the depths between nodes from bilinear interpolation). A common
-difference of all depths may be taken away first: a tide, or the bias of a depth sensor.
+with the vehicle at each node of a search area. How well it fits there says the mean absolute difference between the
+depths of the profile and those of the chart (bilinear between nodes). It is the mean of the smallest four fifths, so a
+few false soundings do not change it. A common difference of all depths, their median, may be taken away first: a tide,
+or the bias of a depth sensor.
 
 The local minima of the difference, and the best nodes, are then refined below the spacing of the nodes: Gauss-Newton
-steps with Huber's weights, on the depths and the gradients of `simnav.world.depth_grid`. Their measure is the mean of
-the smallest four fifths of the absolute differences, so a few false soundings change neither the place nor the measure.
+steps with Huber's weights, on the depths and the gradients of `simnav.world.depth_grid`.
 
 The covariance of a place is that of least squares: the variance of the residuals over the curvature, J'J. Residuals of
 neighbouring pings are alike where the chart is wrong or the track is bent, so it is multiplied by the mean ratio of the
@@ -145,7 +145,7 @@ def match(grid: DepthGrid, profile: Profile, middle: Array, reach: Array, *, rem
 
 
 def scan(grid: DepthGrid, profile: Profile, middle: Array, reach: Array, *, remove_offset: bool) -> tuple[Array, Array]:
-    """The mean absolute difference with the vehicle at each node of a search area.
+    """The difference with the vehicle at each node of a search area.
 
     Parameters
     ----------
@@ -177,16 +177,21 @@ def scan(grid: DepthGrid, profile: Profile, middle: Array, reach: Array, *, remo
     step = max(1, _AT_A_TIME // (len(some) * int(shape[1])))
     for row in range(int(low[0]), int(high[0]) + 1, step):
         rows = min(step, int(high[0]) + 1 - row)
-        apart = np.empty((len(some), rows, int(shape[1])))
+        apart = np.empty((rows, int(shape[1]), len(some)))
         for i, (k, j) in enumerate(first.tolist()):
             nodes = grid.depth[row + k : row + k + rows + 1, low[1] + j : high[1] + j + 2]
             along = nodes[:, :-1] + part[i, 1] * (nodes[:, 1:] - nodes[:, :-1])
-            apart[i] = along[:-1] + part[i, 0] * (along[1:] - along[:-1])
-            apart[i] -= depth[i]
+            apart[:, :, i] = along[:-1] + part[i, 0] * (along[1:] - along[:-1]) - depth[i]
         if remove_offset:
-            apart -= apart.mean(axis=0)
-        difference[row - low[0] : row - low[0] + rows] = np.abs(apart, out=apart).mean(axis=0)
+            apart -= np.median(apart, axis=2, keepdims=True)
+        difference[row - low[0] : row - low[0] + rows] = _measure(apart)
     return low, difference
+
+
+def _measure(apart: Array) -> Array:
+    """The mean of the smallest four fifths of the absolute values along the last axis."""
+    count = max(1, int(_KEPT * apart.shape[-1]))
+    return np.asarray(np.partition(abs(apart), count - 1, axis=-1)[..., :count].mean(axis=-1))
 
 
 def _minima(difference: Array) -> NDArray[np.intp]:
@@ -231,13 +236,11 @@ def _refined(grid: DepthGrid, profile: Profile, place: Array, remove_offset: boo
     normal = design.T @ design
     if len(design) <= design.shape[1] or not _regular(normal):
         return None
-    inverse = np.linalg.inv(normal)
+    inverse = np.asarray(np.linalg.inv(normal), dtype=np.float64)
     gain = np.zeros((len(profile), 2))
     gain[used] = design @ inverse[:, :2]
-    ordered = np.sort(abs(residual))
-    difference = float(ordered[: max(1, int(_KEPT * len(ordered)))].mean())
     covariance = _covariance(design, inverse, residual[used], profile, used)
-    return Match(place, covariance, difference, used, gain, gradient)
+    return Match(place, covariance, float(_measure(residual)), used, gain, gradient)
 
 
 def _design(gradient: Array, remove_offset: bool) -> Array:

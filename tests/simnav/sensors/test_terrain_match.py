@@ -108,7 +108,7 @@ def test_fixes_do_not_depend_on_blocks() -> None:
 
 def test_a_fault_of_the_velocity_is_a_fault_of_the_fix() -> None:
     fault = {
-        "kind": "bias_step", "instruments": ["dvl"], "start_s": 110.0, "end_s": 140.0, "offset_m_s": [0.0, 0.05, 0.0],
+        "kind": "bias_step", "instruments": ["dvl"], "start_s": 110.0, "end_s": 140.0, "offset_m_s": [0.0, 0.03, 0.0],
     }  # fmt: skip
     wrong, _ = fixes(matched(200.0, bottom=ROUGH, fault=[fault]))
     clean, _ = fixes(matched(200.0, bottom=ROUGH))
@@ -116,7 +116,7 @@ def test_a_fault_of_the_velocity_is_a_fault_of_the_fix() -> None:
     assert wrong.faults.tolist() == [0, 0, 1, 0]
     moved = KINDS["terrain_match"].difference(wrong.value, clean.value)
     np.testing.assert_allclose(wrong.fault_error[2], moved[2], atol=1e-6)
-    assert np.linalg.norm(wrong.fault_error[2]) > 0.3
+    assert np.linalg.norm(wrong.fault_error[2]) > 0.2
     np.testing.assert_allclose(wrong.fault_error[[0, 1, 3]], 0.0)
 
 

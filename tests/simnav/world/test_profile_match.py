@@ -29,7 +29,7 @@ def sounded(grid: DepthGrid, at: Array, noise: float = 0.0, seed: int = 1) -> Pr
 
 
 @pytest.mark.parametrize("remove_offset", [False, True])
-def test_the_scan_is_the_mean_absolute_difference_at_each_node(remove_offset: bool) -> None:
+def test_the_scan_is_the_mean_of_the_smallest_four_fifths_at_each_node(remove_offset: bool) -> None:
     grid = rough()
     profile = sounded(grid, np.array([33.0, -47.0]))
     corner, difference = scan(
@@ -41,8 +41,8 @@ def test_the_scan_is_the_mean_absolute_difference_at_each_node(remove_offset: bo
     for i, j in ((0, 0), (4, 8), (12, 5)):
         node = np.array([north[int(corner[0]) + i], east[int(corner[1]) + j]])
         apart = chart(node + ALONG) - profile.depth
-        apart = apart - apart.mean() if remove_offset else apart
-        assert difference[i, j] == pytest.approx(np.mean(abs(apart)), abs=1e-9)
+        apart = apart - np.median(apart) if remove_offset else apart
+        assert difference[i, j] == pytest.approx(np.mean(np.sort(abs(apart))[:40]), abs=1e-9)
 
 
 def test_only_nodes_that_have_all_of_the_profile_on_the_chart_are_scanned() -> None:
