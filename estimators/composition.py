@@ -142,7 +142,7 @@ class Piece:
 
 
 #: The kinds of instruments that solve the raw readings of another one.
-_SOLUTIONS = ("gnss_receiver", "dvl_solution", "dvl_water_solution")
+_SOLUTIONS = ("gnss_receiver", "dvl_solution", "dvl_water_solution", "terrain_match")
 _NAMED = (inspect.Parameter.POSITIONAL_OR_KEYWORD, inspect.Parameter.KEYWORD_ONLY)
 
 

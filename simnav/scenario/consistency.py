@@ -159,17 +159,23 @@ def _check_log(s: Description, log: RecordedSpec) -> None:
 
 
 def _check_sources(s: Description) -> None:
-    """Check that an instrument that reads others finds them."""
+    """Check that an instrument that reads others finds them, and fits the charts."""
     for name, spec in s.aids.items():
         for source, kind in spec.sources().items():
-            if source not in s.aids or s.aids[source].kind != kind:
-                there = [n for n, other in s.aids.items() if other.kind == kind]
-                right = f"one of that kind is {there[0]!r}" if there else f"add a table of kind = {kind!r}"
+            kinds = (kind,) if isinstance(kind, str) else kind
+            if source not in s.aids or s.aids[source].kind not in kinds:
+                there = [n for n, other in s.aids.items() if other.kind in kinds]
+                right = f"one of that kind is {there[0]!r}" if there else f"add a table of kind = {kinds[0]!r}"
                 raise ValueError(
-                    f"instruments.{name}: it reads {source!r} of kind {kind!r}, which there is not; {right}"
+                    f"instruments.{name}: it reads {source!r} of kind {' or '.join(map(repr, kinds))}, which there is "
+                    f"not; {right}"
                 )
             if s.log is not None:
                 raise ValueError(f"instruments.{name}: it reads {source!r}, which a recorded run ([log]) does not have")
+        try:
+            spec.fits(s.chart)
+        except ValueError as error:
+            raise ValueError(f"instruments.{name}: {error}") from None
 
 
 def _check_faults(s: Description) -> None:

@@ -31,6 +31,7 @@ from simnav.sensors.magnetic_field import MagneticField
 from simnav.sensors.multibeam_profile import MultibeamProfile
 from simnav.sensors.speed_log import SpeedLog
 from simnav.sensors.terrain import TerrainFix
+from simnav.sensors.terrain_match import TerrainMatch
 from simnav.sensors.usbl_fix import UsblFix
 from simnav.sensors.vessel_range import VesselRange
 from simnav.spec import OneOf
@@ -64,6 +65,7 @@ __all__ = [
     "MultibeamProfile",
     "SpeedLog",
     "TerrainFix",
+    "TerrainMatch",
     "UsblFix",
     "VesselRange",
     "build_layers",

@@ -88,6 +88,9 @@ class AidSpec(Spec):
     charts : tuple of str
         Names of the parts of the surroundings whose chart (`simnav.world.SurroundingSpec.chart`) estimators receive, in
         ``Datasheet.details``.
+    states_sigma : bool
+        Whether each reading states its own sigma (`simnav.kinds.Datasheet.stated`). Only for a kind without channels,
+        whose instrument puts the sigmas into the side information of its stream.
     unstated : tuple of str
         The error fields whose one-sigma figure is in no datasheet. Only the oracles know it, see
         `simnav.scenario.Scenario.actual_sheet`.
@@ -113,6 +116,7 @@ class AidSpec(Spec):
         "sigma", "bias", "bias_instability", "scale", "misalignment", "lever_arm_sigma",
     )  # fmt: skip
     charts: ClassVar[tuple[str, ...]] = ()
+    states_sigma: ClassVar[bool] = False
     unstated: ClassVar[tuple[str, ...]] = ()
     #: See `simnav.spec.without_later`.
     later: ClassVar[Mapping[str, Any]] = {"processes": (), "lever_arm_sigma": ZERO, "timing": None}
@@ -209,13 +213,33 @@ class AidSpec(Spec):
         """
         return ()
 
-    def sources(self) -> Mapping[str, str]:
-        """The kind of each instrument, by its name in the scenario, whose readings this one reads; none, unless a
-        subclass says so.
+    def sources(self) -> Mapping[str, str | tuple[str, ...]]:
+        """The kind of each instrument, or the kinds that it may have, by its name in the scenario, whose readings this
+        one reads; none, unless a subclass says so.
 
         With sources `build` returns a `simnav.sensors.DerivedInstrument`. A source reads no other instrument itself.
         """
         return {}
+
+    def solves(self) -> tuple[str, ...]:
+        """Those of the `sources` whose readings an estimator uses in place of those of this instrument, or not at all;
+        all of them, unless a subclass says otherwise.
+        """
+        return tuple(self.sources())
+
+    def fits(self, chart: Callable[[str], Mapping[str, Any] | None]) -> None:
+        """Check that the instrument fits the charts of its scenario; nothing, unless a subclass says otherwise.
+
+        Parameters
+        ----------
+        chart : callable
+            The chart of a part of the surroundings (`charts`), by its name; None where there is none.
+
+        Raises
+        ------
+        ValueError
+            One sentence that names the key, its value, and what would be right.
+        """
 
     def latency_spread(self) -> float | None:
         """By how much the latencies of two readings may differ [s]; None: each reading arrives when it is valid."""
@@ -275,7 +299,8 @@ class AidSpec(Spec):
             self.channels(),
             declared_processes(self.processes, definition),
             None if self.timing is None else self.timing.sheet(),
-            tuple(self.sources()),
+            self.solves(),
+            self.states_sigma,
         )
 
     def build(self, name: str, seed: int) -> Instrument:

@@ -40,7 +40,7 @@ from simnav.world.depth_grid import DepthGrid, grid_of
 from simnav.world.sound_speed import SOUND_SPEED
 from simnav.world.surroundings import FlatBottom
 
-__all__ = ["SIDE", "SoundingSpec", "Soundings", "observe", "observe_all", "reading_sigma", "soundings"]
+__all__ = ["SIDE", "SoundingSpec", "Soundings", "beam_angles", "observe", "observe_all", "reading_sigma", "soundings"]
 
 Axis = Literal["body", "vertical"]
 

@@ -99,6 +99,7 @@ def test_the_scenario_has_every_kind_of_instrument(scenario):
         "dvl_water_solution",
         "magnetic_field",
         "multibeam_profile",
+        "terrain_match",
         "usbl_fix",
         "vessel_range",
     }

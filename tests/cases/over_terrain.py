@@ -6,7 +6,7 @@ from typing import Any
 
 from simnav.scenario import Scenario
 
-__all__ = ["over_terrain"]
+__all__ = ["matched", "over_terrain"]
 
 _PLACE = {"latitude_deg": 54.0, "longitude_deg": 7.9}
 
@@ -37,3 +37,12 @@ def over_terrain(duration: float, *, sounder: Any = None, bottom: Any = None, po
             "sounder": {"kind": "altimeter", "rate_hz": 1.0, "sigma_m": 0.2} | (sounder or {}),
         },
     })  # fmt: skip
+
+
+def matched(duration: float, *, match: Any = None, sounder: Any = None, bottom: Any = None, **more: Any) -> Scenario:
+    """The same without an IMU, with a gyrocompass and a terrain-matching computer, and further tables."""
+    table = over_terrain(duration, sounder={"sigma_m": 0.1} | (sounder or {}), bottom=bottom).to_toml()
+    del table["instruments"]["imu"]
+    table["instruments"]["gyrocompass"] = {"rate_hz": 1.0, "sigma_deg": 0.3, "bias_deg": 0.5}
+    table["instruments"]["match"] = {"kind": "terrain_match", "sounder": "sounder"} | _PLACE | (match or {})
+    return Scenario.from_toml(table | more)

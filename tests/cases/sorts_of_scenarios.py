@@ -32,6 +32,7 @@ OF_EVERY_SORT = (
     "satellites-spoofing",
     "survey-without-bottom-lock",
     "terrain-flat",
+    "terrain-matching",
     "terrain-rough",
     "training-poor-imu-faults",
     "training-ships",

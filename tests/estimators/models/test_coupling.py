@@ -69,6 +69,16 @@ def test_a_model_takes_the_beams_of_a_dvl_or_what_they_give(model, used):
         assert "beams:1" in by_source(raw, model, "row")
 
 
+@pytest.mark.parametrize(
+    ("model", "used"), [(InertialModel(), {"sounder"}), (InertialModel(calibrate=False), {"matching"})]
+)
+def test_a_model_takes_soundings_or_the_fixes_that_a_computer_makes_of_them(model, used):
+    instruments = load("terrain-matching").instruments_sheet()
+    found = {name.partition(":")[0] for name in by_source(instruments, model, "row")}
+    assert found == used | {"dvl", "depth", "gyrocompass"}  # these tell the track, and are used beside the fixes
+    assert instruments["matching"].stated
+
+
 def test_the_receiver_beside_raw_observations_changes_no_bit(recording):
     both = run_trial(make("ekf"), recording)
     alone = run_trial(make("ekf"), record(raw_gnss(4.0), 1))
@@ -86,7 +96,7 @@ def test_any_row_is_loosely_coupled_on_request(recording):
 def test_a_loosely_coupled_row_needs_a_receiver():
     instruments = record(raw_gnss(2.0), 1).instruments
     assert lacking(make("ekf-loose").needs, instruments) == (
-        "it needs gnss_receiver or dvl_solution or dvl_water_solution; there is none"
+        "it needs gnss_receiver or dvl_solution or dvl_water_solution or terrain_match; there is none"
     )
     assert not lacking(make("ekf").needs, instruments)
     with pytest.raises(UnsuitableScenario):
