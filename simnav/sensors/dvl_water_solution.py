@@ -67,7 +67,8 @@ def observe(point: NavigationPoint, sheet: Datasheet) -> tuple[Array, dict[str, 
         equation=observe,
         datasheet=("array", "slant"),
     ),
-    example={"sigma_m_s": [0.01, 0.01, 0.005]},
+    example={"beams": "water_track", "sigma_m_s": [0.01, 0.01, 0.005]},
+    beside={"water_track": {"kind": "dvl_beams", "frequency_khz": 600, "track": "water"}},
 )
 class DvlWaterSolution(BeamSolution):
     """Velocity through the water in body axes, solved from the beams of another instrument with water track.

@@ -36,22 +36,12 @@ from simnav.sensors.block_values import BlockValues, check_blocks
 from simnav.sensors.error_processes import AnyErrorProcess, TotalError, declared_processes, labels_of, white_of
 from simnav.sensors.errors import InstrumentError, label_of, raised
 from simnav.sensors.figures import PROCESSES, ZERO, Pair, SigmaPair, SigmaTriple, Triple, figures_of, times_datasheet
+from simnav.sensors.kind_check import check_kind
 from simnav.sensors.processes import GaussMarkov
 from simnav.sensors.rows import checked_reading, checked_rows
 from simnav.sensors.timing import TimingSpec
 from simnav.sensors.turning import turn_to_body, turn_to_ned
-from simnav.spec import (
-    UNITS,
-    NonNegative,
-    Positive,
-    Spec,
-    SpecError,
-    closest,
-    entries,
-    quantity,
-    unit_of,
-    without_later,
-)  # fmt: skip
+from simnav.spec import NonNegative, Positive, Spec, SpecError, closest, entries, quantity, without_later
 from simnav.streams import stream
 from simnav.types import Array, Datasheet, TapStates
 from simnav.world.surroundings import Surroundings
@@ -85,6 +75,8 @@ class AidSpec(Spec):
         A table of a scenario file with an instrument of this kind; set by `register_instrument`.
     errors : tuple of str
         Names of the error fields; each may also exist with the prefix ``fixed_``. All are zero for an ideal instrument.
+    beside : mapping
+        Tables of the instruments that the example reads, by name, if there are any (`register_instrument`).
     charts : tuple of str
         Names of the parts of the surroundings whose chart (`simnav.world.SurroundingSpec.chart`) estimators receive, in
         ``Datasheet.details``.
@@ -112,6 +104,7 @@ class AidSpec(Spec):
 
     definition: ClassVar[Kind]
     example: ClassVar[Mapping[str, Any]]
+    beside: ClassVar[Mapping[str, Mapping[str, Any]]] = {}
     errors: ClassVar[tuple[str, ...]] = (
         "sigma", "bias", "bias_instability", "scale", "misalignment", "lever_arm_sigma",
     )  # fmt: skip
@@ -336,7 +329,9 @@ class AidSpec(Spec):
 S = TypeVar("S", bound=AidSpec)
 
 
-def register_instrument(kind: Kind, *, example: Mapping[str, Any]) -> Callable[[type[S]], type[S]]:
+def register_instrument(
+    kind: Kind, *, example: Mapping[str, Any], beside: Mapping[str, Mapping[str, Any]] | None = None
+) -> Callable[[type[S]], type[S]]:
     """Register a kind of instrument (class decorator). Its name is the default of the field ``kind``.
 
     Parameters
@@ -346,6 +341,8 @@ def register_instrument(kind: Kind, *, example: Mapping[str, Any]) -> Callable[[
     example : mapping
         A table of a scenario file, without ``kind``, with a typical instrument of this kind. The contract test of
         estimators (`simnav.check`) puts it on a vessel that sails from 54.0 N, 7.9 E.
+    beside : mapping, optional
+        Tables of further instruments by name, which the example reads, where no example of another kind will do.
 
     Raises
     ------
@@ -364,32 +361,8 @@ def register_instrument(kind: Kind, *, example: Mapping[str, Any]) -> Callable[[
         )
         if name in _RESERVED:
             raise PluginError(f"kind {name!r} of instrument {cls.__qualname__}: the name means something else")
-        for field, info in AidSpec.model_fields.items():
-            unit = unit_of(info)
-            if unit_of(cls.model_fields[field]) != unit:
-                raise PluginError(
-                    f"kind {name!r}: every instrument has the field {field!r}"
-                    f"{'' if unit is None else f', in {unit}'}; {cls.__qualname__} should call its own something else"
-                )
-        for component in kind.components:
-            for unit in (component.unit, component.error_unit):
-                if unit not in UNITS:
-                    raise PluginError(
-                        f"kind {name!r}: the unit {unit!r} is unknown; simnav.spec.register_unit adds one; "
-                        f"there are: {', '.join(UNITS)}"
-                    )
-        for component in kind.side:
-            if component.unit and component.unit not in UNITS:
-                raise PluginError(
-                    f"kind {name!r}: the unit {component.unit!r} of its side information {component.name!r} is "
-                    f"unknown; it is empty for a number without a unit, or one of: {', '.join(UNITS)}"
-                )
-        for detail in kind.datasheet:
-            if detail not in cls.model_fields:
-                raise PluginError(
-                    f"kind {name!r}: the datasheet names {detail!r}, but {cls.__qualname__} has no such field"
-                )
-        cls.definition, cls.example = kind, dict(example)
+        check_kind(cls, AidSpec, name, kind)
+        cls.definition, cls.example, cls.beside = kind, dict(example), dict(beside or {})
         with INSTRUMENTS.adding(name, cls):
             source = f"the example of kind {name!r}"
             try:

@@ -313,7 +313,9 @@ def _contract_scenario(specs: Sequence[type[AidSpec]]) -> Scenario:
         kind = cls.model_fields["kind"].default
         spec = cls.from_toml({**cls.example, "kind": kind})
         dear = spec.channels() or len(spec.blocks()) > 1
-        table["instruments"][kind] = {**cls.example, **({"rate_hz": 1.0 / _DEAR_EVERY} if dear else {})}
+        seldom = {"rate_hz": 1.0 / _DEAR_EVERY} if dear else {}
+        table["instruments"][kind] = {**cls.example, **seldom}
+        table["instruments"] |= {name: {**other, **seldom} for name, other in cls.beside.items()}
     return Scenario.from_toml(table, source="the contract test")
 
 

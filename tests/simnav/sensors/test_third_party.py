@@ -185,10 +185,10 @@ def test_an_edited_file_takes_the_place_of_its_older_self(plugins, text, tmp_pat
 
 
 def test_the_contract_test_has_every_kind(plugins):
-    before = set(contract_recording(0).instruments)
+    before = {sheet.kind for sheet in contract_recording(0).instruments.values()}
     load_plugin(plugins / "beacon.py")
     recording = contract_recording(0)
-    assert set(recording.instruments) == {*before, "beacon"} == set(KINDS)
+    assert {sheet.kind for sheet in recording.instruments.values()} == {*before, "beacon"} == set(KINDS)
     assert len(recording.data.aids["beacon"]) == 40
     assert check("ekf").passed
 
@@ -199,7 +199,7 @@ def test_a_kind_whose_instrument_fails_is_left_out_of_the_contract_test(plugins,
     load_plugin(tmp_path / "broken.py")
     with pytest.warns(UserWarning, match="kind 'beacon' are left out of the contract test: .* NameError"):
         recording = contract_recording(0)
-    assert set(recording.instruments) == set(KINDS) - {"beacon"}
+    assert {sheet.kind for sheet in recording.instruments.values()} == set(KINDS) - {"beacon"}
 
 
 def test_the_environment_has_its_space(lagoon):
