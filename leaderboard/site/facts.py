@@ -219,10 +219,17 @@ def _table(values: Mapping[str, Any], skip: Iterable[str] = ()) -> str:
             if inner := _table(value):
                 found.append(f"{name} ({inner})")
         elif isinstance(value, (list, tuple, np.ndarray)):
-            found.append(f"{name} {', '.join(tables.number(v) for v in value)}{unit}")
+            found.append(f"{name} {', '.join(map(_entry, value))}{unit}")
         else:
-            found.append(f"{name} {tables.number(value)}{unit}")
+            found.append(f"{name} {_entry(value)}{unit}")
     return "; ".join(found)
+
+
+def _entry(value: Any) -> str:
+    """A number, a word, or a table in a list, such as a process of an error."""
+    if isinstance(value, Mapping):
+        return f"({_table(value)})"
+    return value if isinstance(value, str) else tables.number(value)
 
 
 _SIGNS = {"deg": "°", "percent": "%", "ug": "µg", "hz": "Hz", "k": "K", "1": "1", "per": "1"}

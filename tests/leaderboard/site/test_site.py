@@ -531,3 +531,14 @@ def test_the_table_of_a_scenario_has_no_column_over_several(folder):
     keys = [c["key"] for c in data_of(folder / f"{SCENARIOS[0]}.html")["table"]["columns"]]
     assert "gain_interval" in keys
     assert not {"won", "gain_scenarios", "over_scenarios"} & set(keys)
+
+
+def test_datasheets_of_any_instrument_are_words() -> None:
+    """Processes of an error are tables in a list, and beacons have names."""
+    for name in ("coloured-fixes", "satellites-harbour", "under-ice-transit"):
+        scenario = load(name).model_copy(update={"duration": 2.0})
+        found = {one["name"]: one["text"] for one in datasheets(scenario, record(scenario, 0))}
+        assert set(found) == {*scenario.instruments, *(["imu"] if scenario.imu is not None else [])}
+        assert not any("{" in text for text in found.values())
+        if name == "coloured-fixes":
+            assert "error (kind gauss_markov; correlation time" in found["gnss"]
