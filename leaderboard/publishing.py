@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -381,8 +381,10 @@ def publish_standard(request: PublishRequest) -> Published:
             preliminary=request.preliminary,
         )
     if request.site is not None:
-        published = {(r.scenario, r.estimator, r.seed) for r in made.results}
-        found = [r for r in results_of(working, series=True) if (r.scenario, r.estimator, r.seed) in published]
+        # Scores are those that were published: they are shorter, and decide how a run at a limit ended.
+        scores = {(r.scenario, r.estimator, r.seed): r.scores for r in made.results}
+        every = ((r, scores.get((r.scenario, r.estimator, r.seed))) for r in results_of(working, series=True))
+        found = [replace(r, scores=known) for r, known in every if known is not None]
         found, seeds = attached(found)
         output = absolute(request.site)
         build(found, made.ranking, output, home=linked_from(output), progress=request.progress, workers=request.workers,
