@@ -26,10 +26,12 @@ from simnav.leaderboard.results.home import Home
 from simnav.leaderboard.results.result import Result
 from simnav.leaderboard.site import charts, site, sweeps
 from simnav.leaderboard.site.entries import entries
-from simnav.leaderboard.site.facts import estimator_facts
+from simnav.leaderboard.site.facts import datasheets, estimator_facts
 from simnav.leaderboard.site.overview import bar_scale, overview
 from simnav.leaderboard.site.scenario_page import ScenarioData
+from simnav.scenario import load
 from simnav.scoring import SCORES
+from simnav.source import record
 from tests.leaderboard.site.conftest import made_up_sweep
 
 SCENARIOS = ("made-up-one-v1", "made-up-two-v3")
