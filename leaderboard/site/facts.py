@@ -45,6 +45,8 @@ _FAMILIES = {
     "robust_windows": "Robust factor graph",
     "gtsam": "GTSAM",
     "loosely_coupled": "Loosely coupled",
+    "cooperative": "Kalman filter",
+    "terrain": "Point-mass filter",
     "smoothers": "Smoother",
     "anfis": "Learned",
     "policy": "Learned",

@@ -160,7 +160,8 @@ def solve_beams(radial: Array, azimuth: Array, slant: Array, sigma: Array) -> Ja
         use = np.arange(4) != (-1 if lost is None else lost)
         of = (heard == use).all(axis=1)
         inverse = np.linalg.pinv(axes[use])
-        velocity[of] = radial[of][:, use] @ inverse.T
+        # Summed beam by beam: the last bits of a product of matrices depend on how many pings there are.
+        velocity[of] = sum(radial[of, beam, None] * part for beam, part in zip(np.flatnonzero(use), inverse.T))
         covariance[of] = np.einsum("ik,nk,jk->nij", inverse, np.square(sigma[of][:, use]), inverse)
     signs = np.empty(4)
     signs[np.argsort(azimuth)] = [1.0, -1.0, 1.0, -1.0]

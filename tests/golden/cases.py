@@ -152,6 +152,20 @@ CASES = {
         "kind": "multibeam_profile", "rate_hz": 0.25, "beams": 3, "swath_deg": 60.0, "beam_width_deg": 4.0,
         "false_readings": 0.1, "chart_error_m": 0.2, "sound_speed_percent": 0.1, "axis": "vertical",
     }}),
+    "fixes of terrain matching, and the velocity through the water": Case("terrain-matching", 16.0, (
+        _fault("bias_step", "sounder", 9.0, 12.0, offset_m=2.0),
+        _fault("outage", "water_track", 5.0, 9.0, channels=["2"]),
+    ), instruments={"sounder": {
+        "kind": "multibeam_profile", "rate_hz": 1.0, "beams": 5, "swath_deg": 60.0, "sigma_m": 0.05,
+    }, "matching": {
+        "kind": "terrain_match", "sounder": "sounder", "rate_hz": 0.25, "window_s": 4.0, "least_soundings": 8,
+        "uniqueness": 1.0, "latitude_deg": 54.0, "longitude_deg": 4.0, "first_search_m": 100.0,
+    }, "water_track": {
+        "kind": "dvl_beams", "frequency_khz": 600, "rate_hz": 1.0, "track": "water", "current_m_s": 0.2,
+    }, "water_velocity": {
+        "kind": "dvl_water_solution", "beams": "water_track", "rate_hz": 1.0, "sigma_m_s": [0.01, 0.01, 0.005],
+        "sound_speed_percent": 0.2, "mounting_deg": 0.1, "current_m_s": 0.2,
+    }}),
     "messages of a ship and of a second vehicle, some of them lost": Case("auv-and-ship", 16.0, (
         _fault("bias_step", "modem", 5.0, 9.0, offset_m=6.0),
         _fault("outage", "second", 7.0, 12.0),

@@ -448,7 +448,7 @@ def test_an_estimator_gives_the_same_numbers_as_an_agent_and_on_its_own(scenario
 
 @pytest.mark.parametrize("name", [n for n in first_of_each_sort() if not make(n).reference])
 def test_every_sort_of_estimator_navigates_in_the_environment_as_in_a_trial(name):
-    for where in ("open-sea", "ship-straight", "satellites-open-sea"):
+    for where in ("open-sea", "ship-straight", "satellites-open-sea", "auv-and-ship", "terrain-rough"):
         short = load(where).model_copy(update={"duration": 60.0})
         trial = run_trial(make(name), record(short, 4))
         if trial.status != "unsuitable":

@@ -275,4 +275,5 @@ def test_the_recording_has_every_kind_of_instrument():
     recording = contract_recording(0)
     assert {s.kind for s in recording.instruments.values()} == set(KINDS)
     assert recording.instruments.imu is not None
-    assert all(len(s) > 3 for s in recording.data.aids.values())
+    # Over a level bottom no profile of depths can be matched.
+    assert all(len(s) > 3 for s in recording.data.aids.values() if s.kind != "terrain_match")

@@ -124,7 +124,7 @@ def test_tables_round_trip_and_count_in_the_digest(shoal, plugins, text):
         (
             'kind = "slope"',
             "",
-            "surroundings.bottom has no key 'kind'; one of: wind, obstacles, .*, slope, sound_speed",
+            "surroundings.bottom has no key 'kind'; one of: bathymetry, wind, .*, slope, sound_speed",
         ),
         ('kind = "slope"', 'kind = "slop"', "surroundings.bottom.kind = 'slop' is unknown; did you mean 'slope'"),
         ("[start]", "water_depth_m = 40.0\n[start]", "surroundings.bottom: water_depth_m says the same"),
