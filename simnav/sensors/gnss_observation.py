@@ -14,6 +14,7 @@ from simnav.geometry.earth import displace_scalar
 from simnav.geometry.ecef import ecef_from_geodetic_scalar
 from simnav.kinds import Component, Datasheet, NavigationPoint, NavigationPoints
 from simnav.satellites.signal_errors import amplification, noise_factor, range_error
+from simnav.sensors.one_of_many import one_of_many
 from simnav.types import Array
 
 __all__ = ["DENSITY_RATIO", "SIDE", "observe", "observe_all", "reading_sigma"]
@@ -92,13 +93,7 @@ def _predict_all(
 
 def observe(point: NavigationPoint, sheet: Datasheet) -> tuple[Array, dict[str, Array]]:
     """Pseudorange and its rate at a state, and their Jacobian by block (`simnav.kinds.Observation`)."""
-    blocks = {name: values[None] for name, values in point.blocks.items()}
-    points = NavigationPoints(
-        np.array([point.time]), point.position[None], point.velocity[None], point.dcm[None], point.angular_rate[None],
-        blocks, np.array([sheet.channels.index(point.channel)]), point.side[None],
-    )  # fmt: skip
-    reading, given = observe_all(points, sheet)
-    return reading[0], {name: block[0] for name, block in given.items()}
+    return one_of_many(observe_all, point, sheet)
 
 
 def observe_all(points: NavigationPoints, sheet: Datasheet) -> tuple[Array, dict[str, Array]]:

@@ -32,6 +32,7 @@ from simnav.recording import AidStream
 from simnav.sensors.channels import ChannelInstrument
 from simnav.sensors.errors import InstrumentError
 from simnav.sensors.instrument import ZERO, AidSpec, Instrument
+from simnav.sensors.one_of_many import one_of_many
 from simnav.sensors.pacing import Pings
 from simnav.spec import NonNegative, Positive, Vector, quantity
 from simnav.types import NO_SIDE, Array, TapStates
@@ -179,13 +180,7 @@ def observe_all(points: NavigationPoints, sheet: Datasheet) -> tuple[Array, dict
 
 def observe(point: NavigationPoint, sheet: Datasheet) -> tuple[Array, dict[str, Array]]:
     """The range at a state and its Jacobian by block (`simnav.kinds.Observation`)."""
-    blocks = {name: values[None] for name, values in point.blocks.items()}
-    points = NavigationPoints(
-        np.array([point.time]), point.position[None], point.velocity[None], point.dcm[None], point.angular_rate[None],
-        blocks, np.array([sheet.channels.index(point.channel)]), point.side[None],
-    )  # fmt: skip
-    reading, given = observe_all(points, sheet)
-    return reading[0], {name: block[0] for name, block in given.items()}
+    return one_of_many(observe_all, point, sheet)
 
 
 def reading_sigma(side: Array, sheet: Datasheet) -> Array:
