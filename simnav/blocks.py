@@ -98,6 +98,10 @@ class StateBlock:
     correlation_time: float = inf
     shared: str = ""
 
+    def __deepcopy__(self, memo: object) -> StateBlock:
+        """Itself: it never changes, and an estimator that takes late readings is copied in each step."""
+        return self
+
     def __post_init__(self) -> None:
         for field in ("name", *(["shared"] if self.shared else [])):
             text = getattr(self, field)

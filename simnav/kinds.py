@@ -324,6 +324,10 @@ class Kind:
     message_noise: MessageNoise | None = None
     _limits: tuple[float, ...] = field(init=False, repr=False)
 
+    def __deepcopy__(self, memo: object) -> Kind:
+        """Itself: there is one object for each registered kind, and it never changes."""
+        return self
+
     def __post_init__(self) -> None:
         if self.role not in get_args(Role):
             raise PluginError(f"role = {self.role!r} of a kind should be one of: {', '.join(get_args(Role))}")

@@ -37,6 +37,10 @@ class ChannelDatasheet(Datasheet):
     channel: str = ""
     siblings: tuple[str, ...] = ()
 
+    def __deepcopy__(self, memo: object) -> ChannelDatasheet:
+        """Itself: it never changes, and an estimator that takes late readings is copied in each step."""
+        return self
+
 
 _FIELDS = tuple(field.name for field in fields(Datasheet))
 

@@ -459,7 +459,7 @@ class InertialModel(ErrorModel):
         """As `ErrorModel.assimilate_together`, where a kind predicts many readings at one time."""
         names = [m.instrument for m in measurements]
         many = next((many for many in self.many if names[0] in many.sources), None)
-        if many is None or not self.fused:
+        if many is None or many.biased or not self.fused:
             return None
         if self.own[names[0]].has_noise:
             return None

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from simnav.blocks import NAVIGATION
 from simnav.geometry.earth import earth_rate
-from simnav.kinds import NavigationPoints, Observations
+from simnav.kinds import NavigationPoints
 from simnav.types import Array
 
 from .ambiguity import innovation_of
@@ -37,34 +37,44 @@ def of_instruments(own: Mapping[str, OwnObservation], bias_at: Mapping[str, int]
     groups: dict[str, list[str]] = {}
     for name, observation in own.items():
         sheet = observation.sheet
-        if isinstance(sheet, ChannelDatasheet) and observation.kind.observations is not None:
+        if isinstance(sheet, ChannelDatasheet) and observation.observations is not None:
             groups.setdefault(sheet.instrument, []).append(name)
-    return [
-        ManyReadings({name: own[name] for name in names}, observations)
-        for names in groups.values()
-        if (observations := own[names[0]].kind.observations) is not None and bias_at.keys().isdisjoint(names)
-    ]
+    return [ManyReadings({name: own[name] for name in names}, bias_at) for names in groups.values()]
 
 
 class ManyReadings:
-    """The measurement equation of all channels of an instrument, without biases of the channels.
+    """The measurement equation of all channels of an instrument.
 
     Parameters
     ----------
     own : mapping of str to OwnObservation
         The equation of each channel, by its source.
-    observations : callable
-        The function of the kind.
+    bias_at : mapping of str to int
+        As of `of_instruments`.
+
+    Attributes
+    ----------
+    biased : bool
+        Whether a channel has biases. Filters take such channels one by one; a change needs new versions of their rows.
     """
 
-    def __init__(self, own: Mapping[str, OwnObservation], observations: Observations):
+    def __init__(self, own: Mapping[str, OwnObservation], bias_at: Mapping[str, int]):
         first = next(iter(own.values()))
         assert isinstance(first.sheet, ChannelDatasheet)
-        self.sources, self.kind, self._observations = tuple(own), first.kind, observations
+        assert first.observations is not None
+        self.sources, self.kind, self._observations = tuple(own), first.kind, first.observations
         self._sheet = whole(first.sheet)
         self._channel = {name: first.sheet.siblings.index(o.channel) for name, o in own.items()}
+        #: Of each channel: the index in the error state of its first bias; -1 without biases.
+        self._bias_at = np.full(len(first.sheet.siblings), -1)
+        self._bias_at[list(self._channel.values())] = [bias_at.get(name, -1) for name in own]
+        self.biased = bool(np.any(self._bias_at >= 0))
         self._places = first.places
         self._zeros = {b.name: np.zeros((1, b.size)) for b in first.sheet.blocks if b.name not in self._places}
+
+    def __deepcopy__(self, memo: object) -> ManyReadings:
+        """Itself: it never changes, and an estimator that takes late readings is copied in each step."""
+        return self
 
     def channels(self, names: Sequence[str]) -> NDArray[np.intp]:
         """(k,) places of the channels of sources in the datasheet; -1 for the sources of other instruments."""
@@ -109,6 +119,13 @@ class ManyReadings:
         jacobian[:, :, :9] = given[NAVIGATION]
         for name, where in at.items():
             jacobian[:, :, where.start + offset : where.stop + offset] = given[name]
+        biased = np.flatnonzero(self._bias_at[channel] >= 0)
+        if len(biased):
+            component = np.arange(value.shape[1])
+            columns = self._bias_at[channel[biased], None] + component
+            jacobian[biased[:, None], component, columns] = 1.0
+            reading = np.array(reading)
+            reading[biased] = self.kind.add_error(reading[biased], calibration[biased[:, None], columns - offset])
         return innovation_of(self.kind, self._sheet, value, reading), jacobian
 
     def noise(self, side: Array) -> Array:

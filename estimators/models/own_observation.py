@@ -31,7 +31,7 @@ from simnav.types import KINDS, NO_SIDE, Array, Datasheet
 
 from .ambiguity import innovation_of
 from .channels import ChannelDatasheet, whole
-from .delayed import acceleration
+from .delayed import acceleration, is_delayed
 from .levered import observation_of
 
 __all__ = ["OwnObservation"]
@@ -75,6 +75,8 @@ class OwnObservation:
         observation = observation_of(sheet)
         assert observation is not None
         self._observation = observation
+        #: The function for many readings. It knows no delays.
+        self.observations = None if is_delayed(sheet) else self.kind.observations
         self._since, self._variance = since, sheet.sigma**2
         #: Index of the first state of each block that has states.
         self.places: Mapping[str, int] = {b.name: places[b.name] for b in sheet.blocks if b.name in places}
@@ -98,6 +100,10 @@ class OwnObservation:
         self._steps = [
             s * _PART_OF_SIGMA or _SMALLEST_STEP for b in sheet.blocks for s in np.atleast_1d(b.sigma).tolist()
         ]
+
+    def __deepcopy__(self, memo: object) -> OwnObservation:
+        """Itself: it never changes, and an estimator that takes late readings is copied in each step."""
+        return self
 
     def point(
         self, time: float, position: Array, velocity: Array, dcm: Array, rate: Array, bias: Array, values: Array,
@@ -265,7 +271,7 @@ class OwnObservation:
 
         It tells nothing about whether the state has a reading, so a kind that may have none has no such form.
         """
-        if self.kind.observations is None or self.has_noise:
+        if self.observations is None or self.has_noise:
             return None
         return self.reading_noise(side)
 
@@ -383,7 +389,7 @@ class OwnObservation:
         velocities = point.velocity + errors[:, 3:6]
         attitudes = dcm_from_rotation_vector(errors[:, 6:9]) @ point.dcm
         states = positions, velocities, attitudes, point.angular_rate - errors[:, 9:12]
-        if self.kind.observations is not None:
+        if self.observations is not None:
             differences = np.asarray(self.kind.difference(self._many(point, states, errors, offset), reading))
         else:
             for k, state in enumerate(zip(*states, strict=True)):
@@ -399,7 +405,7 @@ class OwnObservation:
         self, point: NavigationPoint, states: tuple[Array, Array, Array, Array], errors: Array, offset: int
     ) -> Array:
         """The (k, d) readings at k states by one call, for a kind that predicts many (`simnav.kinds.Observations`)."""
-        assert self.kind.observations is not None
+        assert self.observations is not None
         k = len(errors)
         blocks = {name: np.broadcast_to(zero, (k, len(zero))) for name, zero in self._zeros.items()}
         for name, at in self._slices:
@@ -407,7 +413,7 @@ class OwnObservation:
         channel = self._given.channels.index(self.channel) if self.channel else 0
         side = np.broadcast_to(point.side, (k, *point.side.shape))
         points = NavigationPoints(np.full(k, point.time), *states, blocks, np.full(k, channel), side)
-        reading, _ = self.kind.observations(points, self._given)
+        reading, _ = self.observations(points, self._given)
         return np.asarray(reading)
 
     def by_angular_rate(self, point: NavigationPoint) -> Array:

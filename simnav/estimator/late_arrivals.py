@@ -147,7 +147,8 @@ class LateArrivals:
         self.manner = manner
         self._truth = {key: list(times) for key, times in (truth or {}).items()}
         self._knows = bool(truth)
-        self._shared = tuple(shared)
+        #: What copies of the estimator share: it does not write into its input.
+        self._shared = (*shared, instruments, instruments.imu, *instruments.values())
         self._order = {
             (name, channel): (i, j)
             for i, (name, sheet) in enumerate(instruments.items())

@@ -33,8 +33,8 @@ from pydantic import Field, model_validator
 
 from simnav.blocks import StateBlock
 from simnav.geometry.earth import displace
-from simnav.geometry.rotation import dcm_from_rotation_vector
-from simnav.kinds import Component, Datasheet, Kind, NavigationPoint, speed_components
+from simnav.geometry.rotation import dcm_from_rotation_vector, skew
+from simnav.kinds import Component, Datasheet, Kind, NavigationPoint, NavigationPoints, speed_components
 from simnav.labels import REFLECTION, FaultLabel
 from simnav.recording import AidStream
 from simnav.sensors.channels import ChannelInstrument
@@ -48,6 +48,7 @@ from simnav.sensors.instrument import (
     turn_to_ned,
 )
 from simnav.sensors.janus import absorption, beam_axes, noise_by_range, signal_margin
+from simnav.sensors.one_of_many import one_of_many
 from simnav.sensors.pacing import Pings
 from simnav.sensors.processes import GaussMarkov
 from simnav.spec import NonNegative, Positive, Vector, quantity
@@ -127,30 +128,36 @@ def _directions(side: Array, array: str, scale: Array) -> tuple[Array, Array]:
     return np.column_stack([axes[:, :2], steered]), change
 
 
-def observe(point: NavigationPoint, sheet: Datasheet) -> tuple[Array, dict[str, Array]]:
-    """The velocity along a beam and its Jacobian by block (`simnav.kinds.Observation`)."""
-    blocks, arm = point.blocks, sheet.lever_arm
-    scale = blocks["sound_speed"] if "sound_speed" in blocks else np.zeros(1)
-    along, change = (a[0] for a in _directions(point.side[None], sheet.details["array"], scale))
-    mounting = blocks["mounting"] if "mounting" in blocks else np.zeros(3)
-    velocity = point.velocity.copy()
+def observe_all(points: NavigationPoints, sheet: Datasheet) -> tuple[Array, dict[str, Array]]:
+    """The velocities along a beam at n states, and their Jacobians by block (`simnav.kinds.Observations`)."""
+    n, blocks, velocity = len(points.velocity), points.blocks, points.velocity
+    scale = blocks["sound_speed"][:, 0] if "sound_speed" in blocks else np.zeros(n)
+    along, change = _directions(points.side, sheet.details["array"], scale)
     if "current" in blocks:
-        velocity[:2] -= blocks["current"]
-    body = point.dcm.T @ velocity + np.cross(point.angular_rate, arm)
-    turn = dcm_from_rotation_vector(mounting)
-    own = turn.T @ body
-    d = turn @ along  # in body axes
-    navigation = np.zeros((1, 9))
-    navigation[0, 3:6] = point.dcm @ d
-    navigation[0, 6:9] = np.cross(point.dcm @ d, velocity)
+        velocity = velocity.copy()
+        velocity[:, :2] -= blocks["current"]
+    own = (velocity[:, None] @ points.dcm)[:, 0] + points.angular_rate @ skew(sheet.lever_arm)
+    body = along  # in body axes
+    if "mounting" in blocks:
+        turn = dcm_from_rotation_vector(blocks["mounting"])
+        own, body = (own[:, None] @ turn)[:, 0], (turn @ along[:, :, None])[:, :, 0]
+    level = points.dcm @ body[:, :, None]
+    navigation = np.zeros((n, 1, 9))
+    navigation[:, 0, 3:6] = level[:, :, 0]
+    navigation[:, :, 6:9] = velocity[:, None] @ skew(level[:, :, 0]).swapaxes(1, 2)
     jacobian = {"navigation": navigation}
     if "sound_speed" in blocks:
-        jacobian["sound_speed"] = np.array([[change @ own]])
+        jacobian["sound_speed"] = np.sum(change * own, axis=1)[:, None, None]
     if "mounting" in blocks:
-        jacobian["mounting"] = np.cross(along, own)[None]
+        jacobian["mounting"] = own[:, None] @ skew(along).swapaxes(1, 2)
     if "current" in blocks:
-        jacobian["current"] = -navigation[:, 3:5]
-    return np.array([along @ own]), jacobian
+        jacobian["current"] = -navigation[:, :, 3:5]
+    return np.sum(along * own, axis=1)[:, None], jacobian
+
+
+def observe(point: NavigationPoint, sheet: Datasheet) -> tuple[Array, dict[str, Array]]:
+    """The velocity along a beam and its Jacobian by block (`simnav.kinds.Observation`)."""
+    return one_of_many(observe_all, point, sheet)
 
 
 def reading_sigma(side: Array, sheet: Datasheet) -> Array:
@@ -164,6 +171,7 @@ def reading_sigma(side: Array, sheet: Datasheet) -> Array:
         role="velocity",
         components=speed_components("radial"),
         equation=observe,
+        observations=observe_all,
         datasheet=("array", "track", "frequency_khz"),
         side=(
             Component("azimuth", "deg"),

@@ -23,9 +23,10 @@ def one_of_many(observations: Observations, point: NavigationPoint, sheet: Datas
         Of the instrument.
     """
     blocks = {name: values[None] for name, values in point.blocks.items()}
+    channel = sheet.channels.index(point.channel) if point.channel else 0
     points = NavigationPoints(
         np.array([point.time]), point.position[None], point.velocity[None], point.dcm[None], point.angular_rate[None],
-        blocks, np.array([sheet.channels.index(point.channel)]), point.side[None],
+        blocks, np.array([channel]), point.side[None],
     )  # fmt: skip
     reading, given = observations(points, sheet)
     return reading[0], {name: block[0] for name, block in given.items()}

@@ -11,12 +11,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from math import degrees
+from functools import cached_property
+from math import degrees, inf, isnan, nan
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from simnav.compiled import Flags, kernel
 from simnav.geometry.earth import principal_radii, relative_position
 from simnav.types import Array
 
@@ -25,8 +27,8 @@ __all__ = ["DepthGrid", "grid_of"]
 #: Steps of Newton's method for a ray that is not vertical, and the least rate of approach to the bottom, in metres of
 #: depth for each metre of the ray.
 _STEPS, _GRAZING = 8, 0.1
-#: A ray has arrived where the bottom is so near [m].
-_ARRIVED = 1e-6
+#: A ray has arrived where the bottom is so near, and has met it where it is so near in the end [m].
+_ARRIVED, _NEAR = 1e-6, 1e-3
 #: Charts that are kept as grids.
 _MOST_KEPT = 16
 _kept: dict[int, tuple[Any, DepthGrid]] = {}
@@ -55,6 +57,15 @@ class DepthGrid:
     middle: Array
     spacing: Array
     depth: Array
+
+    @cached_property
+    def _nodes(self) -> Array:
+        """The depths, as kernels take them."""
+        return np.require(self.depth, np.float64, ["C_CONTIGUOUS", "WRITEABLE"])
+
+    @cached_property
+    def _spacing(self) -> tuple[float, float]:
+        return float(self.spacing[0]), float(self.spacing[1])
 
     @property
     def half(self) -> Array:
@@ -93,25 +104,8 @@ class DepthGrid:
         gradient : (n, 2) array
             Derivative of the depth northwards and eastwards; zero beyond the edges.
         """
-        n = len(offset)
-        index, weight, slope = [], [], []
-        for axis in range(2):
-            last = self.depth.shape[axis] - 1
-            u = offset[:, axis] / self.spacing[axis] + 0.5 * last
-            within = (u >= 0.0) & (u <= last)
-            u = np.clip(u, 0.0, last)
-            first = np.minimum(u.astype(np.intp), max(last - 1, 0))
-            t = u - first
-            index.append(np.clip(first[:, None] + np.arange(-1, 3), 0, last))
-            w, dw = _weights(t)
-            weight.append(w)
-            slope.append(dw * (within / self.spacing[axis])[:, None])
-        nodes = self.depth[index[0][:, :, None], index[1][:, None, :]]
-        along = np.matmul(nodes, weight[1][:, :, None])[:, :, 0]
-        depth = np.sum(along * weight[0], axis=1)
-        gradient = np.empty((n, 2))
-        gradient[:, 0] = np.sum(along * slope[0], axis=1)
-        gradient[:, 1] = np.sum(np.matmul(nodes, slope[1][:, :, None])[:, :, 0] * weight[0], axis=1)
+        depth, gradient = np.empty(len(offset)), np.empty((len(offset), 2))
+        _depths(self._nodes, *self._spacing, np.ascontiguousarray(offset), depth, gradient)
         return depth, gradient
 
     def distance(self, offset: Array, depth: Array, ray: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
@@ -135,23 +129,11 @@ class DepthGrid:
         met : (n,) array of bool
             Whether the ray comes to the bottom there, to a millimetre and not grazing.
         """
-        found, gradient = self.at(offset)
-        level = ~ray[:, :2].any()
-        distance = (found - depth) / np.maximum(ray[:, 2], _GRAZING)
-        if level:
-            return distance, gradient, np.ones(len(distance), np.bool_)
-        above, closing = np.full(len(distance), np.inf), np.empty(len(distance))
-        moving = np.arange(len(distance))
-        for _ in range(_STEPS):  # a ray that has arrived stays as it is, whatever other rays do
-            there, down = distance[moving], ray[moving, 2]
-            found, gradient[moving] = self.at(offset[moving] + there[:, None] * ray[moving, :2])
-            above[moving] = found - depth[moving] - there * down
-            closing[moving] = down - np.sum(gradient[moving] * ray[moving, :2], axis=1)
-            moving = moving[abs(above[moving]) > _ARRIVED]
-            if not len(moving):
-                break
-            distance[moving] += above[moving] / np.maximum(closing[moving], _GRAZING)
-        return distance, gradient, (abs(above) < 1e-3) & (closing > _GRAZING)
+        n = len(offset)
+        distance, gradient, met = np.empty(n), np.empty((n, 2)), np.empty(n, np.bool_)
+        places, rays = np.ascontiguousarray(offset), np.ascontiguousarray(ray)
+        _distances(self._nodes, *self._spacing, places, np.ascontiguousarray(depth), rays, distance, gradient, met)
+        return distance, gradient, met
 
     def chart(self) -> dict[str, Any]:
         """The grid as a datasheet has it: `grid_of` makes a grid of it again."""
@@ -195,13 +177,82 @@ def grid_of(chart: Mapping[str, Any]) -> DepthGrid:
     return grid
 
 
-def _weights(t: Array) -> tuple[Array, Array]:
-    """(n, 4) weights of the nodes -1 to 2 at n places between the nodes 0 and 1, and their derivatives."""
+@kernel()
+def _between(place: float, spacing: float, last: int) -> tuple[int, float, float]:
+    """The node before a place, the part of the way to the next one, and the derivative of that: zero beyond an edge."""
+    way = place / spacing + 0.5 * last
+    slope = 1.0 / spacing if 0.0 <= way <= last else 0.0
+    way = min(max(way, 0.0), float(last))
+    first = min(int(way), max(last - 1, 0))
+    return first, way - first, slope
+
+
+@kernel()
+def _weights(t: float) -> tuple[float, float, float, float]:
+    """Weights of the nodes -1 to 2 at a place between the nodes 0 and 1 (Keys, eq. 8)."""
     t2 = t * t
     t3 = t2 * t
-    weight, slope = np.empty((len(t), 4)), np.empty((len(t), 4))
-    weight[:, 0], slope[:, 0] = -0.5 * t3 + t2 - 0.5 * t, -1.5 * t2 + 2.0 * t - 0.5
-    weight[:, 1], slope[:, 1] = 1.5 * t3 - 2.5 * t2 + 1.0, 4.5 * t2 - 5.0 * t
-    weight[:, 2], slope[:, 2] = -1.5 * t3 + 2.0 * t2 + 0.5 * t, -4.5 * t2 + 4.0 * t + 0.5
-    weight[:, 3], slope[:, 3] = 0.5 * t3 - 0.5 * t2, 1.5 * t2 - t
-    return weight, slope
+    return -0.5 * t3 + t2 - 0.5 * t, 1.5 * t3 - 2.5 * t2 + 1.0, -1.5 * t3 + 2.0 * t2 + 0.5 * t, 0.5 * t3 - 0.5 * t2
+
+
+@kernel()
+def _slopes(t: float) -> tuple[float, float, float, float]:
+    """Derivatives of `_weights`."""
+    t2 = t * t
+    return -1.5 * t2 + 2.0 * t - 0.5, 4.5 * t2 - 5.0 * t, -4.5 * t2 + 4.0 * t + 0.5, 1.5 * t2 - t
+
+
+@kernel()
+def _depth(nodes: Array, spacing_n: float, spacing_e: float, north: float, east: float) -> tuple[float, float, float]:
+    """Depth and its derivatives at one place; all are NaN where the place is."""
+    if isnan(north) or isnan(east):
+        return nan, nan, nan
+    rows, columns = nodes.shape[0] - 1, nodes.shape[1] - 1
+    row, t, by_north = _between(north, spacing_n, rows)
+    column, s, by_east = _between(east, spacing_e, columns)
+    weight_n, weight_e, slope_n, slope_e = _weights(t), _weights(s), _slopes(t), _slopes(s)
+    depth = gradient_n = gradient_e = 0.0
+    for i in range(4):
+        k = min(max(row + i - 1, 0), rows)
+        along = across = 0.0
+        for j in range(4):
+            node = nodes[k, min(max(column + j - 1, 0), columns)]
+            along += node * weight_e[j]
+            across += node * slope_e[j]
+        depth += along * weight_n[i]
+        gradient_n += along * slope_n[i]
+        gradient_e += across * weight_n[i]
+    return depth, gradient_n * by_north, gradient_e * by_east
+
+
+@kernel("void(f8[:, ::1], f8, f8, f8[:, ::1], f8[::1], f8[:, ::1])")
+def _depths(nodes: Array, spacing_n: float, spacing_e: float, offset: Array, depth: Array, gradient: Array) -> None:
+    """`DepthGrid.at`; the last two arrays are overwritten."""
+    for i in range(offset.shape[0]):
+        depth[i], gradient[i, 0], gradient[i, 1] = _depth(nodes, spacing_n, spacing_e, offset[i, 0], offset[i, 1])
+
+
+@kernel("void(f8[:, ::1], f8, f8, f8[:, ::1], f8[::1], f8[:, ::1], f8[::1], f8[:, ::1], b1[::1])")
+def _distances(
+    nodes: Array, spacing_n: float, spacing_e: float, offset: Array, depth: Array, ray: Array,
+    distance: Array, gradient: Array, met: Flags,
+) -> None:  # fmt: skip
+    """`DepthGrid.distance`; the last three arrays are overwritten."""
+    for i in range(offset.shape[0]):
+        north, east, down = ray[i, 0], ray[i, 1], ray[i, 2]
+        found, slope_n, slope_e = _depth(nodes, spacing_n, spacing_e, offset[i, 0], offset[i, 1])
+        way = (found - depth[i]) / max(down, _GRAZING)
+        met[i] = True
+        if north != 0.0 or east != 0.0:
+            above, closing = inf, 0.0
+            for _ in range(_STEPS):
+                found, slope_n, slope_e = _depth(
+                    nodes, spacing_n, spacing_e, offset[i, 0] + way * north, offset[i, 1] + way * east
+                )
+                above = found - depth[i] - way * down
+                closing = down - (slope_n * north + slope_e * east)
+                if not abs(above) > _ARRIVED:
+                    break
+                way += above / max(closing, _GRAZING)
+            met[i] = abs(above) < _NEAR and closing > _GRAZING
+        distance[i], gradient[i, 0], gradient[i, 1] = way, slope_n, slope_e

@@ -182,7 +182,7 @@ def of_case(case: Case) -> dict[str, Any]:
     content = [
         case.duration,
         list(case.faults),
-        *([dict(case.instruments)] if case.instruments else []),
+        *(dict(table) for table in (case.instruments, case.initial_error) if table),
         said(table_of(case.base) | {"fault": [], "draw": {}}),
     ]
     says = hashlib.blake2b(json.dumps(content).encode(), digest_size=6).hexdigest()

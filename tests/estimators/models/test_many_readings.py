@@ -1,22 +1,48 @@
-"""All readings of satellites at one time are what they are one by one."""
+"""All readings of the channels of an instrument at one time are what they are one by one."""
 
 from __future__ import annotations
+
+import tomllib
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from simnav.blocks import StateBlock
 from simnav.estimator import make
 from simnav.estimators.algebra.joseph import joseph_sequence
 from simnav.estimators.models import inertial
 from simnav.estimators.models.channels import by_channel
+from simnav.estimators.models.delayed import DELAY
 from simnav.estimators.models.inertial import InertialModel
+from simnav.estimators.models.own_observation import OwnObservation
 from simnav.geometry.earth import relative_position
 from simnav.kinds import Component, Kind
 from simnav.plugins import PluginError
 from simnav.recording import Recording
+from simnav.scenario import Scenario
 from simnav.source import record
 from simnav.trial import run_trial
 from tests.cases.raw_gnss import raw_gnss
+
+BEAMS = """
+name = "beams"
+version = 1
+title = "Beams of a DVL"
+duration_s = 5.0
+water_depth_m = 30.0
+[start]
+latitude_deg = 54.0
+longitude_deg = 7.9
+speed_m_s = 2.0
+[instruments.imu]
+rate_hz = 20.0
+[instruments.beams]
+kind = "dvl_beams"
+rate_hz = 1.0
+mounting_deg = 0.1
+lever_arm_m = [1.0, 0.2, 0.5]
+"""
 
 
 @pytest.fixture(scope="module")
@@ -46,6 +72,42 @@ def test_innovations_and_jacobians(recording: Recording):
         np.testing.assert_allclose(innovation[k], one[0], rtol=0.0, atol=1e-6)
         np.testing.assert_allclose(jacobian[k], one[1], rtol=1e-9, atol=1e-9)
     assert many.channels(["gnss:none", "compass"]).tolist() == [-1, -1]
+
+
+def test_channels_with_biases():
+    """Each beam of a DVL has a bias of its own, beside the blocks that all beams share."""
+    scenario = Scenario.from_toml(tomllib.loads(BEAMS), source="beams")
+    recording = record(scenario, 3)
+    model = InertialModel()
+    model.begin(recording.start, by_channel(recording.instruments))
+    (many,) = model.many
+    assert many.biased
+    assert len(model.bias_at) == 4
+    stream, rng = recording.data.aids["beams"], np.random.default_rng(1)
+    rows = np.arange(len(stream))
+    names = [f"beams:{stream.channels[c]}" for c in stream.channel]
+    states = []
+    for _ in rows:
+        model.correct(rng.standard_normal(model.size) * 0.01)
+        states.append([a.copy() for a in model._state()])
+    columns = [np.stack(column) for column in zip(*states, strict=True)]
+    offset = model.size - len(model.calibration)
+    innovation, jacobian = many.linearise(stream.time, stream.value, many.channels(names), columns, stream.side, offset)
+    for k, name in enumerate(names):
+        one = model.observe_own(name, float(stream.time[k]), stream.value[k], tuple(states[k]), stream.side[k])
+        assert one is not None
+        assert one[1][0, model.bias_at[name]] == 1.0
+        np.testing.assert_allclose(innovation[k], one[0], rtol=0.0, atol=1e-12)
+        np.testing.assert_allclose(jacobian[k], one[1], rtol=0.0, atol=1e-12)
+
+
+def test_an_unknown_delay_has_no_such_form():
+    """The function for many readings knows no delay: the state that tells it would have no effect."""
+    given = BEAMS + "timing = { offset_s = 0.05 }"
+    sheet = by_channel(Scenario.from_toml(tomllib.loads(given), source="beams").instruments_sheet())["beams:2"]
+    late = replace(sheet, blocks=(*sheet.blocks, StateBlock(DELAY, 1, "s", 0.05)))
+    assert OwnObservation(sheet).observations is not None
+    assert OwnObservation(late).observations is None
 
 
 @pytest.mark.parametrize("name", ["sw-fgo", "gnc-fgo"])
