@@ -24,6 +24,9 @@ from simnav.world import SURROUNDINGS, VESSELS
 
 _BESIDE = Path(__file__).parents[2] / "shared" / "data"
 
+# While tests are collected, nothing becomes garbage (`pytest_collection_finish`).
+gc.disable()
+
 # Logs beside the project are used without being asked for; what needs them skips, visibly, where there are none.
 if "SIMNAV_DATA" not in os.environ and _BESIDE.is_dir():
     os.environ["SIMNAV_DATA"] = str(_BESIDE)
@@ -42,16 +45,17 @@ settings.load_profile("simnav")
 
 @pytest.hookimpl(wrapper=True)
 def pytest_collect_file(file_path: Path) -> Generator[None, list[pytest.Collector], list[pytest.Collector]]:
-    """Test modules have no doctests, and need not be searched for them by each worker."""
+    """Each worker searches for doctests only where some are: not in test modules, nor in files without a prompt."""
     found = yield
-    test = file_path.name.startswith("test_")
-    return [one for one in found if not (test and isinstance(one, DoctestModule))]
+    none = file_path.name.startswith("test_") or b">>>" not in file_path.read_bytes()
+    return [one for one in found if not (none and isinstance(one, DoctestModule))]
 
 
 def pytest_collection_finish() -> None:
-    """The tests stay to the end: no collection of garbage needs to look at their many objects again."""
+    """The tests stay to the end: no collection of garbage needs to look at their many objects, now or later."""
     gc.collect()
     gc.freeze()
+    gc.enable()
 
 
 @pytest.fixture

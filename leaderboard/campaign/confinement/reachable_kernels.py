@@ -18,7 +18,7 @@ __all__ = ["ALL", "reachable_kernels"]
 #: Stands for all kernels: of an estimator whose modules are not known.
 ALL = "simnav"
 #: How readings are predicted: estimators call it through the kind of an instrument, and name no module.
-_EQUATIONS = ("simnav.sensors.gnss_observation", "simnav.sensors.observation")
+_EQUATIONS = ("simnav.sensors.gnss_observation", "simnav.sensors.observation", "simnav.world.depth_grid")
 #: A window finds the chain of its model in a registry, and names none.
 _CHAINS = ("simnav.estimators.solvers.window", "simnav.estimators.models.chains")
 
