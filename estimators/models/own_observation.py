@@ -390,7 +390,7 @@ class OwnObservation:
         attitudes = dcm_from_rotation_vector(errors[:, 6:9]) @ point.dcm
         states = positions, velocities, attitudes, point.angular_rate - errors[:, 9:12]
         if self.observations is not None:
-            differences = np.asarray(self.kind.difference(self._many(point, states, errors, offset), reading))
+            differences = np.asarray(self.kind.difference(self.read_many(point, states, errors, offset), reading))
         else:
             for k, state in enumerate(zip(*states, strict=True)):
                 blocks = self._blocks_at(point, errors[k], offset)
@@ -401,10 +401,20 @@ class OwnObservation:
             differences += errors[:, bias_at : bias_at + len(reading)]
         return differences
 
-    def _many(
+    def read_many(
         self, point: NavigationPoint, states: tuple[Array, Array, Array, Array], errors: Array, offset: int
     ) -> Array:
-        """The (k, d) readings at k states by one call, for a kind that predicts many (`simnav.kinds.Observations`)."""
+        """The (k, d) readings at k states by one call, for a kind that predicts many (`simnav.kinds.Observations`).
+
+        Parameters
+        ----------
+        point : NavigationPoint
+            The state with which the k states are compared: time, channel and side information are its own.
+        states : tuple of array
+            Position, velocity, DCM and angular rate of the k states.
+        errors, offset
+            As of `differences`: the values of blocks follow from them.
+        """
         assert self.observations is not None
         k = len(errors)
         blocks = {name: np.broadcast_to(zero, (k, len(zero))) for name, zero in self._zeros.items()}

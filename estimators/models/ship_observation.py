@@ -12,13 +12,14 @@ from math import cos, sin
 
 import numpy as np
 
+from simnav.geometry.earth import displace
 from simnav.kinds import NavigationPoint
 from simnav.types import NO_SIDE, Array, Datasheet
 
 from .ambiguity import innovation_of
 from .base import Linearised
 from .own_observation import OwnObservation
-from .ship_kernels import CE, CN, PSI, E, N, R, U, displace_ship
+from .ship_kernels import CE, CN, PSI, E, N, R, U
 
 __all__ = ["HEEL", "VERTICAL_SPEED", "ShipObservation"]
 
@@ -107,18 +108,22 @@ class ShipObservation(OwnObservation):
         (k, d) array
             A state that has no reading gets the difference by the Jacobian.
         """
-        predicted = self.predict(self._point(time, position, x, side))
+        point = self._point(time, position, x, side)
+        predicted = self.predict(point)
         assert predicted is not None, "the model's own state has a reading"
         reading, own = predicted
-        jacobian = own[:, :9] @ _navigation(x)
-        self.place(own, jacobian, 0)
-        differences = errors @ jacobian.T
-        for k, error in enumerate(errors):
-            there = position.copy()
-            displace_ship(there, error[N], error[E])
-            found = self.read(self._point(time, there, x + error, side))
-            if found is not None:
-                differences[k] = self.kind.difference(found, reading)
+        places = displace(position, np.column_stack([errors[:, N], errors[:, E], np.zeros(len(errors))]))
+        if self.observations is not None:
+            states = places, *_kinematics(x + errors)
+            differences = np.asarray(self.kind.difference(self.read_many(point, states, errors, 0), reading))
+        else:
+            jacobian = own[:, :9] @ _navigation(x)
+            self.place(own, jacobian, 0)
+            differences = errors @ jacobian.T
+            for k, error in enumerate(errors):
+                found = self.read(self._point(time, places[k], x + error, side))
+                if found is not None:
+                    differences[k] = self.kind.difference(found, reading)
         at = self._bias_at
         if at >= 0:
             differences += errors[:, at : at + len(reading)]
@@ -126,11 +131,19 @@ class ShipObservation(OwnObservation):
 
     def _point(self, time: float, position: Array, x: Array, side: Array) -> NavigationPoint:
         """The navigation state of a ship."""
-        c, s = cos(x[PSI]), sin(x[PSI])
-        velocity = np.array([x[U] * c + x[CN], x[U] * s + x[CE], 0.0])
-        dcm = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-        turning = np.array([0.0, 0.0, x[R]])
-        return NavigationPoint(time, position, velocity, dcm, turning, self.blocks(x), self.channel, side)
+        return NavigationPoint(time, position, *_kinematics(x), self.blocks(x), self.channel, side)
+
+
+def _kinematics(x: Array) -> tuple[Array, Array, Array]:
+    """Velocity, DCM and angular rate of (..., n) states of a ship."""
+    c, s = np.cos(x[..., PSI]), np.sin(x[..., PSI])
+    velocity, dcm, turning = np.zeros((*x.shape[:-1], 3)), np.zeros((*x.shape[:-1], 3, 3)), np.zeros((*x.shape[:-1], 3))
+    velocity[..., 0] = x[..., U] * c + x[..., CN]
+    velocity[..., 1] = x[..., U] * s + x[..., CE]
+    dcm[..., 0, 0] = dcm[..., 1, 1] = c
+    dcm[..., 0, 1], dcm[..., 1, 0], dcm[..., 2, 2] = -s, s, 1.0
+    turning[..., 2] = x[..., R]
+    return velocity, dcm, turning
 
 
 def _navigation(x: Array) -> Array:
