@@ -21,10 +21,13 @@ def recording() -> Recording:
 
 
 def subsets(instruments: Instruments) -> Iterator[Instruments]:
-    """All instruments, none, each alone and in pairs, and all but one, with the IMU and without."""
+    """All instruments, none, each alone, and all but one, with the IMU and without; and pairs.
+
+    The pairs are those of instruments without channels and states of their own: no row asks for another.
+    """
     everything = list(instruments.values())
-    n = len(everything)
-    chosen = [*(itertools.combinations(everything, k) for k in (0, 1, 2, n - 1, n))]
+    n, few = len(everything), [sheet for sheet in everything if not (sheet.channels or sheet.blocks)]
+    chosen = [itertools.combinations(few, 2), *(itertools.combinations(everything, k) for k in (0, 1, n - 1, n))]
     for aids in itertools.chain.from_iterable(chosen):
         for imu in (instruments.imu, None):
             yield Instruments(list(aids), imu, instruments.step)
