@@ -74,6 +74,10 @@ class StateBlocks:
         self._columns: Array | None = None
         self._step: tuple[float, Array, Array] | None = None
 
+    def __deepcopy__(self, memo: object) -> StateBlocks:
+        """Itself: a model makes it at the start of a run, and an estimator with late readings is copied in each step."""
+        return self
+
     @property
     def size(self) -> int:
         """Number of components of the error state up to the last block."""
