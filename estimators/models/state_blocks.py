@@ -75,7 +75,7 @@ class StateBlocks:
         self._step: tuple[float, Array, Array] | None = None
 
     def __deepcopy__(self, memo: object) -> StateBlocks:
-        """Itself: a model makes it at the start of a run, and an estimator with late readings is copied in each step."""
+        """Itself: a model makes it at the start of a run. An estimator with late readings is copied in each step."""
         return self
 
     @property

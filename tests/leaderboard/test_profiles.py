@@ -35,9 +35,8 @@ def test_quick_has_few_rows_and_seeds_enough_to_decide():
 
 
 def test_standard_has_the_same_seeds_for_all_rows_of_a_track():
-    """One track is not in it until the next edition of the standard."""
-    known, later = {h.name: h for h in headers()}, ("terrain",)
-    ranked = [h for h in headers() if not h.training and h.track not in later]
+    known = {h.name: h for h in headers()}
+    ranked = [h for h in headers() if not h.training]
     most: dict[tuple[str, str], int] = {}
     for part in read_profile("standard").parts:
         for scenario in part.scenarios:
@@ -47,7 +46,7 @@ def test_standard_has_the_same_seeds_for_all_rows_of_a_track():
     chosen = {row for (scenario, row) in most if known[scenario].track in ("papers", "long")}
     assert 20 <= len(chosen) <= 25
     loose = {n for n in names() if getattr(find(n), "loose", False)}
-    special = {"satellites": loose, "acoustic": loose, "cooperative": {"ekf-ci"}}
+    special = {"satellites": loose, "acoustic": loose, "cooperative": {"ekf-ci"}, "terrain": loose | {"terrain-pmf"}}
     few = {"papers": 10, "long": 10, "coloured": 8, "robustness": 8} | dict.fromkeys(special, 8)
     assert {row for _, row in most} == {n for n in names() if not describe(n).slow}
     for (scenario, row), runs in most.items():
