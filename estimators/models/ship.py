@@ -249,8 +249,8 @@ class ShipModel(MovingModel):
     ) -> tuple[Array, Array] | None:
         """As `ErrorModel.observe_own`; the state is ``position, x``."""
         position, x = state
-        found = self.own[name].measure(time, value, position, x, side)
-        return None if found is None else (found.innovation, found.jacobian)
+        found = self.own[name].observe(time, value, position, x, side)
+        return None if found is None else found[:2]
 
     def correct(self, dx: Array) -> None:
         """Add a correction to the state."""

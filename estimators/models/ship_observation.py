@@ -72,22 +72,41 @@ class ShipObservation(OwnObservation):
         Linearised or None
             None where the state has no reading.
         """
+        found = self.observe(time, value, position, x, side)
+        if found is None:
+            return None
+        innovation, jacobian, whole, point = found
+        own = whole[:, :9]
+        aside = self._sway**0.5 * (own[:, 4] * cos(x[PSI]) - own[:, 3] * sin(x[PSI]))
+        noise = self._white + own @ self._unknown @ own.T + np.outer(aside, aside)
+        more = self.spread(whole, point)
+        return Linearised(innovation, jacobian, noise if more is None else noise + more)
+
+    def observe(
+        self, time: float, value: Array, position: Array, x: Array, side: Array = NO_SIDE
+    ) -> tuple[Array, Array, Array, NavigationPoint] | None:
+        """As `measure`, without the noise.
+
+        Returns
+        -------
+        innovation, jacobian : (d,) array, (d, n) array
+            Measured minus predicted, and the derivative of the prediction by the state of the ship.
+        own : (d, 9 + b) array
+            That of `predict`.
+        point : NavigationPoint
+            Where the reading is predicted.
+        """
         point = self._point(time, position, x, side)
         predicted = self.predict(point)
         if predicted is None:
             return None
-        reading, whole = predicted
-        own = whole[:, :9]
-        jacobian, at, d = own @ _navigation(x), self._bias_at, len(reading)
-        self.place(whole, jacobian, 0)
+        reading, own = predicted
+        jacobian, at, d = own[:, :9] @ _navigation(x), self._bias_at, len(reading)
+        self.place(own, jacobian, 0)
         if at >= 0:
             jacobian[:, at : at + d] = np.eye(d)
             reading = self.kind.add_error(reading, x[at : at + d])
-        aside = self._sway**0.5 * (own[:, 4] * cos(x[PSI]) - own[:, 3] * sin(x[PSI]))
-        noise = self._white + own @ self._unknown @ own.T + np.outer(aside, aside)
-        more = self.spread(whole, point)
-        noise = noise if more is None else noise + more
-        return Linearised(innovation_of(self.kind, self.sheet, value, reading), jacobian, noise)
+        return innovation_of(self.kind, self.sheet, value, reading), jacobian, own, point
 
     def differences_at(self, time: float, position: Array, x: Array, errors: Array, side: Array = NO_SIDE) -> Array:
         """What the instrument should read at k states, minus what it should read at one.

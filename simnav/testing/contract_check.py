@@ -9,13 +9,10 @@ from __future__ import annotations
 
 import contextlib
 import copy
-import hashlib
-import operator
-import pickle
 import tomllib
 import warnings
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import islice
 from typing import TYPE_CHECKING, Any
@@ -23,9 +20,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from simnav.estimator import Estimator, make
-from simnav.recording import Block, Recording
+from simnav.recording import Recording
+from simnav.testing.altered_recordings import altered, silenced, until, without
+from simnav.testing.contract_runs import Output, Watched, difference, parting, run, steps, watch
 from simnav.trial import Trial, run_trial
-from simnav.types import KINDS, Estimate, ImuSamples, Instruments, NavigationStates
 
 if TYPE_CHECKING:
     from simnav.scenario import Scenario
@@ -165,14 +163,19 @@ class Candidate:
         return run_trial(self._first, self.recording)
 
     @cached_property
-    def fresh(self) -> _Output:
+    def fresh(self) -> Output:
         """What a new instance gives on the recording."""
-        return _run(self.factory(), self.recording)
+        return run(self.factory(), self.recording)
+
+    @cached_property
+    def watched(self) -> Watched:
+        """A run in which the input and all estimates are compared with what they were."""
+        return watch(self.factory(), copy.deepcopy(self.recording))
 
     @cached_property
     def unsteady(self) -> str | None:
         """Where two instances differ on the same recording, or None."""
-        return _difference(self.fresh, _run(self.factory(), self.recording))
+        return difference(self.fresh, run(self.factory(), self.recording))
 
 
 @dataclass(frozen=True)
@@ -342,7 +345,7 @@ def _units(candidate: Candidate, recording: Recording) -> tuple[bool, str]:
     Velocity and attitude may differ from the initial state by `_SIGMAS` times its sigma, and by what the vessel can do
     in a second (`_CHANGE`).
     """
-    first = next(iter(_steps(candidate.factory(), recording)))
+    first = next(iter(steps(candidate.factory(), recording)))
     start = recording.start
     wrong: list[str] = []
     mask = first.mask()
@@ -386,8 +389,8 @@ def _determinism(candidate: Candidate, recording: Recording) -> tuple[bool, str]
 def _reset(candidate: Candidate, recording: Recording) -> tuple[bool, str]:
     """After a run, `reset` restores the initial behaviour: the next run gives the estimates of a new instance."""
     used = candidate.factory()
-    _run(used, _until(contract_recording(1), _HALF))
-    where = _difference(candidate.fresh, _run(used, recording))
+    run(used, until(contract_recording(1), _HALF))
+    where = difference(candidate.fresh, run(used, recording))
     sentence = (
         "after a run and a reset it is as good as new" if where is None else f"a run before reset() shows: {where}"
     )
@@ -402,8 +405,8 @@ def _causality(candidate: Candidate, recording: Recording) -> tuple[bool, str]:
     runs end there: who looks ahead, in the arrays behind a packet or as a reference, has the later data in memory.
     """
     n = int(np.searchsorted(recording.data.truth.time, _HALF + 1e-6))
-    changed = [copy.deepcopy(e) for e in islice(_steps(candidate.factory(), _altered(recording, _HALF)), n)]
-    where = _parting(candidate.fresh.estimates[:n], changed)
+    changed = [copy.deepcopy(e) for e in islice(steps(candidate.factory(), altered(recording, _HALF)), n)]
+    where = parting(candidate.fresh.estimates[:n], changed)
     ok = where is None
     return ok, "estimates do not know later data" if ok else f"later data change it: {where}"
 
@@ -411,19 +414,7 @@ def _causality(candidate: Candidate, recording: Recording) -> tuple[bool, str]:
 @_demand("input")
 def _input(candidate: Candidate, recording: Recording) -> tuple[bool, str]:
     """The estimator does not write into its input."""
-    before, lists = _digests(recording), []
-    estimator = candidate.factory()
-    if estimator.reference:
-        estimator.reveal(recording)
-    estimator.reset(recording.start, recording.instruments)
-    for packet in recording.steps():
-        given = list(packet.aids)
-        estimator.update(packet)
-        lists.append(len(given) == len(packet.aids) and all(map(operator.is_, given, packet.aids)))
-    estimator.smooth()
-    after = _digests(recording)
-    spoilt = [name for name in before if before[name] != after[name]]
-    spoilt += [] if all(lists) else ["the list of measurements"]
+    spoilt = candidate.watched.spoilt
     ok = not spoilt
     return ok, "it leaves its input alone" if ok else f"it writes into: {', '.join(spoilt)}"
 
@@ -431,12 +422,7 @@ def _input(candidate: Candidate, recording: Recording) -> tuple[bool, str]:
 @_demand("estimates")
 def _aliasing(candidate: Candidate, recording: Recording) -> tuple[bool, str]:
     """An estimate that was returned is not changed by later steps."""
-    estimator = candidate.factory()
-    kept: list[tuple[Estimate, Estimate]] = []
-    for estimate in _steps(estimator, recording):
-        kept.append((estimate, copy.deepcopy(estimate)))
-    estimator.smooth()
-    where = _parting([a for a, _ in kept], [b for _, b in kept])
+    where = candidate.watched.rewritten
     ok = where is None
     return ok, "later steps leave them alone" if ok else f"a later step writes into one (copy it): {where}"
 
@@ -448,7 +434,7 @@ def _silence(candidate: Candidate, recording: Recording) -> tuple[bool, str]:
     Every aiding instrument stops in the middle of the run, and later also the IMU.
     """
     for what, imu in (("every aiding instrument", True), ("every instrument", False)):
-        trial = run_trial(candidate.factory(), _silenced(recording, _HALF, imu))
+        trial = run_trial(candidate.factory(), silenced(recording, _HALF, imu))
         if trial.status != "ok":
             return False, f"after {what} stopped: {trial.status}: {trial.reason}"
     return True, "it continues when the instruments deliver no more measurements"
@@ -457,15 +443,15 @@ def _silence(candidate: Candidate, recording: Recording) -> tuple[bool, str]:
 @_demand("missing instruments")
 def _missing(candidate: Candidate, recording: Recording) -> tuple[bool, str]:
     """Without an instrument the estimator works, or its `needs` name the instrument; it refuses no other scenario."""
-    names, beginning = list(recording.instruments), _until(recording, _BEGINNING)
-    few = _without(beginning, [n for n, sheet in recording.instruments.items() if sheet.channels or sheet.blocks])
+    names, beginning = list(recording.instruments), until(recording, _BEGINNING)
+    few = without(beginning, [n for n, sheet in recording.instruments.items() if sheet.channels or sheet.blocks])
     if run_trial(candidate.factory(), few).status != "ok":
         few = beginning
     needed: list[str] = []
     for absent in (["imu"], *([n] for n in names), names, [*names, "imu"]):
         # States that an instrument brings along make every epoch dear. They stay where such an instrument is absent.
         one_of_few = len(absent) == 1 and absent[0] in few.instruments
-        trial = run_trial(candidate.factory(), _without(few if one_of_few else beginning, absent))
+        trial = run_trial(candidate.factory(), without(few if one_of_few else beginning, absent))
         label = absent[0] if len(absent) == 1 else "instruments" if "imu" in absent else "aiding instruments"
         if trial.status not in ("ok", "unsuitable"):
             return False, f"without {label}: {trial.status}: {trial.reason}"
@@ -478,118 +464,3 @@ def _missing(candidate: Candidate, recording: Recording) -> tuple[bool, str]:
 
 #: All checks, in the order of the report.
 CHECKS = tuple(_checks)
-
-
-def _steps(estimator: Estimator, recording: Recording) -> Iterable[Estimate]:
-    if estimator.reference:
-        estimator.reveal(recording)
-    estimator.reset(recording.start, recording.instruments)
-    for packet in recording.steps():
-        yield estimator.update(packet)
-
-
-@dataclass(frozen=True)
-class _Output:
-    """All that an estimator gave in a run."""
-
-    estimates: list[Estimate]
-    smoothed: NavigationStates | None
-
-
-def _run(estimator: Estimator, recording: Recording) -> _Output:
-    """A run over a copy of a recording: what is written into it does not reach the next run."""
-    estimates = [copy.deepcopy(e) for e in _steps(estimator, copy.deepcopy(recording))]
-    return _Output(estimates, copy.deepcopy(estimator.smooth()))
-
-
-def _difference(first: _Output, second: _Output) -> str | None:
-    """The first difference between two runs, as text; None if they are equal."""
-    where = _parting(first.estimates, second.estimates)
-    if where is not None:
-        return where
-    a, b = first.smoothed, second.smoothed
-    if (a is None) != (b is None):
-        return "smooth() gives a trajectory in one run only"
-    if a is not None and b is not None:
-        for name in ("time", "position", "velocity", "attitude"):
-            if not np.array_equal(getattr(a, name), getattr(b, name), equal_nan=True):
-                return f"{name} of the smoothed trajectory differs"
-    return None
-
-
-def _parting(first: Sequence[Estimate], second: Sequence[Estimate]) -> str | None:
-    """The first difference between two series of estimates, as text; None if they are equal."""
-    for a, b in zip(first, second, strict=True):
-        when = f"differs at {float(b.time):g} s"
-        for name in ("time", "position", "velocity", "attitude", "covariance", "estimated"):
-            x, y = getattr(a, name), getattr(b, name)
-            if (x is None) != (y is None) or (x is not None and not np.array_equal(x, y, equal_nan=True)):
-                return f"{name} {when}"
-        if list(a.flagged) != list(b.flagged):
-            return f"flagged {when}"
-        for name in {**a.diagnostics, **b.diagnostics}:
-            x, y = a.diagnostics.get(name), b.diagnostics.get(name)
-            if x is None or y is None or not np.array_equal(x, y, equal_nan=True):
-                return f"the diagnostic {name!r} {when}"
-    return None
-
-
-def _altered(recording: Recording, after: float) -> Recording:
-    """The recording with other and fewer measurements after a time."""
-    data = recording.data
-    imu = data.imu
-    if imu is not None:
-        late = imu.time > after + 1e-6
-        imu = ImuSamples(
-            imu.time,
-            imu.interval,
-            np.where(late[:, None], -imu.angular_rate, imu.angular_rate),
-            np.where(late[:, None], imu.specific_force + 0.1, imu.specific_force),
-        )
-    aids = {}
-    for name, stream in data.aids.items():
-        late = stream.arrivals > after + 1e-6
-        small = 1e-6 if KINDS[stream.kind].geodetic else 0.1
-        changed = replace(stream, value=np.where(late[:, None], stream.value + small, stream.value))
-        aids[name] = changed.rows(~late | (np.arange(len(late)) % 3 > 0))
-    return replace(recording, data=replace(data, imu=imu, aids=aids))
-
-
-def _until(recording: Recording, end: float) -> Recording:
-    """The recording up to a time."""
-    data, whole = _silenced(recording, end, imu=False).data, recording.data.truth
-    truth = whole[: int(np.searchsorted(whole.time, end + 1e-6))]
-    return replace(recording, data=replace(data, end=float(truth.time[-1]), truth=truth))
-
-
-def _silenced(recording: Recording, after: float, imu: bool) -> Recording:
-    data = recording.data
-    samples = data.imu
-    if samples is not None and not imu:
-        samples = samples[: int(np.searchsorted(samples.time, after + 1e-6))]
-    aids = {n: s.rows(s.arrivals <= after + 1e-6) for n, s in data.aids.items()}
-    return replace(recording, data=replace(data, imu=samples, aids=aids))
-
-
-def _without(recording: Recording, absent: Sequence[str]) -> Recording:
-    old = recording.instruments
-    imu = "imu" not in absent
-    sheets = Instruments([s for n, s in old.items() if n not in absent], old.imu if imu else None, old.step)
-    data: Block = replace(
-        recording.data,
-        imu=recording.data.imu if imu else None,
-        aids={n: s for n, s in recording.data.aids.items() if n not in absent},
-    )
-    return replace(recording, instruments=sheets, data=data)
-
-
-def _digests(recording: Recording) -> dict[str, str]:
-    parts: dict[str, Any] = {
-        "the initial state": recording.start,
-        "the datasheets": (recording.instruments.imu, list(recording.instruments.values())),
-        "the IMU samples": recording.data.imu,
-    }
-    parts |= {
-        f"the measurements of {n}": (s.value, s.side) if s.channels else s.value for n, s in recording.data.aids.items()
-    }
-    return {name: hashlib.blake2b(pickle.dumps(part)).hexdigest() for name, part in parts.items()}

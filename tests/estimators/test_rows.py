@@ -13,9 +13,11 @@ from simnav.estimator import UnsuitableScenario, make, names
 from simnav.estimators.filterpy_adapter import FilterpyEstimator
 from simnav.estimators.rows.dead_reckoning import DeadReckoning
 from simnav.labels import FaultLabel
+from simnav.recording import Recording
 from simnav.scenario import load
 from simnav.source import record
-from simnav.testing.contract_check import CHECKS, Candidate, _until, check, contract_recording
+from simnav.testing.altered_recordings import until
+from simnav.testing.contract_check import CHECKS, Candidate, check, contract_recording
 from simnav.types import Datasheet, Instruments
 from tests.cases.sorts_of_rows import first_of_each_solver
 
@@ -31,11 +33,16 @@ def test_the_contract(name: str):
     assert report.passed, str(report)
 
 
+@pytest.fixture(scope="module")
+def beginning() -> Recording:
+    return until(contract_recording(0), 12.0)
+
+
 @pytest.mark.parametrize("name", sorted(set(names()) - set(WHOLE)))
-def test_the_contract_of_rows_of_the_same_pieces(name: str):
+def test_the_contract_of_rows_of_the_same_pieces(name: str, beginning: Recording):
     """What an estimator returns in the first seconds, and its units; the golden comparison runs each row as well."""
     candidate = Candidate(lambda: make(name))
-    candidate.recording = _until(contract_recording(0), 12.0)
+    candidate.recording = beginning
     for one in CHECKS:
         if one.name in ("output", "units"):
             finding = one(candidate)

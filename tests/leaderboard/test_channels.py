@@ -19,7 +19,9 @@ from simnav.scoring import errors
 from simnav.scoring.detection import detection
 from simnav.scoring.outages import outages
 from simnav.source import record
-from simnav.testing.contract_check import _altered, _digests, check, contract_recording
+from simnav.testing.altered_recordings import altered
+from simnav.testing.contract_check import check, contract_recording
+from simnav.testing.contract_runs import digests
 from simnav.trial import run_trial
 from simnav.trial.wire import PacketDecoder, PacketEncoder
 from simnav.types import Estimate
@@ -152,11 +154,11 @@ def test_a_label_in_words(recording):
 
 
 def test_the_contract_test_alters_readings_with_their_channels(recording):
-    stream, altered = recording.data.aids["beacons"], _altered(recording, 20.0).data.aids["beacons"]
-    assert len(altered.channel) == len(altered.side) == len(altered) < len(stream)
-    before = _digests(recording)
+    stream, changed = recording.data.aids["beacons"], altered(recording, 20.0).data.aids["beacons"]
+    assert len(changed.channel) == len(changed.side) == len(changed) < len(stream)
+    before = digests(recording)
     stream.side[0, 0] += 1.0
-    assert [n for n, digest in _digests(recording).items() if digest != before[n]] == ["the measurements of beacons"]
+    assert [n for n, digest in digests(recording).items() if digest != before[n]] == ["the measurements of beacons"]
 
 
 # --- figures

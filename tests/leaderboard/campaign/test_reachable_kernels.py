@@ -10,7 +10,8 @@ from simnav.compiled import Kernel, kernels
 from simnav.estimator import find, make
 from simnav.leaderboard.campaign.confinement.reachable_kernels import reachable_kernels
 from simnav.recording import Recording
-from simnav.testing.contract_check import _until, contract_recording
+from simnav.testing.altered_recordings import until
+from simnav.testing.contract_check import contract_recording
 from simnav.trial import run_trial
 from tests.cases.sorts_of_rows import first_of_each_solver
 
@@ -18,7 +19,7 @@ from tests.cases.sorts_of_rows import first_of_each_solver
 @pytest.fixture(scope="module")
 def beginning() -> Recording:
     """Twelve seconds with an instrument of every kind."""
-    return _until(contract_recording(0), 12.0)
+    return until(contract_recording(0), 12.0)
 
 
 @pytest.mark.parametrize("name", [n for n in first_of_each_solver() if not find(n).reference])
