@@ -6,7 +6,7 @@ distance r where D(p + r u) = z + r u_down. The reading is ::
     range = (1 + k) r + c / q,    q = u_down - u . grad D
 
 with the relative error k of the assumed speed of sound (block ``sound_speed``) and the error c of the chart there
-(block ``chart``). With the axis ``body`` the beam turns with the vehicle; with ``vertical`` it has gimbals, and turns
+(block ``chart``, one state for each beam: they meet the bottom at places of their own). With the axis ``body`` the beam turns with the vehicle; with ``vertical`` it has gimbals, and turns
 with the heading only. A beam that has a width gives the first echo: the least distance within its cone, of which nine
 rays are taken. With g = (grad D, -1) and the lever arm a north-east-down the derivatives of r are g/q by the position,
 and (a + r u) x g / q by a small turn of the vehicle.
@@ -147,7 +147,7 @@ def observe_all(points: NavigationPoints, sheet: Datasheet) -> tuple[Array, dict
     n, blocks, details = len(points.position), points.blocks, sheet.details
     navigation = np.zeros((n, 1, 9))
     given = {"navigation": navigation} | {
-        name: np.zeros((n, 1, 1)) for name in ("sound_speed", "chart") if name in blocks
+        name: np.zeros((n, 1, blocks[name].shape[1])) for name in ("sound_speed", "chart") if name in blocks
     }
     if "bottom" not in details:  # without a chart a range says nothing
         return np.zeros((n, 1)), given
@@ -173,8 +173,9 @@ def observe_all(points: NavigationPoints, sheet: Datasheet) -> tuple[Array, dict
         navigation *= scale[:, None, None]
         reading = scale * distance
     if "chart" in blocks:
-        given["chart"][:, 0, 0] = 1.0 / closing
-        reading = reading + blocks["chart"][:, 0] / closing
+        each = np.arange(n), points.channel  # of each beam the error of the chart where it meets the bottom
+        given["chart"][each[0], 0, each[1]] = 1.0 / closing
+        reading = reading + blocks["chart"][each] / closing
     return reading[:, None], given
 
 
@@ -255,7 +256,9 @@ class SoundingSpec(AidSpec):
         if self.sound_speed:
             found.append(StateBlock("sound_speed", 1, "", self.sound_speed))
         if self.chart_error:
-            found.append(StateBlock.stationary("chart", 1, "m", self.chart_error, self.chart_error_time))
+            found.append(
+                StateBlock.stationary("chart", len(self.channels()), "m", self.chart_error, self.chart_error_time)
+            )
         return tuple(found)
 
     def build(self, name: str, seed: int) -> Instrument:

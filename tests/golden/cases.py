@@ -155,7 +155,7 @@ CASES = {
         _fault("bias_step", "altimeter", 5.0, 8.0, offset_m=3.0),
         _fault("outage", "profile", 4.0, 7.0, channels=["1", "3"]),
     ), slow=True, initial_error={"position_m": [2.0, 2.0, 0.3]}, instruments={"profile": {
-        "kind": "multibeam_profile", "rate_hz": 0.25, "beams": 3, "swath_deg": 60.0, "beam_width_deg": 4.0,
+        "kind": "multibeam_profile", "rate_hz": 0.25, "beams": 4, "swath_deg": 60.0, "beam_width_deg": 4.0,
         "false_readings": 0.1, "chart_error_m": 0.2, "sound_speed_percent": 0.1, "axis": "vertical",
     }}),
     "fixes of terrain matching, and the velocity through the water": Case("terrain-matching", 16.0, (

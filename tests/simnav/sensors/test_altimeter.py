@@ -92,7 +92,7 @@ def test_the_equation_predicts_the_reading_and_its_derivatives(kind: Any, axis: 
     stream, last = sounder.sense(tap), sounder.channels[-1]
     sheet = kind.from_toml(table).datasheet("sounder")
     sheet.details["bottom"] = bottom.chart()
-    blocks = {"sound_speed": sounder.block("sound_speed", tap.time)[0], "chart": np.zeros(1)}
+    blocks = {"sound_speed": sounder.block("sound_speed", tap.time)[0], "chart": np.zeros(len(sheet.channels))}
     dcm, row = dcm_from_rpy(tap.attitude)[0], np.zeros(3)
     point = NavigationPoint(0.0, tap.position[0], row, dcm, row, blocks, last, np.ones(1))
 
@@ -109,12 +109,14 @@ def test_the_equation_predicts_the_reading_and_its_derivatives(kind: Any, axis: 
         np.testing.assert_allclose(step, jacobian[NAVIGATION][:, k], atol=2e-3)
         turn = (at(turn=1e-3 * e)[0] - at(turn=-1e-3 * e)[0]) / 2e-3
         np.testing.assert_allclose(turn, jacobian[NAVIGATION][:, 6 + k], atol=0.1)  # of 50 m
-    for name, step in (("sound_speed", 1e-4), ("chart", 1e-2)):
-        np.testing.assert_allclose((at(**{name: step})[0] - reading) / step, jacobian[name][:, 0], rtol=1e-6)
+    of_the_beam = np.arange(len(sheet.channels)) == sheet.channels.index(last)
+    for name, step, column in (("sound_speed", 1e-4, 0), ("chart", 1e-2, -1)):
+        np.testing.assert_allclose((at(**{name: step})[0] - reading) / step, jacobian[name][:, column], rtol=1e-6)
+    assert np.array_equal(jacobian["chart"][0] != 0.0, of_the_beam)
     # An error of the chart is a bottom that is deeper by it.
     deeper = DepthGrid(bottom.middle, bottom.spacing, bottom.depth + 0.05)
     sheet.details["bottom"] = deeper.chart()
-    assert at()[0] - reading == pytest.approx(0.05 * jacobian["chart"][0], rel=0.03)
+    assert at()[0] - reading == pytest.approx(0.05 * jacobian["chart"][0, -1:], rel=0.03)
 
 
 def test_noise_grows_with_the_range_and_is_stated() -> None:
