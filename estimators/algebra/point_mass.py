@@ -38,6 +38,8 @@ _COVERED, _STEPS = 5.0, 3.0
 _WIDE, _NONE = 3.0, 1e-12
 #: On a new lattice the noise in each direction is at least this part of a step.
 _NARROW = 0.6
+#: Least variance of a density that the lattice resolves, in squares of its steps: a Gaussian has its moments to 1e-4.
+_RESOLVED = 0.5
 
 
 @dataclass
@@ -180,6 +182,12 @@ class PointMass:
         self.origin = self.origin + self.basis @ first
         weight = weight[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
         self.weight = weight / weight.sum()
+
+    @property
+    def resolved(self) -> bool:
+        """Whether the steps are not much longer than the standard deviation in the direction where it is least."""
+        inverse = np.linalg.inv(self.basis)
+        return bool(np.linalg.eigvalsh(inverse @ self.moments()[1] @ inverse.T)[0] >= _RESOLVED)
 
     def refine(self) -> None:
         """Halve the steps; between the nodes the masses are interpolated linearly."""

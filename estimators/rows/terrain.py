@@ -19,4 +19,12 @@ class TerrainPmf(Row, solver=TerrainPointMass, model=InertialModel):
     Magazine 19(3), 1999; J. Dunik, M. Sotak, M. Vesely, O. Straka and W. Hawkinson, *Design of Rao-Blackwellized
     point-mass filter with application in terrain aided navigation*, IEEE Transactions on Aerospace and Electronic
     Systems 55(1), 2019.
+
+    Versions
+    --------
+    2
+        The lattice is refined where it is coarser than the density. Over a nearly flat bottom the density came to stand
+        on one node, and the filter ended with an error.
     """
+
+    version = 2

@@ -204,7 +204,8 @@ class TerrainPointMass(KalmanEstimator):
             reading, slope = self._predictions(m, place)
             within = 0.25 * np.sum((slope @ density.basis) ** 2, axis=1)
             weight = density.weight[index]
-            if 4 * len(place) > self.nodes or weight @ within <= _COARSE * variance:
+            fine = density.resolved and weight @ within <= _COARSE * variance
+            if fine or 4 * len(place) > self.nodes:
                 break
             density.refine()
         rho, spread = here - reading - place @ (other @ regression), variance + within

@@ -104,3 +104,22 @@ def test_it_keeps_the_bound_of_terrain_navigation() -> None:
         bounds.append(np.trace(np.linalg.inv(information)))
     ratio = np.sqrt(np.mean(squares) / np.mean(bounds))
     assert 0.7 < ratio < 1.3
+
+
+def test_a_lattice_that_is_coarser_than_its_density_is_refined_until_it_resolves_it() -> None:
+    """Many weak likelihoods narrow a density below the steps that it began with; at last it stood on one node."""
+    density, truth = PointMass.gaussian(100.0 * np.eye(2)), np.array([1.3, -2.1])
+    information, coarse = np.eye(2) / 100.0, 0
+    assert density.resolved
+    for _ in range(200):
+        while not density.resolved:
+            density.refine()
+            coarse += 1
+        index = np.nonzero(density.active)
+        off = density.places(index) - truth
+        density.take(index, -0.5 * np.sum(off**2, axis=1) / 25.0)
+        information += np.eye(2) / 25.0
+    mean, covariance = density.moments()
+    assert coarse >= 2
+    np.testing.assert_allclose(covariance, np.linalg.inv(information), atol=0.03)
+    np.testing.assert_allclose(mean, truth * (1.0 - information[0, 0] ** -1 / 100.0), atol=0.05)
