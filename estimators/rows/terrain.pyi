@@ -9,6 +9,7 @@ __all__ = ["TerrainPmf"]
 
 @register("terrain-pmf")
 class TerrainPmf(Row, solver=TerrainPointMass, model=InertialModel):
+    version = 2
     def __init__(
         self,
         *,

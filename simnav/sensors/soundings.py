@@ -6,10 +6,11 @@ distance r where D(p + r u) = z + r u_down. The reading is ::
     range = (1 + k) r + c / q,    q = u_down - u . grad D
 
 with the relative error k of the assumed speed of sound (block ``sound_speed``) and the error c of the chart there
-(block ``chart``, one state for each beam: they meet the bottom at places of their own). With the axis ``body`` the beam turns with the vehicle; with ``vertical`` it has gimbals, and turns
-with the heading only. A beam that has a width gives the first echo: the least distance within its cone, of which nine
-rays are taken. With g = (grad D, -1) and the lever arm a north-east-down the derivatives of r are g/q by the position,
-and (a + r u) x g / q by a small turn of the vehicle.
+(block ``chart``, one state for each beam: they meet the bottom at places of their own). With the axis ``body`` the beam
+turns with the vehicle; with ``vertical`` it has gimbals, and turns with the heading only. A beam that has a width gives
+the first echo: the least distance within its cone, of which nine rays are taken. With g = (grad D, -1) and the lever
+arm a north-east-down the derivatives of r are g/q by the position, and (a + r u) x g / q by a small turn of the
+vehicle.
 
 An estimator has the chart of the bottom in the datasheet (``details["bottom"]``, `simnav.world.depth_grid.grid_of`).
 """
