@@ -24,8 +24,9 @@ from simnav.world import SURROUNDINGS, VESSELS
 
 _BESIDE = Path(__file__).parents[2] / "shared" / "data"
 
-# While tests are collected, nothing becomes garbage (`pytest_collection_finish`).
+# While tests are collected, nothing becomes garbage (`pytest_collection_finish`); later little of it is in cycles.
 gc.disable()
+gc.set_threshold(50_000, 20, 50)
 
 # Logs beside the project are used without being asked for; what needs them skips, visibly, where there are none.
 if "SIMNAV_DATA" not in os.environ and _BESIDE.is_dir():
