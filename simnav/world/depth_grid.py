@@ -61,7 +61,7 @@ class DepthGrid:
     @cached_property
     def _nodes(self) -> Array:
         """The depths, as kernels take them."""
-        return np.require(self.depth, np.float64, ["C_CONTIGUOUS", "WRITEABLE"])
+        return _ready(self.depth)
 
     @cached_property
     def _spacing(self) -> tuple[float, float]:
@@ -105,7 +105,7 @@ class DepthGrid:
             Derivative of the depth northwards and eastwards; zero beyond the edges.
         """
         depth, gradient = np.empty(len(offset)), np.empty((len(offset), 2))
-        _depths(self._nodes, *self._spacing, np.ascontiguousarray(offset), depth, gradient)
+        _depths(self._nodes, *self._spacing, _ready(offset), depth, gradient)
         return depth, gradient
 
     def distance(self, offset: Array, depth: Array, ray: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
@@ -131,8 +131,8 @@ class DepthGrid:
         """
         n = len(offset)
         distance, gradient, met = np.empty(n), np.empty((n, 2)), np.empty(n, np.bool_)
-        places, rays = np.ascontiguousarray(offset), np.ascontiguousarray(ray)
-        _distances(self._nodes, *self._spacing, places, np.ascontiguousarray(depth), rays, distance, gradient, met)
+        given = _ready(offset), _ready(depth), _ready(ray)
+        _distances(self._nodes, *self._spacing, *given, distance, gradient, met)
         return distance, gradient, met
 
     def chart(self) -> dict[str, Any]:
@@ -177,6 +177,14 @@ def grid_of(chart: Mapping[str, Any]) -> DepthGrid:
     return grid
 
 
+def _ready(array: Array) -> Array:
+    """The array in the form that kernels need: float64, C-contiguous and writable. It is copied only if necessary."""
+    flags = array.flags
+    if flags.c_contiguous and flags.writeable and array.dtype == np.float64:
+        return array
+    return np.array(array, dtype=np.float64, order="C")
+
+
 @kernel()
 def _between(place: float, spacing: float, last: int) -> tuple[int, float, float]:
     """The node before a place, the part of the way to the next one, and the derivative of that: zero beyond an edge."""
@@ -189,7 +197,7 @@ def _between(place: float, spacing: float, last: int) -> tuple[int, float, float
 
 @kernel()
 def _weights(t: float) -> tuple[float, float, float, float]:
-    """Weights of the nodes -1 to 2 at a place between the nodes 0 and 1 (Keys, eq. 8)."""
+    """Weights of the nodes -1 to 2 at a place between the nodes 0 and 1, of Keys."""
     t2 = t * t
     t3 = t2 * t
     return -0.5 * t3 + t2 - 0.5 * t, 1.5 * t3 - 2.5 * t2 + 1.0, -1.5 * t3 + 2.0 * t2 + 0.5 * t, 0.5 * t3 - 0.5 * t2

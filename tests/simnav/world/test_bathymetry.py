@@ -225,3 +225,16 @@ def test_a_scenario_on_another_grid_or_in_the_ground_is_refused() -> None:
     del table["water_depth_m"]
     with pytest.raises(SpecError, match="make land"):
         Scenario.from_toml(table)
+
+
+def test_a_grid_takes_arrays_of_any_form() -> None:
+    """Read-only ones, whole numbers, and places that are not known."""
+    depth = np.arange(12.0).reshape(3, 4)
+    depth.flags.writeable = False
+    grid = DepthGrid(np.zeros(3), np.array([10.0, 10.0]), depth)
+    found, gradient = grid.at(np.broadcast_to([1, 2], (2, 2)))
+    np.testing.assert_allclose(found, 6.118)
+    np.testing.assert_allclose(gradient, [[0.434, 0.1]] * 2)
+    way, _, met = grid.distance(np.zeros((1, 2), int), np.zeros(1, int), np.array([[0, 0, 1]]))
+    assert (way.tolist(), met.tolist()) == ([5.5], [True])
+    assert np.isnan(grid.at(np.array([[np.nan, 0.0]]))[0]).all()
