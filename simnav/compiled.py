@@ -27,7 +27,18 @@ from numpy.typing import NDArray
 from simnav.cache_folder import cache_directory
 from simnav.watchers import announce, announced, awaited
 
-__all__ = ["Array", "Flags", "Integers", "Kernel", "announced", "cache_directory", "kernel", "kernels", "prune"]
+__all__ = [
+    "Array",
+    "Flags",
+    "Integers",
+    "Kernel",
+    "announced",
+    "cache_directory",
+    "kernel",
+    "kernels",
+    "prune",
+    "ready",
+]
 
 #: The array type of kernels, and of everything else in simnav: float64.
 Array = NDArray[np.float64]
@@ -245,6 +256,14 @@ def _value_text(value: Any) -> list[str]:
     if isinstance(value, type):
         return [value.__qualname__, repr(getattr(value, "_fields", ()))]  # a named tuple
     return []
+
+
+def ready(array: Array) -> Array:
+    """The array in the form that kernels need: float64, C-contiguous and writable. It is copied only if necessary."""
+    flags = array.flags
+    if flags.c_contiguous and flags.writeable and array.dtype == np.float64:
+        return array
+    return np.array(array, dtype=np.float64, order="C")
 
 
 def kernel(

@@ -26,11 +26,11 @@ from typing import Any, ClassVar, Literal, Self, TypeAlias
 import numpy as np
 from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
-from simnav.compiled import kernel
+from simnav.compiled import kernel, ready
 from simnav.sensors.imu_effects import Effects, ImuEffects
 from simnav.sensors.imu_models import GRADES, Grade, ImuModel, imu_model
 from simnav.sensors.instrument import figures_of, times_datasheet
-from simnav.sensors.processes import HeldGaussMarkov, quantize_scalar, ready
+from simnav.sensors.processes import HeldGaussMarkov, quantize_scalar
 from simnav.spec import NonNegative, Positive, Spec, SpecError, Vector, closest, quantity
 from simnav.streams import stream
 from simnav.types import Array, ImuDatasheet, ImuSamples, TriadDatasheet

@@ -14,11 +14,11 @@ from math import exp, expm1, floor, isinf, pi, sqrt
 
 import numpy as np
 
-from simnav.compiled import kernel
+from simnav.compiled import kernel, ready
 from simnav.declared_process import oscillation
 from simnav.types import Array
 
-__all__ = ["GaussMarkov", "HeldGaussMarkov", "SecondOrder", "quantize_scalar", "ready"]
+__all__ = ["GaussMarkov", "HeldGaussMarkov", "SecondOrder", "quantize_scalar"]
 
 
 @kernel()
@@ -91,14 +91,6 @@ def _second_order(
             state[j, 1] = c * x + d * v + l21 * first + l22 * second
             variates[i, j, 0], variates[i, j, 1] = state[j, 0], state[j, 1]
     return True
-
-
-def ready(array: Array) -> Array:
-    """The array in the form that kernels need: float64, C-contiguous and writable. It is copied only if necessary."""
-    flags = array.flags
-    if flags.c_contiguous and flags.writeable and array.dtype == np.float64:
-        return array
-    return np.array(array, dtype=np.float64, order="C")
 
 
 def _vector(value: Array | float, size: int | None = None) -> Array:

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from simnav.compiled import Flags, kernel
+from simnav.compiled import Flags, kernel, ready
 from simnav.geometry.earth import principal_radii, relative_position
 from simnav.types import Array
 
@@ -61,7 +61,7 @@ class DepthGrid:
     @cached_property
     def _nodes(self) -> Array:
         """The depths, as kernels take them."""
-        return _ready(self.depth)
+        return ready(self.depth)
 
     @cached_property
     def _spacing(self) -> tuple[float, float]:
@@ -105,7 +105,7 @@ class DepthGrid:
             Derivative of the depth northwards and eastwards; zero beyond the edges.
         """
         depth, gradient = np.empty(len(offset)), np.empty((len(offset), 2))
-        _depths(self._nodes, *self._spacing, _ready(offset), depth, gradient)
+        _depths(self._nodes, *self._spacing, ready(offset), depth, gradient)
         return depth, gradient
 
     def distance(self, offset: Array, depth: Array, ray: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
@@ -131,7 +131,7 @@ class DepthGrid:
         """
         n = len(offset)
         distance, gradient, met = np.empty(n), np.empty((n, 2)), np.empty(n, np.bool_)
-        given = _ready(offset), _ready(depth), _ready(ray)
+        given = ready(offset), ready(depth), ready(ray)
         _distances(self._nodes, *self._spacing, *given, distance, gradient, met)
         return distance, gradient, met
 
@@ -175,14 +175,6 @@ def grid_of(chart: Mapping[str, Any]) -> DepthGrid:
         _kept.pop(next(iter(_kept)))
     _kept[id(chart)] = chart, grid
     return grid
-
-
-def _ready(array: Array) -> Array:
-    """The array in the form that kernels need: float64, C-contiguous and writable. It is copied only if necessary."""
-    flags = array.flags
-    if flags.c_contiguous and flags.writeable and array.dtype == np.float64:
-        return array
-    return np.array(array, dtype=np.float64, order="C")
 
 
 @kernel()

@@ -23,6 +23,7 @@ from simnav.recording import Recording
 from simnav.scenario import Scenario
 from simnav.source import record
 from simnav.trial import run_trial
+from simnav.types import Array
 from tests.cases.raw_gnss import raw_gnss
 
 BEAMS = """
@@ -50,18 +51,23 @@ def recording() -> Recording:
     return record(raw_gnss(30.0), 1)
 
 
+def wandering(model: InertialModel, count: int) -> tuple[list[list[Array]], list[Array]]:
+    """States of a model that is corrected at random, one by one, and the same as columns."""
+    rng, states = np.random.default_rng(1), []
+    for _ in range(count):
+        model.correct(rng.standard_normal(model.size) * 0.01)
+        states.append([a.copy() for a in model._state()])
+    return states, [np.stack(column) for column in zip(*states, strict=True)]
+
+
 def test_innovations_and_jacobians(recording: Recording):
     model = InertialModel()
     model.begin(recording.start, by_channel(recording.instruments))
     (many,) = model.many
-    stream, rng = recording.data.aids["gnss"], np.random.default_rng(1)
+    stream = recording.data.aids["gnss"]
     rows = np.arange(0, len(stream), 7)
     names = [f"gnss:{stream.channels[c]}" for c in stream.channel[rows]]
-    states = []
-    for _ in rows:
-        model.correct(rng.standard_normal(model.size) * 0.01)
-        states.append([a.copy() for a in model._state()])
-    columns = [np.stack(column) for column in zip(*states, strict=True)]
+    states, columns = wandering(model, len(rows))
     offset = model.size - len(model.calibration)
     innovation, jacobian = many.linearise(
         stream.time[rows], stream.value[rows], many.channels(names), columns, stream.side[rows], offset
@@ -83,14 +89,10 @@ def test_channels_with_biases():
     (many,) = model.many
     assert many.biased
     assert len(model.bias_at) == 4
-    stream, rng = recording.data.aids["beams"], np.random.default_rng(1)
+    stream = recording.data.aids["beams"]
     rows = np.arange(len(stream))
     names = [f"beams:{stream.channels[c]}" for c in stream.channel]
-    states = []
-    for _ in rows:
-        model.correct(rng.standard_normal(model.size) * 0.01)
-        states.append([a.copy() for a in model._state()])
-    columns = [np.stack(column) for column in zip(*states, strict=True)]
+    states, columns = wandering(model, len(rows))
     offset = model.size - len(model.calibration)
     innovation, jacobian = many.linearise(stream.time, stream.value, many.channels(names), columns, stream.side, offset)
     for k, name in enumerate(names):
