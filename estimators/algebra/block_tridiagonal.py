@@ -145,13 +145,18 @@ def _absorb(
         for c in range(n):
             U[a, c] *= x
             G[a, c] *= x
-    for i in range(n):
-        for a in range(m):
+    for a in range(m):
+        for i in range(n):
             d[i] += U[a, i] * y[a]
+    for i in range(n):
         if m == 3:  # in one pass
             u, v, w = U[0, i], U[1, i], U[2, i]
             for j in range(n):
                 P[i, j] -= u * U[0, j] + v * U[1, j] + w * U[2, j]
+        elif m == 2:  # likewise
+            u, v = U[0, i], U[1, i]
+            for j in range(n):
+                P[i, j] = P[i, j] - u * U[0, j] - v * U[1, j]
         else:
             for a in range(m):
                 u = U[a, i]

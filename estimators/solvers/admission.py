@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from itertools import pairwise
 
 from simnav.estimators.models.channels import reading_of
 from simnav.types import KINDS, Instruments, Measurement, Measurements
 
-__all__ = ["LATE", "Admission"]
+__all__ = ["LATE", "Admission", "together"]
 
 #: A measurement that is older than the state by at most this counts as simultaneous [s].
 LATE = 1e-4
@@ -56,6 +56,28 @@ class Admission:
             self._used[m.instrument] = m.time
             admitted.append(m)
         return admitted
+
+
+def together(measurements: Iterable[Measurement], owner: Mapping[str, str]) -> list[list[Measurement]]:
+    """Measurements in groups: those of the channels of one instrument at one time are one group.
+
+    Parameters
+    ----------
+    measurements : iterable of Measurement
+        In the order of `Admission.admit`.
+    owner : mapping of str to str
+        The instrument of each channel (`simnav.estimators.models.channels.owners`).
+    """
+    groups: list[list[Measurement]] = []
+    instrument, time = None, 0.0
+    for m in measurements:
+        whose = owner.get(m.instrument)
+        if whose is not None and whose == instrument and m.time == time:
+            groups[-1].append(m)
+        else:
+            groups.append([m])
+            instrument, time = whose, m.time
+    return groups
 
 
 def _time(m: Measurement) -> float:

@@ -129,6 +129,7 @@ def _figures(sheet: Datasheet, elevation: Array) -> tuple[Array, int]:
 
 def reading_sigma(side: Array, sheet: Datasheet) -> Array:
     """The white noise of readings, from their C/N0 (`simnav.kinds.ReadingSigma`)."""
-    sigma: Array = sheet.sigma * noise_factor(side[..., DENSITY_RATIO])[..., None]
+    factor = noise_factor(side[..., DENSITY_RATIO])
+    sigma: Array = sheet.sigma * (factor[..., None] if side.ndim > 1 else factor)
     sigma[..., 0] *= amplification(int(sheet.details["frequencies"]))
     return sigma

@@ -17,14 +17,13 @@ elimination and marginalisation are GTSAM's. It is for tests and benchmarks: whe
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import groupby
 from typing import Any
 
 import numpy as np
 
 from simnav.estimators.models.channels import by_channel, owners
 from simnav.estimators.models.inertial import InertialModel
-from simnav.estimators.solvers.admission import Admission
+from simnav.estimators.solvers.admission import Admission, together
 from simnav.estimators.solvers.gtsam_graph import InertialGraph
 from simnav.estimators.solvers.gtsam_solvers import LONGEST, THRESHOLDS, FixedLagEstimator
 from simnav.types import Array, Estimate, InitialState, Instruments, Measurement, Measurements
@@ -115,7 +114,7 @@ class ChannelGraph(InertialGraph):
         channel, side = many.channels(names), np.array([m.side for m in readings])
         x, v, b, c = self.all_keys(self.node)
         n, d = value.shape
-        rate, k = self._rate, self.full.size - NODE
+        row, rate, k = np.zeros(n, dtype=np.intp), self._rate, self.full.size - NODE
 
         def error(_: Any, values: Any, jacobians: Any) -> Array:
             pose, bias = values.atPose3(x), values.atConstantBias(b)
@@ -123,8 +122,8 @@ class ChannelGraph(InertialGraph):
                 pose.rotation().matrix(), pose.translation(), values.atPoint3(v)
             )
             state = position, velocity, dcm, rate, bias.gyroscope(), values.atVector(c)
-            columns = [np.broadcast_to(array, (n, *array.shape)) for array in state]
-            innovation, jacobian = many.linearise(time, value, channel, columns, side, NODE)
+            states = [array[None] for array in state]
+            innovation, jacobian = many.linearise(time, value, channel, states, row, side, NODE)
             if jacobians is not None:
                 ours = jacobian.reshape(n * d, NODE + k)
                 turned = ours[:, :9] @ error_map
@@ -167,9 +166,8 @@ class ChannelFixedLag(FixedLagEstimator):
 
         graph.motion.load(measurements.imu)
         admitted = self._admission.admit(measurements, graph.motion.time)
-        for (time, _), group in groupby(admitted, lambda m: (m.time, self._owners.get(m.instrument, m.instrument))):
-            graph.motion.advance(min(time, measurements.time))
-            readings = list(group)
+        for readings in together(admitted, self._owners):
+            graph.motion.advance(min(readings[0].time, measurements.time))
             own = readings[0].instrument in self._owners
             noise = None if own else graph.linearise(readings[0])
             extend(0.0)
