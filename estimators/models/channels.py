@@ -66,7 +66,8 @@ def _apart(sheet: Datasheet) -> list[Datasheet]:
 
 def reading_of(measurement: Measurement) -> Measurement:
     """The measurement of a channel as one of an instrument of its own; its side information stays with it."""
-    return Measurement(measurement.time, measurement.source, measurement.kind, measurement.value, side=measurement.side)
+    time, instrument, kind, value, channel, side = measurement
+    return Measurement(time, f"{instrument}:{channel}" if channel else instrument, kind, value, "", side)
 
 
 def of_channels(stream: AidStream) -> list[AidStream]:

@@ -119,11 +119,12 @@ class ManyReadings:
         """
         position, velocity, dcm, rate, bias, calibration = states
         turning = rate[:, :3] - bias[:, :3] - np.einsum("nji,nj->ni", dcm, earth_rate(position[:, 0]))
-        n, own = len(time), calibration[row]
+        n, own = len(time), calibration.take(row, axis=0)
         blocks = {name: np.broadcast_to(zero, (n, zero.shape[1])) for name, zero in self._zeros.items()}
         for name, at in self._at:
             blocks[name] = own[:, at]
-        points = NavigationPoints(time, position[row], velocity[row], dcm[row], turning[row], blocks, channel, side)
+        at_rows = [column.take(row, axis=0) for column in (position, velocity, dcm, turning)]
+        points = NavigationPoints(time, *at_rows, blocks, channel, side)
         reading, given = self._observations(points, self._sheet)
         jacobian = np.empty((n, value.shape[1], offset + own.shape[1])) if out is None else out
         jacobian[...] = 0.0

@@ -43,17 +43,19 @@ class Admission:
         if any(before.time > after.time for before, after in pairwise(aids)):
             aids = sorted(aids, key=_time)
         admitted = []
-        end = measurements.time + LATE
+        begin, end, used, kinds = since - LATE, measurements.time + LATE, self._used, self._kinds
         for m in aids:
-            if m.channel:
+            time, name, _, value, channel, _ = m
+            if channel:
                 m = reading_of(m)
-            used = self._used.get(m.instrument)
-            if used is None:
+                name = m.instrument
+            latest = used.get(name)
+            if latest is None:
                 continue
-            if not since - LATE <= m.time <= end or m.time <= used or not self._kinds[m.instrument].plausible(m.value):
+            if not begin <= time <= end or time <= latest or not kinds[name].plausible(value):
                 self.skipped += 1
                 continue
-            self._used[m.instrument] = m.time
+            used[name] = time
             admitted.append(m)
         return admitted
 
