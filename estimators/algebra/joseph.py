@@ -106,20 +106,28 @@ def joseph_update(
         for i in range(m):
             x += gain[r, i] * residual[i]
         correction[r] = x
-    spread = np.empty((n, m))  # K S - P H'
+    # What is added to a row of the covariance is contiguous in the transposed arrays.
+    K, C, spread = np.empty((m, n)), np.empty((m, n)), np.empty(m)
+    for i in range(m):
+        for r in range(n):
+            K[i, r], C[i, r] = gain[r, i], cross[r, i]
     for r in range(n):
-        for i in range(m):
+        for i in range(m):  # K S - P H'
             x = -cross[r, i]
             for k in range(m):
                 x += gain[r, k] * innovation_covariance[k, i]
-            spread[r, i] = x
-    for r in range(n):
-        for c in range(r + 1):
-            x = covariance[r, c]
+            spread[i] = x
+        if m == 2:  # in one pass
+            s, t, u, v = spread[0], spread[1], gain[r, 0], gain[r, 1]
+            for c in range(r + 1):
+                covariance[r, c] = covariance[r, c] + (s * K[0, c] - u * C[0, c]) + (t * K[1, c] - v * C[1, c])
+        else:
             for i in range(m):
-                x += spread[r, i] * gain[c, i] - gain[r, i] * cross[c, i]
-            covariance[r, c] = x
-            covariance[c, r] = x
+                s, u = spread[i], gain[r, i]
+                for c in range(r + 1):
+                    covariance[r, c] += s * K[i, c] - u * C[i, c]
+        for c in range(r):
+            covariance[c, r] = covariance[r, c]
     return nis
 
 
