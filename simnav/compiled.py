@@ -177,13 +177,15 @@ class Kernel(Generic[Parameters, Returned]):
             # differently, and the linker uses the copy that is loaded first. With fast arithmetic a result would then
             # depend on whether its kernels came from the cache.
             options["forceinline"] = True
-        previous = config.CACHE_DIR
-        config.CACHE_DIR = directory or previous
+        previous = config.CACHE_DIR, config.SLP_VECTORIZE
+        # Sums that are written side by side become vector instructions. Each keeps its order; with fast arithmetic it
+        # would not, and results would change.
+        config.CACHE_DIR, config.SLP_VECTORIZE = directory or previous[0], not any(k.fastmath for k in self.tree())
         try:
             compiled: Callable[..., Any] = numba.jit(**options)(function)
             compile_with(compiled, self.signature)
         finally:
-            config.CACHE_DIR = previous
+            config.CACHE_DIR, config.SLP_VECTORIZE = previous
         return compiled
 
     if TYPE_CHECKING:

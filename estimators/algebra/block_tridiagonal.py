@@ -46,6 +46,7 @@ from simnav.compiled import kernel
 from simnav.types import Array, Integers
 
 from .cholesky import factorise
+from .sparse_product import Places, list_elements, padded, sparse_product
 
 __all__ = [
     "Aids", "Elimination", "after_step", "error_after_step", "half_squares", "keep_weights", "solve_chain", "whiten",
@@ -54,6 +55,10 @@ __all__ = [
 #: A factor with a smaller weight than this is left out.
 LEAST_WEIGHT = 1e-9
 
+#: The elements of a sparse (n, n) matrix, see `sparse_product`: values, columns and their number in each row.
+Lists: TypeAlias = tuple[Array, Places, Places]
+#: Work space (n, w), where w is a multiple of eight.
+Room: TypeAlias = tuple[Array, Array, Array]
 #: The M aiding factors: their nodes (M,), in ascending order, and the number of the first node of all; which instrument
 #: each comes from (M,), measurements of one instrument on one node are taken as their mean; components (M,), 0 for a
 #: factor that says nothing; Jacobians with respect to the nodes (M, 3, n); residuals, measured less predicted (M, 3);
@@ -71,31 +76,24 @@ _ELIMINATION = (
 
 
 @kernel()
-def _predict(P: Array, F: Array, Q: Array, weight: float, work: Array, turned: Array, out: Array) -> None:
+def _predict(P: Array, F: Array, Q: Array, weight: float, lists: Lists, room: Room, out: Array) -> None:
     """Compute ``out = F P F' + Q / weight``, for a sparse F."""
     n = P.shape[0]
+    value, column, count = lists
+    full, work, turned = room
+    list_elements(F, value, column, count)
     for i in range(n):
         for j in range(n):
-            work[i, j] = 0.0
-        for k in range(n):
-            x = F[i, k]
-            if x != 0.0:
-                for j in range(n):
-                    work[i, j] += x * P[k, j]
+            full[i, j] = P[i, j]
+    sparse_product(value, column, count, full, work)
     for i in range(n):
         for j in range(n):
             turned[i, j] = work[j, i]
-            out[i, j] = 0.0
-    for i in range(n):
-        for k in range(n):
-            x = F[i, k]
-            if x != 0.0:
-                for j in range(n):
-                    out[i, j] += x * turned[k, j]
+    sparse_product(value, column, count, turned, full)
     scale = 1.0 / weight
     for i in range(n):
         for j in range(i + 1):
-            x = 0.5 * (out[i, j] + out[j, i]) + scale * Q[i, j]
+            x = 0.5 * (full[i, j] + full[j, i]) + scale * Q[i, j]
             out[i, j] = x
             out[j, i] = x
 
@@ -290,7 +288,8 @@ def solve_chain(
     predicted, predicted_shift, filtered, filtered_shift, cross, white, innovation, used = left
     count, n = step.shape
     total = node.size
-    work, turned, L = np.empty((n, n)), np.empty((n, n)), np.empty((4, 3))
+    L, lists = np.empty((4, 3)), (np.empty((n, n)), np.empty((n, n), np.uint64), np.empty(n, np.uint64))
+    room = np.zeros((n, padded(n))), np.zeros((n, padded(n))), np.zeros((n, padded(n)))
     damps = count if damping > 0.0 else 0
     damp_crosses, damp_whites = np.empty((damps, n, 1, n)), np.empty((damps, n, 1, n))
     damp_innovations = np.empty((damps, n, 1))
@@ -307,7 +306,7 @@ def solve_chain(
             P[:] = prior_covariance
             d[:] = prior_shift
         else:
-            _predict(filtered[k - 1], transition[k - 1], noise[k - 1], motion_weight[k - 1], work, turned, P)
+            _predict(filtered[k - 1], transition[k - 1], noise[k - 1], motion_weight[k - 1], lists, room, P)
             for r in range(n):
                 x = -error[k - 1, r]
                 for c in range(n):
