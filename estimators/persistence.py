@@ -56,13 +56,15 @@ def add_innovation(course: Array, u0: float, u1: float, u2: float, count: int, t
 @kernel()
 def is_correlated(course: Array, quantile: float) -> bool:
     """Do `Course.correlated` on the array of a course."""
-    return course[PRODUCT] > 0.0 and course[PRODUCT] * course[PRODUCT] > quantile * quantile * course[SQUARE]
+    found: bool = course[PRODUCT] > 0.0 and course[PRODUCT] * course[PRODUCT] > quantile * quantile * course[SQUARE]
+    return found
 
 
 @kernel()
 def is_directed(course: Array, quantile: float) -> bool:
     """Do `Course.directed` on the array of a course."""
-    return course[PAIRS] > 0.0 and course[COSINES] * sqrt(course[COUNT] / course[PAIRS]) > quantile
+    found: bool = course[PAIRS] > 0.0 and course[COSINES] * sqrt(course[COUNT] / course[PAIRS]) > quantile
+    return found
 
 
 @kernel()
@@ -70,7 +72,8 @@ def is_large(course: Array, quantile: float) -> bool:
     """Do `Course.large` on the array of a course."""
     spread = 2.0 / (9.0 * course[FREEDOM])
     root = 1.0 - spread + quantile * sqrt(spread)
-    return course[SQUARES] > course[FREEDOM] * (root * root * root)
+    found: bool = course[SQUARES] > course[FREEDOM] * (root * root * root)
+    return found
 
 
 class Course:

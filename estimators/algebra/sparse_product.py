@@ -22,7 +22,8 @@ __all__ = [
 ]  # fmt: skip
 
 Eight: TypeAlias = tuple[float, float, float, float, float, float, float, float]
-#: Unsigned indices and numbers of elements.
+#: An unsigned index or number of elements, and many.
+Place: TypeAlias = int | np.uint64
 Places: TypeAlias = NDArray[np.uint64]
 _0, _1, _2, _3, _4, _5, _6, _7, _8 = (np.uint64(i) for i in range(9))
 NOTHING = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
@@ -46,7 +47,7 @@ def list_elements(F: Array, value: Array, column: Places, count: Places) -> None
 
 
 @kernel()
-def eight_sums(value: Array, column: Places, i: np.uint64, count: np.uint64, M: Array, j: np.uint64, s: Eight) -> Eight:
+def eight_sums(value: Array, column: Places, i: Place, count: Place, M: Array, j: Place, s: Eight) -> Eight:
     """Row i of the product, columns j to j + 7, added to eight sums.
 
     Parameters
@@ -77,7 +78,7 @@ def eight_sums(value: Array, column: Places, i: np.uint64, count: np.uint64, M: 
 
 
 @kernel()
-def eight_of(M: Array, i: np.uint64, j: np.uint64) -> Eight:
+def eight_of(M: Array, i: Place, j: Place) -> Eight:
     """Eight elements of row i of M, from column j on."""
     return (
         M[i, j], M[i, j + _1], M[i, j + _2], M[i, j + _3], M[i, j + _4], M[i, j + _5], M[i, j + _6], M[i, j + _7]
@@ -85,14 +86,14 @@ def eight_of(M: Array, i: np.uint64, j: np.uint64) -> Eight:
 
 
 @kernel()
-def put_eight(M: Array, i: np.uint64, j: np.uint64, s: Eight) -> None:
+def put_eight(M: Array, i: Place, j: Place, s: Eight) -> None:
     """Overwrite eight elements of row i of M, from column j on."""
     M[i, j], M[i, j + _1], M[i, j + _2], M[i, j + _3] = s[0], s[1], s[2], s[3]
     M[i, j + _4], M[i, j + _5], M[i, j + _6], M[i, j + _7] = s[4], s[5], s[6], s[7]
 
 
 @kernel()
-def add_eight(M: Array, i: np.uint64, j: np.uint64, s: Eight) -> None:
+def add_eight(M: Array, i: Place, j: Place, s: Eight) -> None:
     """Add eight sums to row i of M, from column j on."""
     t = eight_of(M, i, j)
     put_eight(

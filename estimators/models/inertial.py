@@ -39,7 +39,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from simnav.compiled import kernel
+from simnav.compiled import kernel, ready
 from simnav.estimator import UnsuitableScenario
 from simnav.estimator.needs import AID, IMU, Needs
 from simnav.estimators.algebra.joseph import joseph_sequence
@@ -88,7 +88,6 @@ __all__ = ["InertialModel", "roll_pitch_yaw"]
 _NAV, _MOTION = 15, 9
 _NO_TIMES, _NO_VECTORS = np.empty(0), np.empty((0, 3))
 _GRAVITY = 9.81
-_FLOAT = np.dtype(np.float64)
 
 
 @kernel("void(f8[:, ::1], f8[::1], f8, f8[:, ::1])")
@@ -337,10 +336,7 @@ class InertialModel(ErrorModel):
         if imu is None or len(imu) == 0:
             self._samples = (_NO_TIMES, _NO_TIMES, _NO_VECTORS, _NO_VECTORS)
         else:
-            self._samples = (imu.time, imu.interval, imu.angular_rate, imu.specific_force)
-            if not all(a.dtype is _FLOAT and a.flags.carray for a in self._samples):
-                time, interval, rate, force = (np.array(a, dtype=np.float64) for a in self._samples)
-                self._samples = (time, interval, rate, force)
+            self._samples = ready(imu.time), ready(imu.interval), ready(imu.angular_rate), ready(imu.specific_force)
 
     def propagate(self, covariance: Array, until: float) -> None:
         """Advance the state and its covariance through the samples loaded."""
@@ -472,7 +468,7 @@ class InertialModel(ErrorModel):
                 return None
             self._packet = Packet(list(self.noise), self._table(list(self.noise)))
         measured = self._packet.fill(measurements)
-        self._first = filter_inertial(
+        self._first = filter_inertial.unchecked(
             (self.position, self.velocity, self.dcm, self._memory, self.bias, self._turn, self._clock), self._samples,
             self._first, until, self._noise, (self.transition, self.process_noise, covariance),
             (self.calibration, self._decay, self._density, correction), self._packet.aids, measured,
@@ -520,5 +516,5 @@ class InertialModel(ErrorModel):
 
 def roll_pitch_yaw(dcm: Array) -> Array:
     """(3,) array: `simnav.geometry.rotation.rpy_from_dcm` of one matrix, without the overhead of stacks."""
-    c20, c21, c22 = float(dcm[2, 0]), float(dcm[2, 1]), float(dcm[2, 2])
-    return np.array([atan2(c21, c22), atan2(-c20, hypot(c21, c22)), atan2(float(dcm[1, 0]), float(dcm[0, 0]))])
+    (c00, _, _), (c10, _, _), (c20, c21, c22) = dcm.tolist()
+    return np.array([atan2(c21, c22), atan2(-c20, hypot(c21, c22)), atan2(c10, c00)])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from itertools import pairwise
+from operator import attrgetter
 
 from simnav.estimators.models.channels import reading_of
 from simnav.types import KINDS, Instruments, Measurement, Measurements
@@ -12,6 +12,7 @@ __all__ = ["LATE", "Admission"]
 
 #: A measurement that is older than the state by at most this counts as simultaneous [s].
 LATE = 1e-4
+_time = attrgetter("time")
 
 
 class Admission:
@@ -34,29 +35,23 @@ class Admission:
 
     def __init__(self, instruments: Instruments, observed: Iterable[str]):
         self._used = dict.fromkeys(observed, float("-inf"))
-        self._kinds = {name: KINDS[instruments[name].kind] for name in self._used}
+        self._plausible = {name: KINDS[instruments[name].kind].plausible for name in self._used}
         self.skipped = 0
 
     def admit(self, measurements: Measurements, since: float) -> list[Measurement]:
         """The measurements of a step to be used by a state of time ``since`` [s], in order of their times."""
-        aids = measurements.aids
-        if any(before.time > after.time for before, after in pairwise(aids)):
-            aids = sorted(aids, key=_time)
         admitted = []
-        end = measurements.time + LATE
-        for m in aids:
+        begin, end = since - LATE, measurements.time + LATE
+        for m in sorted(measurements.aids, key=_time):
             if m.channel:
                 m = reading_of(m)
-            used = self._used.get(m.instrument)
+            name, time = m.instrument, m.time
+            used = self._used.get(name)
             if used is None:
                 continue
-            if not since - LATE <= m.time <= end or m.time <= used or not self._kinds[m.instrument].plausible(m.value):
+            if not begin <= time <= end or time <= used or not self._plausible[name](m.value):
                 self.skipped += 1
                 continue
-            self._used[m.instrument] = m.time
+            self._used[name] = time
             admitted.append(m)
         return admitted
-
-
-def _time(m: Measurement) -> float:
-    return m.time
