@@ -26,7 +26,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from simnav.compiled import kernel
+from simnav.compiled import kernel, ready
 from simnav.estimator.needs import Needs
 from simnav.estimators.algebra.whitening import whitening
 from simnav.types import (
@@ -154,8 +154,10 @@ def add_motion_noise(
         whitening(noise[i], whitener[i])
 
 
-class Columns:
+class Columns(dict[str, Any]):
     """Named columns of equal length; rows are appended at the end and dropped at the front.
+
+    An item is a view of a column, (rows, ...). Views are kept until the number of rows changes.
 
     Parameters
     ----------
@@ -175,7 +177,6 @@ class Columns:
     def __init__(self, **columns: Any):
         self._capacity = 64
         self._columns: dict[str, Any] = {}
-        self._views: dict[str, Any] = {}
         self._first = self._last = 0
         self.add(**columns)
 
@@ -188,12 +189,12 @@ class Columns:
     def __len__(self) -> int:
         return self._last - self._first
 
-    def __getitem__(self, name: str) -> Any:
-        """A view of a column, (rows, ...)."""
-        view = self._views.get(name)
-        if view is None:
-            view = self._views[name] = self._columns[name][self._first : self._last]
+    def __missing__(self, name: str) -> Any:
+        view = self[name] = self._columns[name][self._first : self._last]
         return view
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _restored, (vars(self),)  # copies have views of their own
 
     def newest(self, name: str) -> Any:
         """A view of the last row's entry in a column."""
@@ -206,17 +207,17 @@ class Columns:
         for name, value in values.items():
             self._columns[name][self._last] = value
         self._last += 1
-        self._views.clear()
+        self.clear()
 
     def drop(self, count: int) -> None:
         """Take ``count`` rows off the front."""
         self._first += count
-        self._views.clear()
+        self.clear()
 
     def pop(self, count: int) -> None:
         """Take ``count`` rows off the end."""
         self._last -= count
-        self._views.clear()
+        self.clear()
 
     def _make_room(self) -> None:
         """Move the rows to the front; twice the space where they fill more than half of it."""
@@ -230,6 +231,12 @@ class Columns:
             else:
                 column[:rows] = column[self._first : self._last].copy()
         self._capacity, self._first, self._last = grown, 0, rows
+
+
+def _restored(state: dict[str, Any]) -> Columns:
+    columns = Columns()
+    vars(columns).update(state)
+    return columns
 
 
 class Chain(ABC):
@@ -322,7 +329,7 @@ class Chain(ABC):
 
     def set_prior(self, covariance: Array, shift: Array) -> None:
         """Set the prior of the first node: its covariance, and its mean minus the node."""
-        self.prior, self.prior_shift = covariance.copy(), shift.copy()
+        self.prior, self.prior_shift = ready(covariance.copy()), ready(shift.copy())
         self.prior_whitener = np.empty_like(self.prior)
         whitening(self.prior, self.prior_whitener)
 
@@ -366,7 +373,7 @@ class Chain(ABC):
         """Make the front a node, with the motion since the newest one as its factor."""
         motions = self.motions
         motions.append(begin_shift=0.0, end_shift=0.0, time=self.front.time, weight=1.0)
-        _begin_motion(
+        _begin_motion.unchecked(
             self._transition, self._noise, motions.newest("transition"), motions.newest("jacobian"),
             motions.newest("noise"), motions.newest("whitener"),
         )  # fmt: skip
@@ -399,7 +406,7 @@ class Chain(ABC):
             node=self.base + len(self.nodes) - 1, fold=self._fold() if ahead else -1, bare=ahead, weight=1.0,
             instrument=self._index[measurement.instrument], components=len(noise), time=measurement.time,
         )  # fmt: skip
-        _attach(
+        _attach.unchecked(
             np.ascontiguousarray(noise, dtype=np.float64), np.ascontiguousarray(measurement.value, dtype=np.float64),
             aids.newest("noise"), aids.newest("whitener"), aids.newest("value"),
         )  # fmt: skip
@@ -479,10 +486,10 @@ class Chain(ABC):
         self.move_folds(int(folds["node"].searchsorted(aids["node"][first])))
         row = np.where(at_node, -1, aids["fold"] - self.fold_base)
         self.observe(first, row, folds, "now_", jacobian)
-        add_motion_noise(
+        add_motion_noise.unchecked(
             first, row, aids["components"], jacobian, folds["noise"], aids["noise"], aids["whitener"], aids["bare"]
         )
-        through_motion(first, row, min(self.coupled, self.size), folds["jacobian"], jacobian)
+        through_motion.unchecked(first, row, min(self.coupled, self.size), folds["jacobian"], jacobian)
 
     @abstractmethod
     def observe(self, first: int, row: NDArray[np.int64], states: Columns, prefix: str, jacobian: Array) -> None:

@@ -14,7 +14,7 @@ from typing import TypeAlias
 import numpy as np
 
 from simnav.compiled import kernel
-from simnav.estimators.algebra.sparse_product import (
+from simnav.estimators.algebra.products import (
     Places,
     add_eight,
     eight_of,
@@ -148,7 +148,7 @@ def _advance_rows(value: Array, half: Array, column: Places, count: Places, M: A
     sparse_product(value, column, count, M, A)
     for i in range(np.uint64(15)):
         for j in range(np.uint64(0), np.uint64(WIDTH), np.uint64(8)):
-            add_eight(M, i, j, eight_sums(half, column, i, count[i], A, j, eight_of(A, i, j)))
+            add_eight(M[i], j, eight_sums(half, column, i, count[i], A, j, eight_of(A[i], j)))
 
 
 @kernel()

@@ -1,9 +1,8 @@
-"""The product of a sparse matrix, whose non-zero elements are listed, and a dense one, eight columns at a time.
+"""Products with a dense matrix, eight columns at a time: of a sparse matrix, whose elements are listed, and of a vector.
 
-The sums of eight columns stay in one vector register while the elements of a row are gone through. The terms are added
-in the order in which the elements are listed. For this the dense matrix has a multiple of eight columns (`padded`), and
-indices are unsigned: of a signed one the compiler has to ask whether it counts from the end, and then it does not see
-that eight elements lie side by side.
+The sums of eight columns stay in one vector register while the terms are added, in the order in which the elements are
+listed. Indices are unsigned: of a signed one the compiler has to ask whether it counts from the end, and then it does
+not see that eight elements lie side by side.
 """
 
 from __future__ import annotations
@@ -17,8 +16,7 @@ from simnav.compiled import kernel
 from simnav.types import Array
 
 __all__ = [
-    "NOTHING", "Places", "add_eight", "eight_of", "eight_sums", "list_elements", "padded", "put_eight",
-    "sparse_product",
+    "Places", "add_eight", "add_product", "eight_of", "eight_sums", "list_elements", "padded", "sparse_product",
 ]  # fmt: skip
 
 Eight: TypeAlias = tuple[float, float, float, float, float, float, float, float]
@@ -78,26 +76,24 @@ def eight_sums(value: Array, column: Places, i: Place, count: Place, M: Array, j
 
 
 @kernel()
-def eight_of(M: Array, i: Place, j: Place) -> Eight:
-    """Eight elements of row i of M, from column j on."""
-    return (
-        M[i, j], M[i, j + _1], M[i, j + _2], M[i, j + _3], M[i, j + _4], M[i, j + _5], M[i, j + _6], M[i, j + _7]
-    )  # fmt: skip
+def eight_of(row: Array, j: Place) -> Eight:
+    """Eight elements of a row, from j on."""
+    return row[j], row[j + _1], row[j + _2], row[j + _3], row[j + _4], row[j + _5], row[j + _6], row[j + _7]
 
 
 @kernel()
-def put_eight(M: Array, i: Place, j: Place, s: Eight) -> None:
-    """Overwrite eight elements of row i of M, from column j on."""
-    M[i, j], M[i, j + _1], M[i, j + _2], M[i, j + _3] = s[0], s[1], s[2], s[3]
-    M[i, j + _4], M[i, j + _5], M[i, j + _6], M[i, j + _7] = s[4], s[5], s[6], s[7]
+def put_eight(row: Array, j: Place, s: Eight) -> None:
+    """Overwrite eight elements of a row, from j on."""
+    row[j], row[j + _1], row[j + _2], row[j + _3] = s[0], s[1], s[2], s[3]
+    row[j + _4], row[j + _5], row[j + _6], row[j + _7] = s[4], s[5], s[6], s[7]
 
 
 @kernel()
-def add_eight(M: Array, i: Place, j: Place, s: Eight) -> None:
-    """Add eight sums to row i of M, from column j on."""
-    t = eight_of(M, i, j)
+def add_eight(row: Array, j: Place, s: Eight) -> None:
+    """Add eight sums to a row, from element j on."""
+    t = eight_of(row, j)
     put_eight(
-        M, i, j,
+        row, j,
         (t[0] + s[0], t[1] + s[1], t[2] + s[2], t[3] + s[3], t[4] + s[4], t[5] + s[5], t[6] + s[6], t[7] + s[7]),
     )  # fmt: skip
 
@@ -107,4 +103,37 @@ def sparse_product(value: Array, column: Places, count: Places, M: Array, out: A
     """The product of a matrix in lists (`eight_sums`) and M; M and ``out`` have a multiple of eight columns."""
     for i in range(np.uint64(count.size)):
         for j in range(_0, np.uint64(M.shape[1]), _8):
-            put_eight(out, i, j, eight_sums(value, column, i, count[i], M, j, NOTHING))
+            put_eight(out[i], j, eight_sums(value, column, i, count[i], M, j, NOTHING))
+
+
+@kernel()
+def _eight_columns(M: Array, x: Array, j: Place, total: Array) -> Eight:
+    """Elements j to j + 7 of ``total + M' x``, row by row."""
+    s0, s1, s2, s3, s4, s5, s6, s7 = eight_of(total, j)
+    for k in range(np.uint64(x.size)):
+        a = x[k]
+        s0 += M[k, j] * a
+        s1 += M[k, j + _1] * a
+        s2 += M[k, j + _2] * a
+        s3 += M[k, j + _3] * a
+        s4 += M[k, j + _4] * a
+        s5 += M[k, j + _5] * a
+        s6 += M[k, j + _6] * a
+        s7 += M[k, j + _7] * a
+    return s0, s1, s2, s3, s4, s5, s6, s7
+
+
+@kernel()
+def add_product(M: Array, x: Array, total: Array) -> None:
+    """Compute ``total += M' x`` for an (n, n) matrix, row by row."""
+    n = x.size
+    if n < 8:
+        for k in range(n):
+            for j in range(n):
+                total[j] += M[k, j] * x[k]
+        return
+    last = np.uint64(n - 8)
+    end = _eight_columns(M, x, last, total)
+    for j in range(_0, last, _8):
+        put_eight(total, j, _eight_columns(M, x, j, total))
+    put_eight(total, last, end)  # some elements a second time, with the same values
