@@ -123,8 +123,8 @@ class ManyReadings:
         blocks = {name: np.broadcast_to(zero, (n, zero.shape[1])) for name, zero in self._zeros.items()}
         for name, at in self._at:
             blocks[name] = own[:, at]
-        at_rows = [column.take(row, axis=0) for column in (position, velocity, dcm, turning)]
-        points = NavigationPoints(time, *at_rows, blocks, channel, side)
+        places, velocities, dcms, rates = (column.take(row, axis=0) for column in (position, velocity, dcm, turning))
+        points = NavigationPoints(time, places, velocities, dcms, rates, blocks, channel, side)
         reading, given = self._observations(points, self._sheet)
         jacobian = np.empty((n, value.shape[1], offset + own.shape[1])) if out is None else out
         jacobian[...] = 0.0
