@@ -15,6 +15,7 @@ of a geoid model at the place, such as EGM2008.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
@@ -73,6 +74,7 @@ class WaterLevel(SurroundingSpec):
     """
 
     files: ClassVar[tuple[str, ...]] = ("geoid_grid",)
+    later: ClassVar[Mapping[str, Any]] = {"geoid_grid": ""}
 
     kind: Literal["water_level"] = "water_level"
     geoid: float = quantity("m", 0.0)
@@ -109,7 +111,7 @@ class WaterLevel(SurroundingSpec):
     @model_serializer(mode="wrap")
     def _without_later(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
         """See `simnav.spec.without_later`."""
-        return without_later(handler(self), {"geoid_grid": ""})
+        return without_later(handler(self), self.later)
 
     def check(self, name: str, start: Start | None) -> None:
         """See `SurroundingSpec.check`."""
