@@ -128,7 +128,7 @@ def inspect_log(request: InspectRequest) -> tuple[list[Stream], list[str]]:
         streams, failed = inspect_log([absolute(path) for path in given])
         if target is not None and streams:
             words = "".join(c if c.isascii() and c.isalnum() else " " for c in target.stem.lower()).split()
-            write_whole(target, draft(streams, "-".join(words) or "my-log"))
+            write_whole(target, draft(streams, "-".join(words) or "my-log", target.name))
     return streams, failed
 
 

@@ -183,7 +183,7 @@ def read_csv(path: Path, comment: str = "") -> Table:
         column = data.column(name)
         data = data.drop_columns([name])  # so that no more than one is there twice
         if pa.types.is_integer(column.type) or pa.types.is_floating(column.type) or pa.types.is_null(column.type):
-            columns[name] = np.asarray(column.cast(pa.float64()).to_numpy(), dtype=np.float64)
+            columns[name] = np.asarray(column.cast(pa.float64(), safe=False).to_numpy(), dtype=np.float64)
         else:
             columns[name] = np.array([None if c is None else str(c) for c in column.to_pylist()], dtype=object)
     if count == 0:

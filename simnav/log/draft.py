@@ -11,6 +11,8 @@ from typing import Any
 import numpy as np
 
 from simnav.log.inspection import Stream
+from simnav.log.units import dimension
+from simnav.log.variation import dated
 from simnav.types import Array
 
 __all__ = ["Guess", "draft", "guesses"]
@@ -28,7 +30,7 @@ _NAMES: dict[str, tuple[str, ...]] = {
         r"^(gps|gnss|nav)?[_.]?(lon|lng)",
         r"^(height|hgt|h$|ellh)|^(alt|ele)",
     ),
-    **{quantity: tuple(rf"^({label}){_AXES}{axis}\b" for axis in "xyz") for quantity, label in _LABEL.items()},
+    **{quantity: tuple(rf"^({label}){_AXES}{axis}(?![a-z0-9])" for axis in "xyz") for quantity, label in _LABEL.items()},
     "heading": (r"^(true[_.]?)?(heading|hdg|yaw)\b|^(heading|yaw)_",),
     "level": (r"^roll\b|^roll_", r"^pitch\b|^pitch_"),
     "velocity": (r"^(vel(ocity)?[_.]?n(orth)?|vn)\b", r"^(vel(ocity)?[_.]?e(ast)?|ve)\b"),
@@ -47,6 +49,22 @@ _INSTRUMENTS = {
 #: Sentences that say nothing of the vessel's own motion, though their columns have such names.
 _NOT = {"depth": ("DPT", "DBT", "PSIMSSB"), "speed": ("RMC", "VTG", "GGA")}
 _EVERY = 10
+#: Units as headers write them, in brackets or after an underscore at the end, where they are not those of `LOG_UNITS`.
+_SPELT = {
+    "dps": "deg_s", "deg/s": "deg_s", "deg/sec": "deg_s", "degs": "deg_s", "\N{DEGREE SIGN}/s": "deg_s",
+    "rad/s": "rad_s", "rad/sec": "rad_s", "rads": "rad_s", "rps": "rad_s",
+    "m/s2": "m_s2", "m/s^2": "m_s2", "m/s/s": "m_s2", "m/s\N{SUPERSCRIPT TWO}": "m_s2", "mps2": "m_s2", "ms2": "m_s2",
+    "m/s": "m_s", "mps": "m_s", "km/h": "km_h", "kmh": "km_h", "kt": "kn", "kts": "kn", "knots": "kn",
+    "degrees": "deg", "\N{DEGREE SIGN}": "deg", "e7": "1e-7 deg", "dege7": "1e-7 deg",
+}  # fmt: skip
+_UNIT = re.compile(r"(?:\[([^\]]+)\]|\(([^)]+)\)|_((?:deg|rad|m|cm|mm)_s2?|[^_\W]+))\s*$")
+_LENGTH, _SPEED = "length", "speed"
+#: What each quantity is measured in; of a position the angle stands for the first two columns.
+_DIMENSIONS = {
+    "position": ("angle", "angle", _LENGTH), "angular_rate": ("angular rate",) * 3,
+    "specific_force": ("acceleration",) * 3, "heading": ("angle",), "level": ("angle",) * 2, "velocity": (_SPEED,) * 2,
+    "dvl": (_SPEED,) * 3, "speed": (_SPEED,), "depth": (_LENGTH,),
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -90,7 +108,24 @@ def guesses(stream: Stream) -> Iterator[Guess]:
         if not len(values):
             continue
         columns, units = _signed(quantity, found, values), _units(stream, quantity, values)
+        if stream.form != "nmea":
+            units = tuple(
+                _named(name, what) or unit for name, what, unit in zip(found, _DIMENSIONS[quantity], units, strict=False)
+            ) + units[len(found) :]
         yield Guess(stream, quantity, columns, units)
+    if "heading_magnetic" in names and not np.isfinite(stream.table.column("heading")[1]).any():
+        if np.isfinite(stream.table.column("heading_magnetic")[1]).any():
+            yield Guess(stream, "heading", ("heading_magnetic",), ("1",))
+
+
+def _named(name: str, what: str) -> str | None:
+    """The unit that the name of a column says, if it is one of what is measured."""
+    match = _UNIT.search(name.strip())
+    if match is None:
+        return None
+    text = next(g for g in match.groups() if g is not None).strip()
+    unit = _SPELT.get(text.lower(), text)
+    return unit if dimension(unit) == what else None
 
 
 def _first(names: Sequence[str], pattern: str) -> list[str]:
@@ -131,7 +166,7 @@ def _units(stream: Stream, quantity: str, values: Array) -> tuple[str, ...]:
     return ("m" if quantity == "depth" else "m_s",) * width
 
 
-def draft(streams: Sequence[Stream], name: str = "my-log") -> str:
+def draft(streams: Sequence[Stream], name: str = "my-log", file: str | None = None) -> str:
     """The text of a scenario file over the streams, with all that has to be checked as comments.
 
     Parameters
@@ -140,6 +175,8 @@ def draft(streams: Sequence[Stream], name: str = "my-log") -> str:
         From `simnav.log.inspection.inspect_log`, of one folder.
     name : str
         Name of the scenario.
+    file : str or None
+        Name of the file that the text goes to; None: that of the scenario and ``.toml``.
 
     Returns
     -------
@@ -166,7 +203,7 @@ def draft(streams: Sequence[Stream], name: str = "my-log") -> str:
     span = float(position.stream.time[-1] - position.stream.time[0])
     lines = [
         "# A scenario to begin with. Check everything that is marked: simnav cannot know it.",
-        f"# Then: simnav check {name}.toml; simnav run {name}.toml",
+        f"# Then: simnav check {file or f'{name}.toml'}; simnav run {file or f'{name}.toml'}",
         f'name = "{name}"',
         "version = 1",
         f'title = "{name}"',
@@ -191,7 +228,12 @@ def draft(streams: Sequence[Stream], name: str = "my-log") -> str:
         if quantity in _INSTRUMENTS:
             lines += ["", *_channel(f"log.instruments.{_INSTRUMENTS[quantity][0]}", guess, keys)]
             if quantity == "position":
+                if _graded(guess):
+                    lines.append('sigma = ["sdn", "sde", "sdu"]')
                 lines.append(f"every = {_EVERY}                     # every tenth fix to the estimators ...")
+    if _graded(position):
+        lines += ["", "[log.reference]",
+                  'quality = "Q"                  # only fixed and float solutions are scored']  # fmt: skip
     lines += ["", *_channel("log.reference.position", position, keys)]
     lines.append(f"hold_out = {_EVERY}                  # ... and the others to compare with")
     if inertial and rate is not None:
@@ -249,9 +291,23 @@ def _channel(table: str, guess: Guess, keys: dict[Any, str]) -> list[str]:
         lines.append(f'talker = "{stream.talker}"')
     columns = list(guess.columns)
     lines.append(f"columns = {json.dumps(columns)}")
+    if columns == ["heading_magnetic"]:
+        lines.append(
+            'variation_model = "wmm"        # check: the file has no variation'
+            if dated(stream.time) else
+            "variation_deg = 0.0            # check: the file has no variation; that of the place and year, positive east"
+        )  # fmt: skip
     if set(guess.units) != {"1"}:
         lines.append(f"units = {json.dumps(list(guess.units))}   # check")
     return lines
+
+
+def _graded(position: Guess) -> bool:
+    """Whether most positions say that they are fixed or float solutions of RTKLIB, and with which sigma."""
+    table = position.stream.table
+    if position.stream.form != "rtklib" or not {"Q", "sdn", "sde", "sdu"} <= set(table.names):
+        return False
+    return bool(np.mean(np.isin(table.column("Q")[1], (1.0, 2.0))) > 0.5)
 
 
 def _imu(rate: Guess, force: Guess, keys: dict[Any, str]) -> list[str]:

@@ -22,7 +22,7 @@ from simnav.log.formats.rinex import read_rinex
 from simnav.log.formats.ubx import read_ubx
 from simnav.log.nmea import read_nmea
 from simnav.log.reader import READERS
-from simnav.log.table import LogError, Table, utc_seconds
+from simnav.log.table import LogError, LogWarning, Table, utc_seconds
 from simnav.types import Array
 
 __all__ = ["Stream", "inspect_log", "streams_of", "track_of"]
@@ -122,12 +122,19 @@ def inspect_log(paths: Sequence[Path]) -> tuple[list[Stream], list[str]]:
     Raises
     ------
     LogError
-        If a path does not exist.
+        If a path does not exist, or a folder has no file.
     """
     files: list[Path] = []
     for path in paths:
         if path.is_dir():
-            files += sorted(p for p in path.iterdir() if p.is_file() and not p.name.startswith("."))
+            inside = sorted(p for p in path.iterdir() if not p.name.startswith("."))
+            here = [p for p in inside if p.is_file()]
+            if not here:
+                folders = ", ".join(p.name for p in inside)
+                raise LogError(
+                    f"{path}: there is no file in it" + (f"; name one of its folders: {folders}" if folders else "")
+                )
+            files += here
         elif path.exists():
             files.append(path)
         else:
@@ -155,6 +162,8 @@ def streams_of(path: Path) -> list[Stream]:
         warnings.simplefilter("always")
         found = list(_streams(path, form))
     notes = tuple(dict.fromkeys(" ".join(str(w.message).split()).removeprefix(f"{path}: ") for w in said))
+    if not found:
+        raise LogError(f"{path}: " + ("; ".join(notes) or "there is nothing in it"))
     return [Stream(s.path, s.form, s.sentence, s.talker, s.table, s.time, s.keys, notes) for s in found]
 
 
@@ -199,10 +208,14 @@ def _streams(path: Path, form: str) -> Iterator[Stream]:
             yield Stream(path, form, sentence, talker or None, table, _known(time))
         return
     if form in ("mcap", "rosbag"):
+        reader = READERS.get(form)
+        assert reader is not None
         for topic in topics_of(path, form):
-            reader = READERS.get(form)
-            assert reader is not None
-            rows = reader.read(path, FileSpec(path=path.name, format=form), topic)
+            try:
+                rows = reader.read(path, FileSpec(path=path.name, format=form), topic)
+            except LogError as error:  # such as images in an encoding of their own; the other topics are of use
+                warnings.warn(str(error), LogWarning, 2)
+                continue
             yield Stream(path, form, topic, None, rows.table, _known(rows.time))
         return
     keys = _time_keys(path) if form == "csv" else _array_keys(path, form)
@@ -295,7 +308,7 @@ def _array_keys(path: Path, form: str) -> dict[str, Any]:
     try:
         names = list(reader.read(path, FileSpec(path=path.name, format=form, time=1)).table.names)
     except LogError as error:
-        names = re.findall(r"([^\s,]+) \d+(?:x\d+)*", str(error).rpartition("there are:")[2])
+        names = re.findall(r"([^\s,]+) \d+(?:x\d+)*", str(error).partition("there are:")[2])
         if not names:
             raise
     chosen = next((n for n in names if _TIME.match(re.split(r"[./]", n)[-1])), None)

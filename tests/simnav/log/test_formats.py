@@ -129,8 +129,23 @@ def test_sbet(good):
     assert table.column("heading")[1][0] == pytest.approx(0.7)
     path = good.folder / "cut.out"
     path.write_bytes((good.folder / "good.out").read_bytes()[:-5])
-    with pytest.raises(LogError, match=r"1627 bytes are no whole number of records of 136 bytes.*offset 1496"):
+    with pytest.warns(LogWarning, match=r"the last record, at offset 1496, has 131 bytes where .* has 136"):
+        assert len(read("sbet", path).table) == 11
+    path.write_text("0,1,2,3\n" * 100)
+    with pytest.raises(LogError, match="it is text, and no binary file as format = 'sbet' wants"):
         read("sbet", path)
+
+
+def test_a_last_row_of_rtklib_that_is_cut_off_is_left_out(good):
+    good("rtklib")
+    text = (good.folder / f"good{CASES['rtklib'].ending}").read_text().splitlines()
+    path = good.folder / "cut.pos"
+    path.write_text("\n".join(text)[:-9])
+    with pytest.warns(LogWarning, match="the last row has 5 cells where the first line has 8; it is incomplete"):
+        assert len(read("rtklib", path).table) == 11
+    path.write_text("\n".join([*text[:-3], text[-3][:-9], *text[-2:]]))
+    with pytest.raises(LogError, match="line 12: 5 cells where the first line has 8"):
+        read("rtklib", path)
 
 
 def test_pd0(good):

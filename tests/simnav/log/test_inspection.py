@@ -97,3 +97,77 @@ def test_rows_that_are_not_later_than_the_one_before_have_no_rate():
         described(np.array([3.0, 3.0])) == "2 rows from 3.000 to 3.000 s, most rows are not later than the one before"
     )
     assert described(np.array([3.0, 4.0, 9.5])) == "3 rows from 3.000 to 9.500 s, 0.3077 Hz"
+
+
+def test_a_magnetic_heading_without_variation_is_in_the_draft(tmp_path):
+    stamps = [f"2024-05-01T10:00:{k:02d}.000Z" for k in range(40)]
+    lines = [f"{t} $GPGGA,1000{k:02d}.00,54{27.0 + 0.004 * k:07.4f},N,01015.0000,E,1,09,0.9,3.0,M,44.0,M,,\n"
+             f"{t} $HCHDM,356.5,M" for k, t in enumerate(stamps)]  # fmt: skip
+    (tmp_path / "boat.log").write_text("\n".join(lines) + "\n")
+    text = draft(streams_of(tmp_path / "boat.log"), "boat", "my boat.toml")
+    assert 'columns = ["heading_magnetic"]\nvariation_model = "wmm"' in text
+    assert "simnav check my boat.toml" in text
+    path = tmp_path / "boat.toml"
+    path.write_text(text.replace('variation_model = "wmm"', "variation_deg = 5.0"))
+    source = LogSource(load(path), 0)
+    heading = source.advance(source.duration).aids["gyrocompass"].value
+    assert np.degrees(heading) == pytest.approx(1.5)
+    undated = [line.partition(" ")[2] for pair in lines for line in pair.split("\n")]
+    (tmp_path / "boat.log").write_text("\n".join(undated) + "\n")
+    assert "variation_deg = 0.0 " in draft(streams_of(tmp_path / "boat.log"), "boat")
+
+
+def test_units_in_the_names_of_columns_count(tmp_path):
+    names = ["t_ms", "gyro_x [dps]", "gyro_y (rad/s)", "gyro_z_deg_s", "acc_x [mg]", "acc_y_m_s2", "acc_z",
+             "lat_e7", "lon [deg]", "alt_mm", "heading_deg", "speed (kts)"]  # fmt: skip
+    rows = [[20 * k, 0.1, 0.1, 0.1, 0.1, 0.1, -9.8, 540000000 + k, 10.0, 2000, 0.5, 2.0] for k in range(9)]
+    path = tmp_path / "a.csv"
+    path.write_text("\n".join([",".join(names), *(",".join(map(str, row)) for row in rows)]) + "\n")
+    found = {g.quantity: g.units for g in guesses(streams_of(path)[0])}
+    assert found == {
+        "position": ("1e-7 deg", "deg", "mm"),
+        "angular_rate": ("deg_s", "rad_s", "deg_s"),
+        "specific_force": ("mg", "m_s2", "m_s2"),
+        "heading": ("deg",),
+        "speed": ("kn",),
+    }
+
+
+def test_a_solution_of_rtklib_gives_its_own_accuracy(tmp_path):
+    path = tmp_path / "a.pos"
+    CASES["rtklib"].make(path)
+    text = path.read_text().splitlines()
+    head = next(k for k, line in enumerate(text) if not line.startswith("%"))
+    rows = [" ".join([*line.split()[:6], "12", "0.01", "0.01", "0.02"]) for line in text[head:]]
+    named = "%  UTC  latitude(deg) longitude(deg) height(m) Q ns sdn(m) sde(m) sdu(m)"
+    path.write_text("\n".join([named, *rows]) + "\n")
+    text = draft(streams_of(path), "a")
+    assert 'sigma = ["sdn", "sde", "sdu"]' in text
+    assert '[log.reference]\nquality = "Q"' in text
+
+
+def test_a_topic_that_cannot_be_read_does_not_hide_the_others(tmp_path):
+    writer = pytest.importorskip("mcap.writer")
+    path = tmp_path / "a.mcap"
+    with open(path, "wb") as stream:
+        out = writer.Writer(stream)
+        out.start()
+        channels = [out.register_channel(t, form, 0) for t, form in (("/image", "own"), ("/fix", "json"))]
+        for k in range(3):
+            for channel in channels:
+                out.add_message(channel, k, b'{"latitude": 54.0}', k)
+        out.finish()
+    (stream,) = streams_of(path)
+    assert (stream.sentence, len(stream.table)) == ("/fix", 3)
+    assert "messages of the topic '/image' are encoded as 'own'" in stream.notes[0]
+
+
+def test_a_folder_of_folders_and_a_damaged_file_are_said(tmp_path):
+    (tmp_path / "day1").mkdir()
+    with pytest.raises(LogError, match="there is no file in it; name one of its folders: day1"):
+        inspect_log([tmp_path])
+    path = tmp_path / "a.mat"
+    CASES["mat"].make(path)
+    path.write_bytes(path.read_bytes()[:-3])
+    with pytest.raises(LogError, match="a.mat: .*damaged"):
+        streams_of(path)

@@ -134,3 +134,9 @@ def test_stamps_with_the_day_of_the_year():
     assert utc_seconds("19+085:10:06:03.188") == utc_seconds("2019-03-26T10:06:03.188Z")
     with pytest.raises(ValueError, match="does not match"):
         utc_seconds("19+485:10:06:03.188")
+
+
+def test_whole_numbers_above_those_of_a_double_are_read(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_text("time,x\n1714557600020000000,1\n1714557600040000000,2\n")
+    assert read_csv(path).column("time")[1] == pytest.approx([1.71455760002e18, 1.71455760004e18], rel=1e-15)
