@@ -6,7 +6,7 @@ import json
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
+from pathlib import Path
 
 import numpy as np
 
@@ -22,6 +22,8 @@ _LABEL = {
     "angular_rate": r"gyr?o?|g|w|ang(ular)?[_.]?(vel(ocity)?|rate)|omega|imu[_.]g",
     "specific_force": r"acc?(el)?(eration)?|a|f|linear[_.]acc(eleration)?|imu[_.]a",
 }
+#: Names of files and topics that say what their columns x, y, z are.
+_OWN_NAME = {"angular_rate": r"gyr", "specific_force": r"acc(?!urac)"}
 _DVL = (("x", "forward"), ("y", "starboard"), ("z", "down"))
 #: Quantity -> regular expressions of the names of its columns, in order.
 _NAMES: dict[str, tuple[str, ...]] = {
@@ -49,6 +51,8 @@ _INSTRUMENTS = {
 #: Sentences that say nothing of the vessel's own motion, though their columns have such names.
 _NOT = {"depth": ("DPT", "DBT", "PSIMSSB"), "speed": ("RMC", "VTG", "GGA")}
 _EVERY = 10
+#: From this share of repeated values on they are left out.
+_MANY = 0.3
 #: Units as headers write them, in brackets or after an underscore at the end, where they are not those of `LOG_UNITS`.
 _SPELT = {
     "dps": "deg_s", "deg/s": "deg_s", "deg/sec": "deg_s", "degs": "deg_s", "\N{DEGREE SIGN}/s": "deg_s",
@@ -113,9 +117,27 @@ def guesses(stream: Stream) -> Iterator[Guess]:
                 _named(name, what) or unit for name, what, unit in zip(found, _DIMENSIONS[quantity], units, strict=False)
             ) + units[len(found) :]
         yield Guess(stream, quantity, columns, units)
+    bare = _bare(stream, names)
+    if bare is not None:
+        yield bare
     if "heading_magnetic" in names and not np.isfinite(stream.table.column("heading")[1]).any():
         if np.isfinite(stream.table.column("heading_magnetic")[1]).any():
             yield Guess(stream, "heading", ("heading_magnetic",), ("1",))
+
+
+def _bare(stream: Stream, names: Sequence[str]) -> Guess | None:
+    """Columns x, y, z of a file or topic whose name says what they are, as those of phones."""
+    label = stream.path.stem if stream.sentence is None else stream.sentence
+    quantity = next((q for q, pattern in _OWN_NAME.items() if re.search(pattern, label, re.I)), None)
+    found = [next((n for n in names if re.split(r"[./]", n.lower())[-1] == axis), None) for axis in "xyz"]
+    if quantity is None or None in found:
+        return None
+    columns = [n for n in found if n is not None]
+    values = np.stack([stream.table.column(n)[1] for n in columns], axis=-1)
+    values = values[np.isfinite(values).all(axis=1)]
+    if not len(values) or (quantity == "specific_force" and np.linalg.norm(values.mean(axis=0)) < 0.5):
+        return None  # gravity was taken out
+    return Guess(stream, quantity, _signed(quantity, columns, values), _units(stream, quantity, values))
 
 
 def _named(name: str, what: str) -> str | None:
@@ -195,10 +217,13 @@ def draft(streams: Sequence[Stream], name: str = "my-log", file: str | None = No
             "# positions as a reference: see docs/how-to/use-your-own-log.md.\n"
         )
     rate, force = best.get("angular_rate"), best.get("specific_force")
-    inertial = rate is not None and force is not None and rate.stream is force.stream
+    if rate is not None and force is not None and rate.stream is not force.stream:  # rather both of one stream
+        both = [(r, f) for r in found for f in found if r.stream is f.stream
+                and (r.quantity, f.quantity) == ("angular_rate", "specific_force")]  # fmt: skip
+        rate, force = both[0] if both else (rate, force)
     used = [position, *(g for q, g in best.items() if q in _INSTRUMENTS and q != "position")]
-    if inertial and rate is not None:
-        used.append(rate)
+    if rate is not None and force is not None:
+        used += [rate, force]
     keys = _file_keys(used)
     span = float(position.stream.time[-1] - position.stream.time[0])
     lines = [
@@ -220,9 +245,9 @@ def draft(streams: Sequence[Stream], name: str = "my-log", file: str | None = No
     ]
     if "heading" in best or span < 20.0:
         lines[-1] = f"# {lines[-1]}"
-    for stream, key in keys.items():
-        lines += ["", *_file(stream, key)]
-    if inertial and rate is not None and force is not None:
+    for (_, topic), (stream, key) in keys.items():
+        lines += ["", *_file(stream, key, topic)]
+    if rate is not None and force is not None:
         lines += ["", *_imu(rate, force, keys)]
     for quantity, guess in best.items():
         if quantity in _INSTRUMENTS:
@@ -236,7 +261,7 @@ def draft(streams: Sequence[Stream], name: str = "my-log", file: str | None = No
                   'quality = "Q"                  # only fixed and float solutions are scored']  # fmt: skip
     lines += ["", *_channel("log.reference.position", position, keys)]
     lines.append(f"hold_out = {_EVERY}                  # ... and the others to compare with")
-    if inertial and rate is not None:
+    if rate is not None and force is not None:
         hertz = 1.0 / float(np.median(np.diff(rate.stream.time)))
         lines += ["", "[instruments.imu]", f"rate_hz = {_round(hertz)}",
                   'grade = "mems"                   # check: or the figures of its datasheet']  # fmt: skip
@@ -244,6 +269,7 @@ def draft(streams: Sequence[Stream], name: str = "my-log", file: str | None = No
         if quantity in _INSTRUMENTS:
             label, kind, sigma = _INSTRUMENTS[quantity]
             hertz = 1.0 / max(1e-3, float(np.median(np.diff(guess.stream.time)))) if len(guess.stream.time) > 1 else 1.0
+            hertz *= 1.0 - (_repeated(guess) if _stale(guess) else 0.0)
             hertz = hertz / _EVERY if quantity == "position" else hertz
             lines += ["", f"[instruments.{label}]", kind, f"rate_hz = {_round(hertz)}", f"{sigma}   # check"]
     return "\n".join(lines) + "\n"
@@ -253,28 +279,40 @@ def _round(value: float) -> str:
     return f"{float(f'{value:.4g}')!r}"
 
 
-def _file_keys(used: Sequence[Guess]) -> dict[Any, str]:
-    """A name for each file, by path and keys."""
-    keys: dict[Any, str] = {}
+#: Streams and the keys of their files, by path and, of the IMU in a bag, topic.
+_Keys = dict[tuple[Path, str | None], tuple[Stream, str]]
+
+
+def _place(guess: Guess) -> tuple[Path, str | None]:
+    own = guess.quantity in _LABEL and guess.stream.form in ("mcap", "rosbag")
+    return guess.stream.path, guess.stream.sentence if own else None
+
+
+def _file_keys(used: Sequence[Guess]) -> _Keys:
+    """A name for each file, or topic of an IMU."""
+    keys: _Keys = {}
+    taken: set[str] = set()
     for guess in used:
-        stem = re.sub(r"\W+", "_", guess.stream.path.stem.lower()).strip("_") or "file"
-        place = guess.stream.path
+        place = _place(guess)
         if place not in keys:
-            keys[place] = stem if stem not in keys.values() else f"{stem}_{len(keys)}"
-    by_stream: dict[Any, Any] = {}
-    for guess in used:
-        by_stream.setdefault(guess.stream.path, (guess.stream, keys[guess.stream.path]))
-    return dict(by_stream.values())
+            text = guess.stream.path.stem if place[1] is None else place[1]
+            stem = re.sub(r"\W+", "_", text.lower()).strip("_") or "file"
+            key = stem if stem not in taken else f"{stem}_{len(keys)}"
+            taken.add(key)
+            keys[place] = guess.stream, key
+    return keys
 
 
-def _key_of(keys: dict[Any, str], stream: Stream) -> str:
-    return next(key for known, key in keys.items() if known.path == stream.path)
+def _key_of(keys: _Keys, guess: Guess) -> str:
+    return keys[_place(guess)][1]
 
 
-def _file(stream: Stream, key: str) -> list[str]:
+def _file(stream: Stream, key: str, topic: str | None) -> list[str]:
     lines = [f"[log.files.{key}]", f"path = {json.dumps(stream.path.name)}"]
     if stream.form != "csv":
         lines.append(f'format = "{stream.form}"')
+    if topic is not None:
+        lines.append(f"options = {{ topic = {json.dumps(topic)} }}")
     for name, value in stream.keys.items():
         lines.append(f"{name} = {json.dumps(list(value) if isinstance(value, tuple) else value)}")
     if stream.form == "csv" and len(stream.time) > 1 and (np.diff(stream.time) == 0.0).any():
@@ -282,15 +320,17 @@ def _file(stream: Stream, key: str) -> list[str]:
     return lines
 
 
-def _channel(table: str, guess: Guess, keys: dict[Any, str]) -> list[str]:
+def _channel(table: str, guess: Guess, keys: _Keys) -> list[str]:
     stream = guess.stream
-    lines = [f"[{table}]", f'file = "{_key_of(keys, stream)}"']
+    lines = [f"[{table}]", f'file = "{_key_of(keys, guess)}"']
     if stream.sentence is not None:
         lines.append(f"sentence = {json.dumps(stream.sentence)}")
     if stream.talker is not None:
         lines.append(f'talker = "{stream.talker}"')
     columns = list(guess.columns)
     lines.append(f"columns = {json.dumps(columns)}")
+    if _stale(guess):
+        lines.append("drop_repeated = true            # check: many values are those of the row before")
     if columns == ["heading_magnetic"]:
         lines.append(
             'variation_model = "wmm"        # check: the file has no variation'
@@ -302,6 +342,17 @@ def _channel(table: str, guess: Guess, keys: dict[Any, str]) -> list[str]:
     return lines
 
 
+def _repeated(guess: Guess) -> float:
+    """The share of rows whose values are those of the row before."""
+    values = np.stack([guess.stream.table.column(c)[1] for c in guess.columns], axis=-1)
+    return float(np.mean(np.all(np.diff(values, axis=0) == 0.0, axis=1))) if len(values) > 1 else 0.0
+
+
+def _stale(guess: Guess) -> bool:
+    """Whether a logger seems to repeat old values: of several numbers, with their noise, few are the same by chance."""
+    return len(guess.columns) > 1 and _MANY < _repeated(guess) < 1.0
+
+
 def _graded(position: Guess) -> bool:
     """Whether most positions say that they are fixed or float solutions of RTKLIB, and with which sigma."""
     table = position.stream.table
@@ -310,12 +361,15 @@ def _graded(position: Guess) -> bool:
     return bool(np.mean(np.isin(table.column("Q")[1], (1.0, 2.0))) > 0.5)
 
 
-def _imu(rate: Guess, force: Guess, keys: dict[Any, str]) -> list[str]:
+def _imu(rate: Guess, force: Guess, keys: _Keys) -> list[str]:
     flipped = force.columns[2].startswith("-")
+    one = _key_of(keys, rate) == _key_of(keys, force)
+    two = [] if one else [f'specific_force_file = "{_key_of(keys, force)}"   # check: offset_s of its clock']
     rates = [rate.columns[0], *(f"-{c}" if flipped else c for c in rate.columns[1:])]
     return [
         "[log.imu]",
-        f'file = "{_key_of(keys, rate.stream)}"',
+        f'file = "{_key_of(keys, rate)}"',
+        *two,
         'samples = "instantaneous"        # check: or "means", "increments"',
         f"angular_rate = {json.dumps(rates)}   # check: forward, starboard, down; or say mounting_deg",
         f'angular_rate_unit = "{rate.units[0]}"   # check',

@@ -171,3 +171,23 @@ def test_a_folder_of_folders_and_a_damaged_file_are_said(tmp_path):
     path.write_bytes(path.read_bytes()[:-3])
     with pytest.raises(LogError, match="a.mat: .*damaged"):
         streams_of(path)
+
+
+def test_a_draft_of_a_phone_can_be_run(tmp_path):
+    """Gyroscope and accelerometer in files of their own, and a position that is repeated."""
+    time = np.arange(0.0, 40.0, 0.02)
+    for name, shift, values in (("Gyroscope", 0.0, (0.0, 0.0, 0.01)), ("Accelerometer", 0.007, (0.1, 0.0, 9.81))):
+        rows = "".join(f"{1_714_557_600_000 + 1000 * (t + shift):.0f},{values[0]},{values[1]},{values[2]}\n" for t in time)
+        (tmp_path / f"{name}.csv").write_text("time_ms,x,y,z\n" + rows)
+    fixes = [f"{1714557600 + 0.5 * k},{54.0 + 1e-5 * (k // 2)},10.0,3.0" for k in range(80)]
+    (tmp_path / "gps.csv").write_text("\n".join(["time,lat,lon,alt", *fixes]) + "\n")
+    text = draft(inspect_log([tmp_path])[0], "phone")
+    assert 'file = "gyroscope"\nspecific_force_file = "accelerometer"' in text
+    assert text.count("drop_repeated = true") == 2
+    path = tmp_path / "phone.toml"
+    path.write_text(text)
+    source = LogSource(load(path), 0)
+    block = source.advance(source.duration)
+    assert block.imu.specific_force[:, 2] == pytest.approx(-9.81)
+    assert block.imu.angular_rate[:, 2] == pytest.approx(-0.01)
+    assert np.diff(block.aids["gnss"].time) == pytest.approx(10.0)
