@@ -32,7 +32,7 @@ _NAMES: dict[str, tuple[str, ...]] = {
         r"^(gps|gnss|nav)?[_.]?(lon|lng)",
         r"^(height|hgt|h$|ellh)|^(alt|ele)",
     ),
-    **{quantity: tuple(rf"^({label}){_AXES}{axis}(?![a-z0-9])" for axis in "xyz") for quantity, label in _LABEL.items()},
+    **{q: tuple(rf"^({label}){_AXES}{axis}(?![a-z0-9])" for axis in "xyz") for q, label in _LABEL.items()},
     "heading": (r"^(true[_.]?)?(heading|hdg|yaw)\b|^(heading|yaw)_",),
     "level": (r"^roll\b|^roll_", r"^pitch\b|^pitch_"),
     "velocity": (r"^(vel(ocity)?[_.]?n(orth)?|vn)\b", r"^(vel(ocity)?[_.]?e(ast)?|ve)\b"),
@@ -113,16 +113,17 @@ def guesses(stream: Stream) -> Iterator[Guess]:
             continue
         columns, units = _signed(quantity, found, values), _units(stream, quantity, values)
         if stream.form != "nmea":
-            units = tuple(
-                _named(name, what) or unit for name, what, unit in zip(found, _DIMENSIONS[quantity], units, strict=False)
-            ) + units[len(found) :]
+            told = [_named(name, what) for name, what in zip(found, _DIMENSIONS[quantity], strict=False)]
+            units = *(a or b for a, b in zip(told, units, strict=False)), *units[len(found) :]
         yield Guess(stream, quantity, columns, units)
     bare = _bare(stream, names)
     if bare is not None:
         yield bare
-    if "heading_magnetic" in names and not np.isfinite(stream.table.column("heading")[1]).any():
-        if np.isfinite(stream.table.column("heading_magnetic")[1]).any():
-            yield Guess(stream, "heading", ("heading_magnetic",), ("1",))
+    magnetic, true = (
+        n in names and bool(np.isfinite(stream.table.column(n)[1]).any()) for n in ("heading_magnetic", "heading")
+    )
+    if magnetic and not true:
+        yield Guess(stream, "heading", ("heading_magnetic",), ("1",))
 
 
 def _bare(stream: Stream, names: Sequence[str]) -> Guess | None:
@@ -334,9 +335,9 @@ def _channel(table: str, guess: Guess, keys: _Keys) -> list[str]:
     if columns == ["heading_magnetic"]:
         lines.append(
             'variation_model = "wmm"        # check: the file has no variation'
-            if dated(stream.time) else
-            "variation_deg = 0.0            # check: the file has no variation; that of the place and year, positive east"
-        )  # fmt: skip
+            if dated(stream.time)
+            else "variation_deg = 0.0            # check: the file has no variation; of the place and year, positive east"
+        )
     if set(guess.units) != {"1"}:
         lines.append(f"units = {json.dumps(list(guess.units))}   # check")
     return lines

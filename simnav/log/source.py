@@ -205,9 +205,7 @@ class LogSource:
         if steps < 1:
             raise LogError(f"{self._called()}: IMU and reference have only {available:.3f} s in common")
         length = steps * self.step
-        message = (
-            f"{self._called()}: the run ends at {length:g} s, where the log does ({wanted:g} s are wanted)"
-        )
+        message = f"{self._called()}: the run ends at {length:g} s, where the log does ({wanted:g} s are wanted)"
         warnings.warn(message, LogWarning, 3)
         return length
 

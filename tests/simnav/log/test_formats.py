@@ -136,6 +136,28 @@ def test_sbet(good):
         read("sbet", path)
 
 
+def test_an_mcap_file_that_is_cut_off_is_read_as_far_as_it_goes(tmp_path):
+    """A recorder that was switched off has written no index."""
+    writer = pytest.importorskip("mcap.writer")
+    path = tmp_path / "a.mcap"
+    with open(path, "wb") as stream:
+        out = writer.Writer(stream, chunk_size=100, compression=writer.CompressionType.NONE)
+        out.start()
+        channel = out.register_channel("/fix", "json", 0)
+        for k in range(50):
+            out.add_message(channel, 10**9 * k, b'{"latitude": 54.0}', 10**9 * k)
+        out.finish()
+    whole = path.read_bytes()
+    path.write_bytes(whole[: whole.index((10**9 * 30).to_bytes(8, "little"))])
+    with pytest.warns(LogWarning, match="no index, since its recorder did not end well; it is cut off or damaged"):
+        rows = read("mcap", path, clock="logger")
+    assert 20 < len(rows.table) <= 30
+    assert rows.time[:20] == pytest.approx(np.arange(20.0))
+    (stream,) = streams_of(path)
+    assert stream.sentence == "/fix"
+    assert "has no index" in stream.notes[0]
+
+
 def test_a_last_row_of_rtklib_that_is_cut_off_is_left_out(good):
     good("rtklib")
     text = (good.folder / f"good{CASES['rtklib'].ending}").read_text().splitlines()
