@@ -336,7 +336,7 @@ def _channel(table: str, guess: Guess, keys: _Keys) -> list[str]:
         lines.append(
             'variation_model = "wmm"        # check: the file has no variation'
             if dated(stream.time)
-            else "variation_deg = 0.0            # check: the file has no variation; of the place and year, positive east"
+            else "variation_deg = 0.0            # check: the variation of the place, positive east"
         )
     if set(guess.units) != {"1"}:
         lines.append(f"units = {json.dumps(list(guess.units))}   # check")
