@@ -27,6 +27,10 @@ __all__ = ["date_and_time", "read_csv", "rows_of"]
 _DELIMITERS = (",", ";", "\t", " ")
 _MISSING = ["", "nan", "NaN", "NAN", "NA", "null"]
 _SOMETHING = re.compile(rb"\S")
+_DECIMAL_COMMA = re.compile(rb'\s*"?[+-]?\d+,\d+(?:[eE][+-]?\d+)?"?\s*')
+_DECIMAL_POINT = re.compile(rb'\s*"?[+-]?\d+\.\d+(?:[eE][+-]?\d+)?"?\s*')
+#: So many bytes tell whether numbers have decimal commas.
+_HEAD = 4096
 #: Arrow's words for a cell that does not fit the type of its column: the number of the column, and the type.
 _NOT_OF_TYPE = re.compile(r"In CSV column #(\d+): .*?conversion error to (\w+)", re.DOTALL)
 
@@ -116,7 +120,8 @@ def _time(table: Table, file: FileSpec, column: str) -> Array:
 def read_csv(path: Path, comment: str = "") -> Table:
     """Read a table of numbers with or without a header, separated by comma, semicolon, tab or blank.
 
-    The result is kept for the life of the process, as long as the file does not change.
+    With semicolons or tabs between them, numbers may have a decimal comma. The result is kept for the life of the
+    process, as long as the file does not change.
 
     Parameters
     ----------
@@ -144,9 +149,11 @@ def read_csv(path: Path, comment: str = "") -> Table:
     if not first.strip():
         raise LogError(f"{path}: the file is empty")
     delimiter = next((d for d in _DELIMITERS if d in first), ",")
+    if delimiter == "," and ";" in first and all(_is_number(c.replace(",", ".", 1)) for c in first.split(";")):
+        delimiter = ";"  # numbers with decimal commas
     blanks = delimiter == " "
     cells = [c.strip().strip('"') for c in (first.split() if blanks else first.split(delimiter))]
-    header = not any(_is_number(c) for c in cells)
+    header = not any(_is_number(c.replace(",", ".", 1)) for c in cells)
     names = cells if header else [str(i) for i in range(1, len(cells) + 1)]
     if len(set(names)) != len(names):
         raise LogError(f"{path}, line {blank + 1}: two columns share a name: {', '.join(names)}")
@@ -158,6 +165,7 @@ def read_csv(path: Path, comment: str = "") -> Table:
     if not _SOMETHING.search(content, start, end):
         raise LogError(f"{path}: there are no rows of data")
     numbers: NDArray[np.int64] | None = None
+    commas = _decimal_commas(content[start : min(end, start + _HEAD)], delimiter)
     rows = pa.py_buffer(content).slice(start, end - start)
     if blanks or comment:  # columns may be lined up with any number of blanks
         lines = enumerate(content[start:end].split(b"\n"), begin + 1)
@@ -165,7 +173,7 @@ def read_csv(path: Path, comment: str = "") -> Table:
         rows = pa.py_buffer(b"\n".join(b" ".join(line.split()) if blanks else line for _, line in kept))
         numbers = np.array([n for n, _ in kept], dtype=np.int64)
     try:
-        data = _parsed(rows, names, delimiter)
+        data = _parsed(rows, names, delimiter, "," if commas else ".")
     except (pa.ArrowInvalid, pa.ArrowKeyError) as error:
         lines = enumerate(content.split(b"\n")[begin:], begin + 1)
         kept = [(n, line) for n, line in lines if not _marked(line, mark)]
@@ -193,7 +201,15 @@ def read_csv(path: Path, comment: str = "") -> Table:
     return Table(str(path), columns, numbers[:count])
 
 
-def _parsed(rows: Any, names: Sequence[str], delimiter: str) -> Any:
+def _decimal_commas(head: bytes, delimiter: str) -> bool:
+    """Whether the numbers of the first rows have a comma before their fraction, and none a point."""
+    if delimiter not in (";", "\t"):
+        return False
+    cells = [cell for line in head.split(b"\n")[:6] for cell in line.strip().split(delimiter.encode())]
+    return any(map(_DECIMAL_COMMA.fullmatch, cells)) and not any(map(_DECIMAL_POINT.fullmatch, cells))
+
+
+def _parsed(rows: Any, names: Sequence[str], delimiter: str, decimal: str) -> Any:
     """The columns of a buffer of rows, as a table of pyarrow.
 
     Arrow takes the type of a column from its first megabyte. Where a later cell does not fit, the column is read again
@@ -210,7 +226,10 @@ def _parsed(rows: Any, names: Sequence[str], delimiter: str) -> Any:
                 read_options=csv.ReadOptions(column_names=list(names), use_threads=False),
                 parse_options=csv.ParseOptions(delimiter=delimiter, ignore_empty_lines=False),
                 convert_options=csv.ConvertOptions(
-                    null_values=_MISSING, strings_can_be_null=True, column_types=types or None
+                    null_values=_MISSING,
+                    strings_can_be_null=True,
+                    column_types=types or None,
+                    decimal_point=decimal,
                 ),
             )
         except pa.ArrowInvalid as error:

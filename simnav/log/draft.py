@@ -28,11 +28,16 @@ _DVL = (("x", "forward"), ("y", "starboard"), ("z", "down"))
 #: Quantity -> regular expressions of the names of its columns, in order.
 _NAMES: dict[str, tuple[str, ...]] = {
     "position": (
-        r"^(gps|gnss|nav)?[_.]?lat(itude)?\b|^lat",
-        r"^(gps|gnss|nav)?[_.]?(lon|lng)",
-        r"^(height|hgt|h$|ellh)|^(alt|ele)",
+        r"^(gps|gnss|nav|location)?[_.]?lat(itude)?\b|^lat",
+        r"^(gps|gnss|nav|location)?[_.]?(lon|lng)",
+        r"^(height|hgt|h$|ellh)|^(gps|gnss|nav|location)?[_.]?(alt|ele)",
     ),
-    **{q: tuple(rf"^({label}){_AXES}{axis}(?![a-z0-9])" for axis in "xyz") for q, label in _LABEL.items()},
+    **{
+        q: tuple(
+            rf"^({label}){_AXES}{axis}(?![a-z0-9])|^(?![agwf][_.])({label})_{i}$" for i, axis in enumerate("xyz", 1)
+        )
+        for q, label in _LABEL.items()
+    },
     "heading": (r"^(true[_.]?)?(heading|hdg|yaw)\b|^(heading|yaw)_",),
     "level": (r"^roll\b|^roll_", r"^pitch\b|^pitch_"),
     "velocity": (r"^(vel(ocity)?[_.]?n(orth)?|vn)\b", r"^(vel(ocity)?[_.]?e(ast)?|ve)\b"),
@@ -155,9 +160,13 @@ def _first(names: Sequence[str], pattern: str) -> list[str]:
     """The first name that fits the first alternative that any name fits; empty for none."""
     for alternative in pattern.split("|^"):
         text = alternative if alternative.startswith("^") else f"^{alternative}"
-        found = [n for n in names if re.search(text, n.strip().lstrip("#").strip(), re.I)]
-        if found:
-            return found[:1]
+        for whole in (True, False):  # of nested names also the last part
+            shown = {n: n.strip().lstrip("#").strip() for n in names}
+            if not whole:
+                shown = {n: re.split(r"[./]", s)[-1] for n, s in shown.items()}
+            found = [n for n, s in shown.items() if re.search(text, s, re.I)]
+            if found:
+                return found[:1]
     return []
 
 
@@ -316,6 +325,8 @@ def _file(stream: Stream, key: str, topic: str | None) -> list[str]:
         lines.append(f"options = {{ topic = {json.dumps(topic)} }}")
     for name, value in stream.keys.items():
         lines.append(f"{name} = {json.dumps(list(value) if isinstance(value, tuple) else value)}")
+        if name == "time_unit" and value != "iso":
+            lines[-1] += "   # check"
     if stream.form == "csv" and len(stream.time) > 1 and (np.diff(stream.time) == 0.0).any():
         lines.append('same_time = "spread"             # check: some rows have the same time')
     return lines

@@ -286,7 +286,8 @@ def _time_unit(table: Table, name: str, values: Array) -> str:
     size = float(np.nanmedian(np.abs(values)))
     inertial = sum(bool(_INERTIAL.match(n)) for n in table.names) >= 3
     spacing = float(np.nanmedian(np.abs(np.diff(values)))) if len(values) > 1 else 0.0
-    if inertial and size < _LARGE[-1][0] and spacing >= 1.0:  # no IMU has samples as rare as that
+    since_1970 = 1e9 < size < 1e10 and spacing < 10.0
+    if inertial and size < _LARGE[-1][0] and spacing >= 1.0 and not since_1970:  # hardly an IMU has samples so rare
         return "ms" if spacing < 1e3 else "us" if spacing < 1e6 else "ns"
     return next((unit for least, unit in _LARGE if size > least), "s")
 

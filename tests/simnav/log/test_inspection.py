@@ -72,6 +72,8 @@ def test_the_format_of_a_file_is_found(tmp_path, form):
         ("#timestamp [ns],lat,lon\n1,1,2\n2,1,2\n", {"time": "#timestamp [ns]", "time_unit": "ns"}),
         ("x,utc\n1,2024-05-01T10:00:00Z\n2,2024-05-01T10:00:01Z\n", {"time": "utc", "time_unit": "iso"}),
         ("1714557600000,5\n1714557600100,6\n", {"time": "1", "time_unit": "ms"}),
+        ("time,gx,gy,gz\n0,0,0,0\n20,0,0,0\n40,0,0,0\n", {"time": "time", "time_unit": "ms"}),
+        ("time,gx,gy,gz\n1714557600,0,0,0\n1714557601,0,0,0\n", {"time": "time", "time_unit": "s"}),
     ],
 )
 def test_the_times_of_a_table_are_found(tmp_path, text, keys):
