@@ -19,8 +19,8 @@ __all__ = ["Guess", "draft", "guesses"]
 
 _AXES = r"(?:_|\.|\[|\s|-)?"
 _LABEL = {
-    "angular_rate": r"gyr?o?|g|w|ang(ular)?[_.]?(vel(ocity)?|rate)|omega|imu[_.]g",
-    "specific_force": r"acc?(el)?(eration)?|a|f|linear[_.]acc(eleration)?|imu[_.]a",
+    "angular_rate": r"gyr?o?|g|w|ang(ular)?[_.]?(vel(ocity)?|rate)|omega|imu[_.]g|w_rs_s",
+    "specific_force": r"acc?(el)?(eration)?|a|f|linear[_.]acc(eleration)?|imu[_.]a|a_rs_s",
 }
 #: Names of files and topics that say what their columns x, y, z are.
 _OWN_NAME = {"angular_rate": r"gyr", "specific_force": r"acc(?!urac)"}
@@ -55,6 +55,8 @@ _INSTRUMENTS = {
 }
 #: Sentences that say nothing of the vessel's own motion, though their columns have such names.
 _NOT = {"depth": ("DPT", "DBT", "PSIMSSB"), "speed": ("RMC", "VTG", "GGA")}
+#: A solution of Applanix has such columns, but no measurements of these.
+_NOT_OF_SBET = ("angular_rate", "specific_force", "dvl", "speed")
 _EVERY = 10
 #: From this share of repeated values on they are left out.
 _MANY = 0.3
@@ -62,6 +64,7 @@ _MANY = 0.3
 _SPELT = {
     "dps": "deg_s", "deg/s": "deg_s", "deg/sec": "deg_s", "degs": "deg_s", "\N{DEGREE SIGN}/s": "deg_s",
     "rad/s": "rad_s", "rad/sec": "rad_s", "rads": "rad_s", "rps": "rad_s",
+    "rad s^-1": "rad_s", "m s^-2": "m_s2", "m s^-1": "m_s",
     "m/s2": "m_s2", "m/s^2": "m_s2", "m/s/s": "m_s2", "m/s\N{SUPERSCRIPT TWO}": "m_s2", "mps2": "m_s2", "ms2": "m_s2",
     "m/s": "m_s", "mps": "m_s", "km/h": "km_h", "kmh": "km_h", "kt": "kn", "kts": "kn", "knots": "kn",
     "degrees": "deg", "\N{DEGREE SIGN}": "deg", "e7": "1e-7 deg", "dege7": "1e-7 deg",
@@ -105,7 +108,7 @@ def guesses(stream: Stream) -> Iterator[Guess]:
     """What the columns of a stream probably are; everything is to be checked by its user."""
     names = [n for n in stream.table.names if stream.table.columns[n].dtype != object]
     for quantity, patterns in _NAMES.items():
-        if stream.sentence in _NOT.get(quantity, ()):
+        if stream.sentence in _NOT.get(quantity, ()) or (stream.form == "sbet" and quantity in _NOT_OF_SBET):
             continue
         found = []
         for pattern in patterns:
@@ -152,7 +155,7 @@ def _named(name: str, what: str) -> str | None:
     if match is None:
         return None
     text = next(g for g in match.groups() if g is not None).strip()
-    unit = _SPELT.get(text.lower(), text)
+    unit = _SPELT.get(text.lower(), "" if " " in text else text)
     return unit if dimension(unit) == what else None
 
 
@@ -294,12 +297,14 @@ _Keys = dict[tuple[Path, str | None], tuple[Stream, str]]
 
 
 def _place(guess: Guess) -> tuple[Path, str | None]:
+    if guess.stream.form in ("mat", "hdf5"):
+        return guess.stream.path, str(guess.stream.keys["time"])
     own = guess.quantity in _LABEL and guess.stream.form in ("mcap", "rosbag")
     return guess.stream.path, guess.stream.sentence if own else None
 
 
 def _file_keys(used: Sequence[Guess]) -> _Keys:
-    """A name for each file, or topic of an IMU."""
+    """A name for each file, topic of an IMU, and time of arrays."""
     keys: _Keys = {}
     taken: set[str] = set()
     for guess in used:
@@ -321,7 +326,7 @@ def _file(stream: Stream, key: str, topic: str | None) -> list[str]:
     lines = [f"[log.files.{key}]", f"path = {json.dumps(stream.path.name)}"]
     if stream.form != "csv":
         lines.append(f'format = "{stream.form}"')
-    if topic is not None:
+    if topic is not None and stream.sentence is not None:
         lines.append(f"options = {{ topic = {json.dumps(topic)} }}")
     for name, value in stream.keys.items():
         lines.append(f"{name} = {json.dumps(list(value) if isinstance(value, tuple) else value)}")

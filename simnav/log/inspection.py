@@ -23,6 +23,7 @@ from simnav.log.formats.ubx import read_ubx
 from simnav.log.nmea import read_nmea
 from simnav.log.reader import READERS
 from simnav.log.table import LogError, LogWarning, Table, utc_seconds
+from simnav.log.units import factor
 from simnav.types import Array
 
 __all__ = ["Stream", "inspect_log", "streams_of", "track_of"]
@@ -38,13 +39,15 @@ _DATE = re.compile(r"^\s*(date|day|%?\s*ymd)\b", re.I)
 #: Times of this size are in this unit.
 _LARGE = ((1e17, "ns"), (1e14, "us"), (1e11, "ms"))
 #: Columns of an IMU.
-_INERTIAL = re.compile(r"^(a|g|w|acc|gyr|gyro|accel|omega)[_ .]?[xyz]\b", re.I)
+_INERTIAL = re.compile(r"(?:^|[./])(a|g|w|acc|gyr|gyro|accel|omega)[_ .]?[xyz123](?![a-z0-9])", re.I)
 _LINES = 40
 #: What the lines of a text format look like.
 _LINES_OF = {
     "n2k": re.compile(r"\d{4}-\d\d-\d\d[T-][\d:.]+Z?,\d+,\d{5,6},\d+,\d+,\d+,[0-9a-f]{2}", re.I),
     "pd6": re.compile(r"\s*:(SA|TS|W[ISED]|B[ISED]),"),
 }
+#: Formats whose files hold arrays or columns by name, with a time or several.
+_OF_ARRAYS = ("mat", "hdf5", "parquet")
 #: Formats whose files have several tables, besides NMEA and bags.
 _OF_SENTENCES = {"n2k": read_n2k, "rinex": read_rinex, "ubx": read_ubx}
 
@@ -84,6 +87,8 @@ class Stream:
     def name(self) -> str:
         """File, and sentence or topic."""
         inside = "" if self.sentence is None else f" {self.talker or ''}{self.sentence}"
+        if self.form in _OF_ARRAYS:
+            inside = f" {self.keys['time']}"
         return f"{self.path.name}{inside}"
 
     def to_dict(self) -> dict[str, Any]:
@@ -218,11 +223,19 @@ def _streams(path: Path, form: str) -> Iterator[Stream]:
                 continue
             yield Stream(path, form, topic, None, rows.table, _known(rows.time))
         return
-    keys = _time_keys(path) if form == "csv" else _array_keys(path, form)
     reader = READERS.get(form)
     assert reader is not None
-    rows = reader.read(path, FileSpec(path=path.name, format=form, **keys))
-    yield Stream(path, form, None, None, rows.table, _known(rows.time), keys)
+    if form not in _OF_ARRAYS:
+        keys = _time_keys(path) if form == "csv" else {}
+        rows = reader.read(path, FileSpec(path=path.name, format=form, **keys))
+        yield Stream(path, form, None, None, rows.table, _known(rows.time), keys)
+        return
+    for name in _array_times(path, form):
+        rows = reader.read(path, FileSpec(path=path.name, format=form, time=name))
+        keys = {"time": name}
+        if (unit := _time_unit(rows.table, name, rows.time)) != "s":
+            keys |= {"time_unit": unit}
+        yield Stream(path, form, None, None, _beside(rows.table, name), _known(rows.time) * factor(unit), keys)
 
 
 def track_of(stream: Stream) -> Array | None:
@@ -284,7 +297,7 @@ def _time_unit(table: Table, name: str, values: Array) -> str:
     if ending:
         return ending[1]
     size = float(np.nanmedian(np.abs(values)))
-    inertial = sum(bool(_INERTIAL.match(n)) for n in table.names) >= 3
+    inertial = sum(bool(_INERTIAL.search(n)) for n in table.names) >= 3
     spacing = float(np.nanmedian(np.abs(np.diff(values)))) if len(values) > 1 else 0.0
     since_1970 = 1e9 < size < 1e10 and spacing < 10.0
     if inertial and size < _LARGE[-1][0] and spacing >= 1.0 and not since_1970:  # hardly an IMU has samples so rare
@@ -300,10 +313,8 @@ def _ascends(table: Table, name: str) -> bool:
         return bool(np.all(np.diff(values.astype(np.float64)) > 0.0))
 
 
-def _array_keys(path: Path, form: str) -> dict[str, Any]:
-    """The array or column of the times, by its name."""
-    if form not in ("mat", "hdf5", "parquet"):
-        return {}
+def _array_times(path: Path, form: str) -> list[str]:
+    """The arrays or columns of times, by their names."""
     reader = READERS.get(form)
     assert reader is not None
     try:
@@ -312,7 +323,14 @@ def _array_keys(path: Path, form: str) -> dict[str, Any]:
         names = re.findall(r"([^\s,]+) \d+(?:x\d+)*", str(error).partition("there are:")[2])
         if not names:
             raise
-    chosen = next((n for n in names if _TIME.match(re.split(r"[./]", n)[-1])), None)
-    if chosen is None:
+    chosen = [n for n in names if _TIME.match(re.split(r"[./]", n)[-1])]
+    if not chosen:
         raise LogError(f"{path}: no name tells the times; say time = NAME in a scenario; there are: {', '.join(names)}")
-    return {"time": chosen}
+    return chosen[:1] if form == "parquet" else chosen
+
+
+def _beside(table: Table, name: str) -> Table:
+    """The columns in the structure or group of a time, where it has one and others are in it."""
+    group = re.match(r".*[./]", name)
+    inside = {} if group is None else {n: c for n, c in table.columns.items() if n.startswith(group[0])}
+    return Table(table.source, inside, table.line, table.numbered) if len(inside) > 1 else table

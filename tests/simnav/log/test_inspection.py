@@ -194,3 +194,24 @@ def test_a_draft_of_a_phone_can_be_run(tmp_path):
     assert block.imu.specific_force[:, 2] == pytest.approx(-9.81)
     assert block.imu.angular_rate[:, 2] == pytest.approx(-0.01)
     assert np.diff(block.aids["gnss"].time) == pytest.approx(10.0)
+
+
+def test_arrays_with_several_times_are_several_streams(tmp_path):
+    h5py = pytest.importorskip("h5py")
+    path = tmp_path / "a.h5"
+    with h5py.File(path, "w") as file:
+        file["imu/t"] = np.arange(2000, dtype=np.uint64) * 20_000_000  # nanoseconds
+        file["imu/gyro"], file["imu/accel"] = np.zeros((2000, 3)), np.tile([0.0, 0.0, -9.8], (2000, 1))
+        file["gps/t"], file["gps/lat"], file["gps/lon"] = (
+            np.arange(40.0),
+            54.0 + 1e-5 * np.arange(40),
+            np.full(40, 10.0),
+        )
+    streams = {s.name: s for s in streams_of(path)}
+    assert streams["a.h5 imu/t"].keys == {"time": "imu/t", "time_unit": "ns"}
+    assert set(streams["a.h5 gps/t"].table.names) == {"gps/t", "gps/lat", "gps/lon"}
+    toml = tmp_path / "a.toml"
+    toml.write_text(draft(list(streams.values()), "a"))
+    source = LogSource(load(toml), 0)
+    assert source.duration > 30.0
+    assert source.advance(source.duration).imu.specific_force[:, 2] == pytest.approx(-9.8)
