@@ -19,6 +19,7 @@ from simnav.log.files import FileSpec
 from simnav.log.kept import kept
 from simnav.log.reader import Rows, register_reader
 from simnav.log.table import LogError, LogWarning, Table, utc_seconds
+from simnav.log.text_forms import form_of_text
 from simnav.log.units import factor
 from simnav.types import Array
 
@@ -291,8 +292,11 @@ def _ragged(path: Path, lines: Iterable[tuple[int, bytes]], delimiter: str, widt
         line = raw.decode().rstrip("\r")
         count = len(line.split()) if delimiter == " " else line.count(delimiter) + 1
         if line.strip() and count != width:
-            return (
-                f"{path}, line {number}: {count} cells where the first line has {width}; lines that are no data are "
-                "left out by 'comment', the mark that they begin with"
+            form = form_of_text(path)
+            right = (
+                "lines that are no data are left out by 'comment', the mark that they begin with"
+                if form is None
+                else f"it looks like a file of format = {form!r}"
             )
+            return f"{path}, line {number}: {count} cells where the first line has {width}; {right}"
     return ""

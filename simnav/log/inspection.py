@@ -23,6 +23,7 @@ from simnav.log.formats.ubx import read_ubx
 from simnav.log.nmea import read_nmea
 from simnav.log.reader import READERS
 from simnav.log.table import LogError, LogWarning, Table, utc_seconds
+from simnav.log.text_forms import form_of_text
 from simnav.log.units import factor
 from simnav.types import Array
 
@@ -40,12 +41,6 @@ _DATE = re.compile(r"^\s*(date|day|%?\s*ymd)\b", re.I)
 _LARGE = ((1e17, "ns"), (1e14, "us"), (1e11, "ms"))
 #: Columns of an IMU.
 _INERTIAL = re.compile(r"(?:^|[./])(a|g|w|acc|gyr|gyro|accel|omega)[_ .]?[xyz123](?![a-z0-9])", re.I)
-_LINES = 40
-#: What the lines of a text format look like.
-_LINES_OF = {
-    "n2k": re.compile(r"\d{4}-\d\d-\d\d[T-][\d:.]+Z?,\d+,\d{5,6},\d+,\d+,\d+,[0-9a-f]{2}", re.I),
-    "pd6": re.compile(r"\s*:(SA|TS|W[ISED]|B[ISED]),"),
-}
 #: Formats whose files hold arrays or columns by name, with a time or several.
 _OF_ARRAYS = ("mat", "hdf5", "parquet")
 #: Formats whose files have several tables, besides NMEA and bags.
@@ -184,17 +179,9 @@ def _format(path: Path) -> str:
             if b"\xb5\x62\x01" in stream.read(1 << 16):  # a message of UBX after sentences of NMEA
                 return "ubx"
         raise LogError(f"{path}: it is {found[0]}; say its format in a scenario: {', '.join(sorted(READERS.items()))}")
-    with open(path, encoding="latin-1") as text:
-        head = [line for _, line in zip(range(_LINES), text, strict=False)]
-    if sum(bool(re.search(r"[$!][A-Z]{4,6},", line)) for line in head) > 0.3 * len(head):
-        return "nmea"
-    if any(re.match(r"%\s+(GPST|UTC|JST)\s", line) for line in head):
-        return "rtklib"
-    if head and head[0][60:].startswith("RINEX VERSION / TYPE") and head[0][20:21] == "O":
-        return "rinex"
-    for form, pattern in _LINES_OF.items():
-        if sum(bool(pattern.match(line)) for line in head) > 0.3 * len(head):
-            return form
+    by_content = form_of_text(path)
+    if by_content is not None:
+        return by_content
     return by_ending if by_ending in ("tum", "rtklib", "nmea") else "csv"
 
 

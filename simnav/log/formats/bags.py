@@ -101,7 +101,9 @@ def topics_of(path: Path, form: str) -> list[str]:
         with AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader:
             return sorted({c.topic for c in reader.connections})
     except ImportError as error:
-        raise LogError(f"{path}: needs the library {error.name}: pip install 'simnav[logs]'") from None
+        raise LogError(
+            f"{path}: needs the library {(error.name or '').partition('.')[0]}: pip install 'simnav[logs]'"
+        ) from None
     except LogError:
         raise
     except Exception as error:

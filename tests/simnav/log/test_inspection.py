@@ -7,6 +7,7 @@ import pytest
 
 from simnav.log import LogError, LogSource
 from simnav.log.check import check_log, described
+from simnav.log.delimited import read_csv
 from simnav.log.draft import draft, guesses
 from simnav.log.inspection import inspect_log, streams_of
 from simnav.scenario import load
@@ -60,6 +61,9 @@ def test_the_format_of_a_file_is_found(tmp_path, form):
     tables = {"euroc": "csv", "kf_gins": "csv"}  # a table of numbers says no more of itself
     assert {s.form for s in found} == {tables.get(form, form)}
     assert all(np.all(np.diff(s.time) >= 0.0) for s in found)
+    if form in ("nmea", "rtklib", "pd6", "n2k", "rinex"):
+        with pytest.raises(LogError, match=f"it looks like a file of format = '{form}'"):
+            read_csv(path)
     if form == "rtklib":
         assert any(g.quantity == "position" and g.units[0] == "deg" for s in found for g in guesses(s))
 
