@@ -57,6 +57,8 @@ _INSTRUMENTS = {
 _NOT = {"depth": ("DPT", "DBT", "PSIMSSB"), "speed": ("RMC", "VTG", "GGA")}
 #: A solution of Applanix has such columns, but no measurements of these.
 _NOT_OF_SBET = ("angular_rate", "specific_force", "dvl", "speed")
+#: Sentences of compasses; the true heading goes first.
+_COMPASSES = {"HDT": 2, "THS": 2, "HDG": 1, "HDM": 1}
 _EVERY = 10
 #: From this share of repeated values on they are left out.
 _MANY = 0.3
@@ -220,8 +222,8 @@ def draft(streams: Sequence[Stream], name: str = "my-log", file: str | None = No
     """
     found = [g for s in streams for g in guesses(s)]
     best: dict[str, Guess] = {}
-    for guess in found:  # of several the longest
-        if guess.quantity not in best or len(guess.stream.time) > len(best[guess.quantity].stream.time):
+    for guess in found:
+        if guess.quantity not in best or _worth(guess) > _worth(best[guess.quantity]):
             best[guess.quantity] = guess
     position = best.get("position")
     if position is None:
@@ -357,6 +359,15 @@ def _channel(table: str, guess: Guess, keys: _Keys) -> list[str]:
     if set(guess.units) != {"1"}:
         lines.append(f"units = {json.dumps(list(guess.units))}   # check")
     return lines
+
+
+def _worth(guess: Guess) -> tuple[int, int]:
+    """Of several streams a position with height and the sentence of a compass go first, then the longest."""
+    if guess.quantity == "position":
+        return int(guess.columns[2] != "=0"), len(guess.stream.time)
+    if guess.quantity == "heading":
+        return _COMPASSES.get(guess.stream.sentence or "", 0), len(guess.stream.time)
+    return 0, len(guess.stream.time)
 
 
 def _repeated(guess: Guess) -> float:

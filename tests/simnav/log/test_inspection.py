@@ -37,11 +37,12 @@ def test_a_draft_of_sentences_can_be_run(tmp_path):
     lines = []
     for k in range(40):
         stamp = f"2024-05-01T10:00:{k:02d}.000Z"
-        lines += [f"{stamp} $GPGGA,1000{k:02d}.00,54{27.0 + 0.004 * k:07.4f},N,01015.0000,E,1,09,0.9,3.0,M,44.0,M,,",
+        lines += [f"{stamp} $GPGLL,5427.0000,N,01015.0000,E,1000{k:02d}.00,A", f"{stamp} $PRDID,1.0,2.0,9.0",
+                  f"{stamp} $GPGGA,1000{k:02d}.00,54{27.0 + 0.004 * k:07.4f},N,01015.0000,E,1,09,0.9,3.0,M,44.0,M,,",
                   f"{stamp} $HEHDT,0.5,T", f"{stamp} $IIVHW,,T,,M,14.0,N,,K", f"{stamp} $SDDPT,20.5,1.2"]  # fmt: skip
     (tmp_path / "ship.log").write_text("\n".join(lines) + "\n")
     streams, failed = inspect_log([tmp_path / "ship.log"])
-    assert {s.sentence for s in streams} == {"GGA", "HDT", "VHW", "DPT"}
+    assert {s.sentence for s in streams} == {"GLL", "PRDID", "GGA", "HDT", "VHW", "DPT"}
     assert not failed
     path = tmp_path / "ship.toml"
     path.write_text(draft(streams, "ship"))
@@ -49,6 +50,9 @@ def test_a_draft_of_sentences_can_be_run(tmp_path):
     assert set(source.instruments) == {"gnss", "gyrocompass", "speed_log"}  # the depth of the water is not the vessel's
     speed = source.advance(source.duration).aids["speed_log"].value
     assert speed == pytest.approx(14.0 * 1852.0 / 3600.0)
+    assert source.initial_truth.position[0, 2] == pytest.approx(47.0)  # GGA has a height, GLL none
+    text = path.read_text()
+    assert 'sentence = "HDT"' in text
 
 
 @pytest.mark.parametrize("form", CASES)
