@@ -98,8 +98,8 @@ def readme(recording: Recording, ending: str = "csv") -> str:
     ]
     if recording.data.imu is not None:
         lines.append(
-            f"| `imu.{ending}` | {len(recording.data.imu)} | mean angular rate and specific force over the interval that "
-            "ends at the time; axes forward, starboard, down |"
+            f"| `imu.{ending}` | {len(recording.data.imu)} | mean angular rate and specific force over the interval "
+            "that ends at the time; axes forward, starboard, down |"
         )
     for name, s in recording.data.aids.items():
         kind = KINDS[s.kind]
