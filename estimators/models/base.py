@@ -168,6 +168,21 @@ class ErrorModel(ABC):
         linearised = self.measure(measurement)
         return None if linearised is None else linearised.noise
 
+    def nominal_noises(self, measurements: Sequence[Measurement]) -> Array | None:
+        """`nominal_noise` of k readings of one time of the channels of one instrument, by one call.
+
+        Parameters
+        ----------
+        measurements : sequence of Measurement
+            Readings of channels of one instrument (`many`).
+
+        Returns
+        -------
+        (k, m, m) array or None
+            The noises. None where each reading has to be asked for by itself.
+        """
+        return None
+
     @abstractmethod
     def correct(self, dx: Array) -> None:
         """Add a correction to the state."""
@@ -217,6 +232,28 @@ class ErrorModel(ABC):
         (float, float) or None
             Normalised innovation squared (-1 if nothing was changed), and the norm of the innovation. None if the
             model has no faster implementation than `innovate` and `absorb`.
+        """
+        return None
+
+    def assimilate_step(
+        self, measurements: Sequence[Measurement], until: float, covariance: Array, correction: Array
+    ) -> list[list[float]] | None:
+        """Use the measurements of a step with their nominal noise, each at its time, and propagate to the step's end.
+
+        Parameters
+        ----------
+        measurements : sequence of Measurement
+            In order of their times; one that is later than ``until`` is used then.
+        until : float
+            End of the step [s].
+        covariance, correction
+            As of `assimilate`; the correction is that by the last measurement.
+
+        Returns
+        -------
+        list of [float, float], or None
+            For each measurement, what `assimilate` returns. None if the model has no faster implementation than
+            `propagate` and `assimilate`.
         """
         return None
 

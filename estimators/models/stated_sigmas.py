@@ -49,6 +49,9 @@ class _Stated(ErrorModel):
             return super().nominal_noise(measurement)
         return ErrorModel.nominal_noise(self, measurement)
 
+    def nominal_noises(self, measurements: Sequence[Measurement]) -> Array | None:
+        return None if any(map(self._states, measurements)) else super().nominal_noises(measurements)
+
     def innovate(self, measurement: Measurement, covariance: Array) -> Observation | None:
         if not self._states(measurement):
             return super().innovate(measurement, covariance)
@@ -56,6 +59,13 @@ class _Stated(ErrorModel):
 
     def assimilate(self, measurement: Measurement, covariance: Array, correction: Array) -> tuple[float, float] | None:
         return None if self._states(measurement) else super().assimilate(measurement, covariance, correction)
+
+    def assimilate_step(
+        self, measurements: Sequence[Measurement], until: float, covariance: Array, correction: Array
+    ) -> list[list[float]] | None:
+        if any(map(self._states, measurements)):
+            return None
+        return super().assimilate_step(measurements, until, covariance, correction)
 
     def assimilate_together(
         self, measurements: Sequence[Measurement], covariance: Array, correction: Array
