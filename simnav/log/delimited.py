@@ -273,8 +273,12 @@ def _marked(line: bytes, mark: bytes) -> bool:
 
 
 def _utf8(path: Path) -> bytes:
-    """The content of a text file in UTF-8, which may have been in UTF-16 or in Latin-1."""
-    content = path.read_bytes()
+    """The content of a text file in UTF-8, which may have been in UTF-16 or in Latin-1; lines end in a line feed."""
+    content = _decoded(path.read_bytes())
+    return content if b"\n" in content else content.replace(b"\r", b"\n")  # the ends of lines of old systems
+
+
+def _decoded(content: bytes) -> bytes:
     if content.isascii():
         return content
     if content.startswith((b"\xff\xfe", b"\xfe\xff")):

@@ -265,12 +265,22 @@ def _time_keys(path: Path) -> dict[str, Any]:
         try:
             utc_seconds(first)
         except ValueError:
+            if _is_number(first):
+                table.column(named)  # raises: it names the cell that is no number
             second = names[names.index(named) + 1] if names.index(named) + 1 < len(names) else None
             if second is None or not re.match(r"\d{4}[-/]", first):
                 raise LogError(f"{path}: no column holds the times; there are: {', '.join(names)}") from None
             return keys | {"time": (named, second)}
         return keys | {"time": named, "time_unit": "iso"}
     return keys | {"time": named, "time_unit": _time_unit(table, named, np.asarray(values, dtype=np.float64))}
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
 
 
 def _header_in_comment(path: Path) -> bool:

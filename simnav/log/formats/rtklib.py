@@ -22,6 +22,8 @@ from simnav.log.reader import Rows, register_reader
 from simnav.log.table import LogError, LogWarning, Table
 
 _NAMES = {"latitude(deg)": "latitude", "longitude(deg)": "longitude", "height(m)": "height"}
+#: The mark of UTF-8 at the beginning of a file, read as Latin-1.
+_MARK = b"\xef\xbb\xbf".decode("latin-1")
 _RATHER = ("latitude", "longitude", "height", "Q", "ns", "sdn", "sde", "sdu", "sdne", "sdeu", "sdun", "age", "ratio")
 
 
@@ -35,6 +37,7 @@ def read(path: Path, file: FileSpec, sentence: str | None, talker: str | None) -
     lines: list[int] = []
     with open(path, encoding="latin-1") as text:
         for number, line in enumerate(text, 1):
+            line = line.removeprefix(_MARK) if number == 1 else line
             if line.startswith("%"):
                 found = re.search(r"^%\s+(GPST|UTC|JST)\s+(.*)$", line.rstrip())
                 if found:

@@ -93,10 +93,12 @@ def test_the_times_of_a_table_are_found(tmp_path, text, keys):
 def test_what_cannot_be_read_is_said(tmp_path):
     (tmp_path / "a.bin").write_bytes(bytes(range(256)) * 8)
     (tmp_path / "b.csv").write_text("t,x\n1,2\n3\n5,6\n")
+    (tmp_path / "c.csv").write_text("time,x\n1,2\n3..,4\n5,6\n")
     streams, failed = inspect_log([tmp_path])
     assert not streams
     assert "it is a binary file; say its format" in failed[0]
     assert "b.csv, line 3: 1 cells where the first line has 2" in failed[1]
+    assert "c.csv, line 3, column 'time': '3..' is not a number" in failed[2]
     with pytest.raises(LogError, match="there is no such file or folder"):
         inspect_log([tmp_path / "no"])
     assert draft([], "x").startswith("# No columns with latitude")

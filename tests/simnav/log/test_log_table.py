@@ -160,3 +160,9 @@ def test_commas_and_points_are_no_decimal_commas(tmp_path):
     assert found.column("t")[1].tolist() == [0.5, 0.75]
     with pytest.raises(LogError, match="line 2, column 'x': '1,25' is not a number"):
         found.column("x")
+
+
+def test_lines_that_end_in_a_carriage_return(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_bytes(b"t,x\r0.5,1\r0.75,2\r")
+    assert read_csv(path).column("x")[1].tolist() == [1.0, 2.0]
