@@ -123,8 +123,10 @@ class ManyReadings:
         blocks = {name: np.broadcast_to(zero, (n, zero.shape[1])) for name, zero in self._zeros.items()}
         for name, at in self._at:
             blocks[name] = own[:, at]
-        at_rows = [column.take(row, axis=0) for column in (position, velocity, dcm, turning)]
-        points = NavigationPoints(time, *at_rows, blocks, channel, side)
+        points = NavigationPoints(
+            time, position.take(row, axis=0), velocity.take(row, axis=0), dcm.take(row, axis=0),
+            turning.take(row, axis=0), blocks, channel, side,
+        )  # fmt: skip
         reading, given = self._observations(points, self._sheet)
         jacobian = np.empty((n, value.shape[1], offset + own.shape[1])) if out is None else out
         jacobian[...] = 0.0
@@ -179,7 +181,7 @@ class ManyReadings:
         if function is None:
             return np.broadcast_to(self._sheet.sigma**2, shape)
         sigma = np.asarray(function(side, self._sheet), dtype=np.float64)
-        if sigma.shape != shape or not (np.isfinite(sigma).all() and np.all(sigma >= 0.0)):
+        if sigma.shape != shape or not (isfinite(sigma.sum()) and sigma.min() >= 0.0):
             raise ValueError(
                 f"reading_sigma of kind {self._sheet.kind!r}, for the instrument {self._sheet.name!r}, should return "
                 f"an array of shape {shape} for so many readings, finite and not negative, not {sigma.tolist()!r:.200}"
