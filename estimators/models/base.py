@@ -235,6 +235,28 @@ class ErrorModel(ABC):
         """
         return None
 
+    def assimilate_step(
+        self, measurements: Sequence[Measurement], until: float, covariance: Array, correction: Array
+    ) -> list[list[float]] | None:
+        """Use the measurements of a step with their nominal noise, each at its time, and propagate to the step's end.
+
+        Parameters
+        ----------
+        measurements : sequence of Measurement
+            In order of their times; one that is later than ``until`` is used then.
+        until : float
+            End of the step [s].
+        covariance, correction
+            As of `assimilate`; the correction is that by the last measurement.
+
+        Returns
+        -------
+        list of [float, float], or None
+            For each measurement, what `assimilate` returns. None if the model has no faster implementation than
+            `propagate` and `assimilate`.
+        """
+        return None
+
     def assimilate_together(
         self, measurements: Sequence[Measurement], covariance: Array, correction: Array
     ) -> tuple[Array, Array] | None:

@@ -27,7 +27,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from simnav.compiled import kernel
+from simnav.compiled import kernel, ready
 from simnav.estimator.needs import Needs
 from simnav.estimators.algebra.whitening import whitening
 from simnav.types import (
@@ -258,7 +258,7 @@ class Chain(ABC):
 
     def set_prior(self, covariance: Array, shift: Array) -> None:
         """Set the prior of the first node: its covariance, and its mean minus the node."""
-        self.prior, self.prior_shift = covariance.copy(), shift.copy()
+        self.prior, self.prior_shift = ready(covariance.copy()), ready(shift.copy())
         self.prior_whitener = np.empty_like(self.prior)
         whitening(self.prior, self.prior_whitener)
 
@@ -302,7 +302,7 @@ class Chain(ABC):
         """Make the front a node, with the motion since the newest one as its factor."""
         motions = self.motions
         motions.append(begin_shift=0.0, end_shift=0.0, time=self.front.time, weight=1.0)
-        _begin_motion(
+        _begin_motion.unchecked(
             self._transition, self._noise, motions.newest("transition"), motions.newest("jacobian"),
             motions.newest("noise"), motions.newest("whitener"),
         )  # fmt: skip
@@ -381,7 +381,7 @@ class Chain(ABC):
 
     def detach(self, count: int) -> None:
         """Remove the newest aiding factors."""
-        self.aids.pop(count)
+        self.aids.drop_newest(count)
 
     def drop(self, count: int) -> None:
         """Remove the oldest nodes and their factors from the window."""
@@ -434,10 +434,10 @@ class Chain(ABC):
         self.move_folds(int(folds["node"].searchsorted(aids["node"][first])))
         row = np.where(at_node, -1, aids["fold"] - self.fold_base)
         self.observe(first, row, folds, "now_", jacobian)
-        add_motion_noise(
+        add_motion_noise.unchecked(
             first, row, aids["components"], jacobian, folds["noise"], aids["noise"], aids["whitener"], aids["bare"]
         )
-        through_motion(first, row, min(self.coupled, self.size), folds["jacobian"], jacobian)
+        through_motion.unchecked(first, row, min(self.coupled, self.size), folds["jacobian"], jacobian)
 
     @abstractmethod
     def observe(self, first: int, row: NDArray[np.int64], states: Columns, prefix: str, jacobian: Array) -> None:

@@ -9,8 +9,10 @@ import numpy as np
 __all__ = ["Columns"]
 
 
-class Columns:
+class Columns(dict[str, Any]):
     """Named columns of equal length; rows are appended at the end and dropped at the front.
+
+    An item is a view of a column, (rows, ...). Views are kept until the number of rows changes.
 
     Parameters
     ----------
@@ -30,7 +32,6 @@ class Columns:
     def __init__(self, **columns: Any):
         self._capacity = 64
         self._columns: dict[str, Any] = {}
-        self._views: dict[str, Any] = {}
         self._first = self._last = 0
         self.add(**columns)
 
@@ -43,12 +44,12 @@ class Columns:
     def __len__(self) -> int:
         return self._last - self._first
 
-    def __getitem__(self, name: str) -> Any:
-        """A view of a column, (rows, ...)."""
-        view = self._views.get(name)
-        if view is None:
-            view = self._views[name] = self._columns[name][self._first : self._last]
+    def __missing__(self, name: str) -> Any:
+        view = self[name] = self._columns[name][self._first : self._last]
         return view
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _restored, (vars(self),)  # copies have views of their own
 
     def newest(self, name: str) -> Any:
         """A view of the last row's entry in a column."""
@@ -61,7 +62,7 @@ class Columns:
         for name, value in values.items():
             self._columns[name][self._last] = value
         self._last += 1
-        self._views.clear()
+        self.clear()
 
     def append_rows(self, count: int, **values: Any) -> None:
         """Add rows with given entries, or one entry for all; what is not given keeps any value."""
@@ -70,17 +71,17 @@ class Columns:
         for name, value in values.items():
             self._columns[name][self._last : self._last + count] = value
         self._last += count
-        self._views.clear()
+        self.clear()
 
     def drop(self, count: int) -> None:
         """Take ``count`` rows off the front."""
         self._first += count
-        self._views.clear()
+        self.clear()
 
-    def pop(self, count: int) -> None:
+    def drop_newest(self, count: int) -> None:
         """Take ``count`` rows off the end."""
         self._last -= count
-        self._views.clear()
+        self.clear()
 
     def _make_room(self, count: int = 1) -> None:
         """Move the rows to the front; more space where they fill more than half of it, or more rows do not fit."""
@@ -95,3 +96,9 @@ class Columns:
             else:
                 column[:rows] = column[self._first : self._last].copy()
         self._capacity, self._first, self._last = grown, 0, rows
+
+
+def _restored(state: dict[str, Any]) -> Columns:
+    columns = Columns()
+    vars(columns).update(state)
+    return columns

@@ -39,7 +39,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from simnav.compiled import kernel
+from simnav.compiled import kernel, ready
 from simnav.estimator import UnsuitableScenario
 from simnav.estimator.needs import AID, IMU, Needs
 from simnav.estimators.algebra.joseph import joseph_sequence
@@ -61,6 +61,7 @@ from .base import ErrorModel, Linearised, Observation
 from .declared_errors import CURRENT, bias_of, bias_of_triad
 from .delayed import is_delayed
 from .equations import EQUATIONS, equation_of
+from .inertial_step import AidTable, Packet, filter_inertial
 from .inertial_update import absorb_inertial, assimilate_inertial, innovate_inertial
 from .levered import is_own, with_lever_arms
 from .many_readings import of_instruments
@@ -87,7 +88,6 @@ __all__ = ["InertialModel", "roll_pitch_yaw"]
 _NAV, _MOTION = 15, 9
 _NO_TIMES, _NO_VECTORS = np.empty(0), np.empty((0, 3))
 _GRAVITY = 9.81
-_FLOAT = np.dtype(np.float64)
 
 
 @kernel("void(f8[:, ::1], f8[::1], f8, f8[:, ::1])")
@@ -202,6 +202,7 @@ class InertialModel(ErrorModel):
         self._bind()
         self.transition, self.process_noise = np.empty((_NAV, _NAV)), np.empty((_NAV, _NAV))
         self.load(None)
+        self._packet: Packet | None = None
         self.blocks = StateBlocks(_MOTION)
         self._imu(imu)
         self._aids()
@@ -312,20 +313,28 @@ class InertialModel(ErrorModel):
         """
         if self._fused != set(self.noise) or not self.noise.keys() <= set(names):
             return None
-        codes, arms = np.zeros((len(names), 4), np.int64), np.zeros((len(names), 3))
-        noises, limits = np.zeros((len(names), 9)), np.zeros((len(names), 3))
+        codes, arms, noises = self._table(names)
+        limits = np.zeros((len(names), 3))
         for i, name in enumerate(names):
             if name in self.noise:
-                code, arms[i], bias_at, scale_at = self.aid_parameters[name]
-                d = len(self.noise[name])
-                codes[i], noises[i, : d * d] = (code, d, bias_at, scale_at), self.noise[name].ravel()
-                limits[i, :d] = KINDS[self.instruments[name].kind].limits
+                limits[i, : len(self.noise[name])] = KINDS[self.instruments[name].kind].limits
         return {
             "position": self.position, "velocity": self.velocity, "dcm": self.dcm, "memory": self._memory,
             "bias": self.bias, "turn": self._turn, "clock": self._clock, "sensors": self._noise,
             "calibration": self.calibration, "decay": self._decay, "density": self._density,
             "codes": codes, "arms": arms, "noises": noises, "limits": limits,
         }  # fmt: skip
+
+    def _table(self, names: Sequence[str]) -> AidTable:
+        """The instruments in the order of their names; zeros for one that is not observed."""
+        codes, arms = np.zeros((len(names), 4), np.int64), np.zeros((len(names), 3))
+        noises = np.zeros((len(names), 9))
+        for i, name in enumerate(names):
+            if name in self.noise:
+                code, arms[i], bias_at, scale_at = self.aid_parameters[name]
+                d = len(self.noise[name])
+                codes[i], noises[i, : d * d] = (code, d, bias_at, scale_at), self.noise[name].ravel()
+        return codes, arms, noises
 
     def load(self, imu: ImuSamples | None) -> None:
         """Take the IMU samples of the step that follows."""
@@ -334,10 +343,7 @@ class InertialModel(ErrorModel):
         if imu is None or len(imu) == 0:
             self._samples = (_NO_TIMES, _NO_TIMES, _NO_VECTORS, _NO_VECTORS)
         else:
-            self._samples = (imu.time, imu.interval, imu.angular_rate, imu.specific_force)
-            if not all(a.dtype is _FLOAT and a.flags.carray for a in self._samples):
-                time, interval, rate, force = (np.array(a, dtype=np.float64) for a in self._samples)
-                self._samples = (time, interval, rate, force)
+            self._samples = ready(imu.time), ready(imu.interval), ready(imu.angular_rate), ready(imu.specific_force)
 
     def propagate(self, covariance: Array, until: float) -> None:
         """Advance the state and its covariance through the samples loaded."""
@@ -467,6 +473,24 @@ class InertialModel(ErrorModel):
         )  # fmt: skip
         return nis, size
 
+    def assimilate_step(
+        self, measurements: Sequence[Measurement], until: float, covariance: Array, correction: Array
+    ) -> list[list[float]] | None:
+        """As `ErrorModel.assimilate_step`, in one kernel, if no instrument has an equation or a clock of its own."""
+        if self._packet is None:
+            if self._fused != set(self.noise) or self.blocks.clocks:
+                return None
+            self._packet = Packet(list(self.noise), self._table(list(self.noise)))
+        measured = self._packet.fill(measurements)
+        self._first = filter_inertial.unchecked(
+            (self.position, self.velocity, self.dcm, self._memory, self.bias, self._turn, self._clock), self._samples,
+            self._first, until, self._noise, (self.transition, self.process_noise, covariance),
+            (self.calibration, self._decay, self._density, correction), self._packet.aids, measured,
+        )  # fmt: skip
+        self.time = float(self._clock[0])
+        used: list[list[float]] = measured[3][: len(measurements)].tolist()
+        return used
+
     def assimilate_together(
         self, measurements: Sequence[Measurement], covariance: Array, correction: Array
     ) -> tuple[Array, Array] | None:
@@ -502,5 +526,5 @@ class InertialModel(ErrorModel):
 
 def roll_pitch_yaw(dcm: Array) -> Array:
     """(3,) array: `simnav.geometry.rotation.rpy_from_dcm` of one matrix, without the overhead of stacks."""
-    c20, c21, c22 = float(dcm[2, 0]), float(dcm[2, 1]), float(dcm[2, 2])
-    return np.array([atan2(c21, c22), atan2(-c20, hypot(c21, c22)), atan2(float(dcm[1, 0]), float(dcm[0, 0]))])
+    (c00, _, _), (c10, _, _), (c20, c21, c22) = dcm.tolist()
+    return np.array([atan2(c21, c22), atan2(-c20, hypot(c21, c22)), atan2(c10, c00)])

@@ -60,6 +60,13 @@ class _Stated(ErrorModel):
     def assimilate(self, measurement: Measurement, covariance: Array, correction: Array) -> tuple[float, float] | None:
         return None if self._states(measurement) else super().assimilate(measurement, covariance, correction)
 
+    def assimilate_step(
+        self, measurements: Sequence[Measurement], until: float, covariance: Array, correction: Array
+    ) -> list[list[float]] | None:
+        if any(map(self._states, measurements)):
+            return None
+        return super().assimilate_step(measurements, until, covariance, correction)
+
     def assimilate_together(
         self, measurements: Sequence[Measurement], covariance: Array, correction: Array
     ) -> tuple[Array, Array] | None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from itertools import pairwise
+from operator import attrgetter
 
 from simnav.estimators.models.channels import reading_of
 from simnav.types import KINDS, Instruments, Measurement, Measurements
@@ -12,6 +12,7 @@ __all__ = ["LATE", "Admission", "together"]
 
 #: A measurement that is older than the state by at most this counts as simultaneous [s].
 LATE = 1e-4
+_time = attrgetter("time")
 
 
 class Admission:
@@ -34,17 +35,14 @@ class Admission:
 
     def __init__(self, instruments: Instruments, observed: Iterable[str]):
         self._used = dict.fromkeys(observed, float("-inf"))
-        self._kinds = {name: KINDS[instruments[name].kind] for name in self._used}
+        self._plausible = {name: KINDS[instruments[name].kind].plausible for name in self._used}
         self.skipped = 0
 
     def admit(self, measurements: Measurements, since: float) -> list[Measurement]:
         """The measurements of a step to be used by a state of time ``since`` [s], in order of their times."""
-        aids = measurements.aids
-        if any(before.time > after.time for before, after in pairwise(aids)):
-            aids = sorted(aids, key=_time)
         admitted = []
-        begin, end, used, kinds = since - LATE, measurements.time + LATE, self._used, self._kinds
-        for m in aids:
+        begin, end, used, plausible = since - LATE, measurements.time + LATE, self._used, self._plausible
+        for m in sorted(measurements.aids, key=_time):
             time, name, _, value, channel, _ = m
             if channel:
                 m = reading_of(m)
@@ -52,7 +50,7 @@ class Admission:
             latest = used.get(name)
             if latest is None:
                 continue
-            if not begin <= time <= end or time <= latest or not kinds[name].plausible(value):
+            if not begin <= time <= end or time <= latest or not plausible[name](value):
                 self.skipped += 1
                 continue
             used[name] = time
@@ -80,7 +78,3 @@ def together(measurements: Iterable[Measurement], owner: Mapping[str, str]) -> l
             groups.append([m])
             instrument, time = whose, m.time
     return groups
-
-
-def _time(m: Measurement) -> float:
-    return m.time

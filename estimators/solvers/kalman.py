@@ -72,6 +72,8 @@ class KalmanEstimator(Solver):
     #: True if `ErrorModel.assimilate` may replace `_observe` and `_absorb` when the noise is the nominal one. A solver
     #: with another form of one of these methods sets it to False.
     assimilates: ClassVar[bool] = True
+    #: True if `ErrorModel.assimilate_step` may replace `_take` and `_propagate`, too, for all measurements of a step.
+    takes_steps: ClassVar[bool] = True
 
     model: ErrorModel
 
@@ -109,6 +111,7 @@ class KalmanEstimator(Solver):
         self._keys = {name: (f"innovation.{name}", f"nis.{name}") for name in self._names}
         self._blank = dict.fromkeys((label for pair in self._keys.values() for label in pair), np.nan)
         self._plain = self.assimilates and self.adaptation is None and not self._stepwise
+        self._whole = self._plain and self.takes_steps and self.iteration is None and self.smoother is None
         self._linearised: Linearised | None = None
         if self.smoother is not None:
             self.smoother.begin(self.model, [instruments[name] for name in self._names])
@@ -123,13 +126,15 @@ class KalmanEstimator(Solver):
         model.load(measurements.imu)
         diagnostics: dict[str, float | Array] = dict(self._blank)
         flagged: list[tuple[str, float]] = []
-        advance = self._propagate if self.smoother is None else self._advance
-        for group in self._together(self._admission.admit(measurements, model.time)):
-            advance(min(group[0].time, measurements.time))
-            if len(group) == 1 or not self._take_together(group, diagnostics):
-                for m in group:
-                    self._take(m, diagnostics, flagged)
-        advance(measurements.time)
+        admitted = self._admission.admit(measurements, model.time)
+        if not (self._whole and self._take_step(admitted, measurements.time, diagnostics)):
+            advance = self._propagate if self.smoother is None else self._advance
+            for group in self._together(admitted):
+                advance(min(group[0].time, measurements.time))
+                if len(group) == 1 or not self._take_together(group, diagnostics):
+                    for m in group:
+                        self._take(m, diagnostics, flagged)
+            advance(measurements.time)
         diagnostics["skipped"] = float(self._admission.skipped)
         self._innovation_test.end_epoch()
         diagnostics["variance_factor"] = self._innovation_test.variance_factor
@@ -235,6 +240,17 @@ class KalmanEstimator(Solver):
         if not (self._plain and self.model.many) or self.iteration is not None or self.smoother is not None:
             return ((m,) for m in measurements)
         return together(measurements, self._owners)
+
+    def _take_step(
+        self, measurements: Sequence[Measurement], until: float, diagnostics: dict[str, float | Array]
+    ) -> bool:
+        """Use the measurements of a step, and propagate to its end; False if they have to be taken one by one."""
+        used = self.model.assimilate_step(measurements, until, self.covariance, self._correction)
+        if used is None:
+            return False
+        for m, (nis, size) in zip(measurements, used, strict=True):
+            self._note(m, nis, size, diagnostics)
+        return True
 
     def _take_together(self, group: Sequence[Measurement], diagnostics: dict[str, float | Array]) -> bool:
         """Use the measurements of a group; False if they have to be taken one by one."""

@@ -439,7 +439,7 @@ class WindowEstimator(LooksBack, Solver):
     def _keep(self) -> None:
         """Refer what the elimination left, and the residuals, to the nodes as they are after the step."""
         chain, nodes, motions, aids = self.chain, self.chain.nodes, self.chain.motions, self.chain.aids
-        after_step(
+        after_step.unchecked(
             nodes["step"], (nodes["predicted_shift"], nodes["filtered_shift"]),
             (motions["jacobian"], motions["residual"], motions["whitener"], motions["whitened"], motions["norm"]),
             (
@@ -454,8 +454,8 @@ class WindowEstimator(LooksBack, Solver):
         motion, aid = self.chain.factors_from(node)
         self.chain.linearise_motion(motion)
         self.chain.linearise_aids(aid)
-        whiten(motion, motions["residual"], motions["whitener"], motions["whitened"], motions["norm"])
-        whiten(aid, aids["residual"], aids["whitener"], aids["whitened"], aids["norm"])
+        whiten.unchecked(motion, motions["residual"], motions["whitener"], motions["whitened"], motions["norm"])
+        whiten.unchecked(aid, aids["residual"], aids["whitener"], aids["whitened"], aids["norm"])
 
     def _weigh(self, iteration: int) -> tuple[bool, int]:
         """Ask the weighting; whether it has settled, and the first node that has to do with a weight that is new."""
@@ -466,7 +466,7 @@ class WindowEstimator(LooksBack, Solver):
         settled = self.weighting.weigh(factors)
         if self.isolation is not None:
             settled = self.isolation.judge(factors) and settled
-        first = keep_weights(
+        first = keep_weights.unchecked(
             (before[0], motions["norm"], motions["weight"]), aids["node"], self.chain.base,
             (before[1], aids["norm"], aids["weight"]), self.tolerance,
         )  # fmt: skip
@@ -475,7 +475,7 @@ class WindowEstimator(LooksBack, Solver):
     def _cost(self) -> float:
         """Half the sum of squares of all factors, with the weights that they have."""
         chain, motions, aids = self.chain, self.chain.motions, self.chain.aids
-        cost: float = half_squares(
+        cost: float = half_squares.unchecked(
             chain.prior_whitener, chain.prior_shift, motions["weight"], motions["norm"], aids["weight"], aids["norm"]
         )
         return cost
@@ -484,7 +484,7 @@ class WindowEstimator(LooksBack, Solver):
         """One step of all nodes; its largest component in sigmas, of all nodes and of those before ``first``."""
         chain, nodes = self.chain, self.chain.nodes
         motions, aids = chain.motions, chain.aids
-        sizes: tuple[float, float] = solve_chain(
+        sizes: tuple[float, float] = solve_chain.unchecked(
             (chain.prior if first else chain.turned(chain.prior, -chain.prior_shift), chain.prior_shift),
             (motions["jacobian"], motions["noise"], motions["residual"], motions["weight"]),
             (

@@ -161,8 +161,9 @@ class Scenario(Description):
         for name in self.craft.files:
             content["vessel"][name] = _digest(getattr(self.craft, name))
         for part, spec in self.surroundings.items():
-            for name in spec.files:
-                content["surroundings"][part][name] = getattr(spec, name) and _digest(getattr(spec, name))
+            table = content["surroundings"][part]
+            for name in (n for n in spec.files if n in table):
+                table[name] = getattr(spec, name) and _digest(getattr(spec, name))
         if self._template is not None:
             content["distributions"] = _canonical(self._template.table, words)
         # Not sorted: the order of the instruments is the order in which simultaneous measurements are handed over.

@@ -18,6 +18,7 @@ from simnav.estimators.models.columns import Columns
 from simnav.estimators.models.delayed import DELAY
 from simnav.estimators.models.inertial import InertialModel
 from simnav.estimators.models.own_observation import OwnObservation
+from simnav.estimators.models.ship import ShipModel
 from simnav.estimators.solvers.admission import Admission, together
 from simnav.geometry.earth import relative_position
 from simnav.kinds import Component, Kind
@@ -110,6 +111,34 @@ def test_channels_with_biases():
         one = model.observe_own(name, float(stream.time[k]), stream.value[k], tuple(states[k]), stream.side[k])
         assert one is not None
         assert one[1][0, model.bias_at[name]] == 1.0
+        np.testing.assert_allclose(innovation[k], one[0], rtol=0.0, atol=1e-12)
+        np.testing.assert_allclose(jacobian[k], one[1], rtol=0.0, atol=1e-12)
+
+
+def test_beams_of_a_ship():
+    """The same at the states of a ship, which have no velocity, attitude and angular rate of their own."""
+    given = (
+        BEAMS
+        + "bias_m_s = 0.05\n[instruments.gnss_position]\nsigma_m = 2.0\n[instruments.gyrocompass]\nsigma_deg = 0.5\n"
+    )
+    recording = record(Scenario.from_toml(tomllib.loads(given), source="beams"), 3)
+    model = ShipModel()
+    model.begin(recording.start, by_channel(recording.instruments))
+    (many,) = model.many
+    assert many.biased
+    stream, rng, states = recording.data.aids["beams"], np.random.default_rng(2), []
+    names = [f"beams:{stream.channels[c]}" for c in stream.channel]
+    for _ in names:
+        model.correct(rng.standard_normal(model.size) * 0.1)
+        states.append((model.position.copy(), model.x.copy()))
+    columns = [np.stack(column) for column in zip(*states, strict=True)]
+    rows = np.arange(len(stream))
+    innovation, jacobian = many.linearise(
+        stream.time, stream.value, many.channels(names), columns, rows, stream.side, 0
+    )
+    for k, name in enumerate(names):
+        one = model.observe_own(name, float(stream.time[k]), stream.value[k], states[k], stream.side[k])
+        assert one is not None
         np.testing.assert_allclose(innovation[k], one[0], rtol=0.0, atol=1e-12)
         np.testing.assert_allclose(jacobian[k], one[1], rtol=0.0, atol=1e-12)
 

@@ -1,6 +1,8 @@
-"""One kernel a measurement, where nothing adapts: the same as one step after the other, and never in a hook's way."""
+"""One kernel a measurement or a step, where nothing adapts: the same numbers, and never in a hook's way."""
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -35,15 +37,7 @@ def test_it_is_the_same_filter(recording_of, row: type[Row]):
     stepwise.solver.adaptation = StepByStep()
     for estimator in (plain, stepwise):
         estimator.reset(recording.start, recording.instruments)
-    taken = [0]
-    assimilate = plain.model.assimilate
-
-    def counting(*args):
-        used = assimilate(*args)
-        taken[0] += used is not None
-        return used
-
-    plain.model.assimilate = counting
+    taken = counted(plain.model, "assimilate"), counted(plain.model, "assimilate_step")
     for packet in recording.steps():
         a, b = plain.update(packet), stepwise.update(packet)
         assert a.diagnostics == pytest.approx(b.diagnostics, rel=1e-6, nan_ok=True)
@@ -51,7 +45,42 @@ def test_it_is_the_same_filter(recording_of, row: type[Row]):
         for state in ("velocity", "dcm", "bias", "calibration"):
             np.testing.assert_allclose(*(getattr(e.model, state) for e in (plain, stepwise)), rtol=1e-9, atol=1e-9)
         np.testing.assert_allclose(a.covariance, b.covariance, rtol=1e-8, atol=1e-14)
-    assert taken[0] > 100
+    assert taken[row is Ekf][0] > 50
+    assert taken[row is Ekf23][0] == 0
+
+
+def counted(model, name: str) -> list[int]:
+    """How often a method of a model had a result."""
+    method, times = getattr(model, name), [0]
+
+    def counting(*args):
+        used = method(*args)
+        times[0] += used is not None
+        return used
+
+    setattr(model, name, counting)
+    return times
+
+
+def test_a_step_in_one_call_has_the_same_bits(recording_of):
+    """Readings between the samples of the IMU, two at one time, more of them than before, none, and no IMU."""
+    recording = recording_of(2, 30.0)
+    whole, single = Ekf(), Ekf()
+    single.solver.takes_steps = False
+    for estimator in (whole, single):
+        estimator.reset(recording.start, recording.instruments)
+    times, rng = counted(whole.model, "assimilate_step"), np.random.default_rng(3)
+    for k, packet in enumerate(recording.steps()):
+        aids = [m for _ in range(4) for m in packet.aids] if k % 5 == 1 else packet.aids if k % 5 else []
+        late = sorted(min(m.time, packet.time - rng.uniform(0.0, 0.9)) for m in aids)
+        aids = [m._replace(time=time) for m, time in zip(aids, late, strict=True)]
+        packet = replace(packet, aids=aids, imu=None if k % 7 == 3 else packet.imu)
+        a, b = whole.update(packet), single.update(packet)
+        np.testing.assert_equal(a.diagnostics, b.diagnostics)
+        for state in (*whole.model.state, *whole.model.memory):
+            np.testing.assert_array_equal(getattr(whole.model, state), getattr(single.model, state))
+        np.testing.assert_array_equal(whole.covariance, single.covariance)
+    assert times[0] == 30
 
 
 @pytest.mark.parametrize("hook", ["_observe", "_absorb"])
