@@ -10,23 +10,28 @@ import numpy as np
 from simnav.compiled import kernel
 from simnav.types import Array, Integers, Measurement
 
+from .base import RESULTS, StepRule
 from .inertial_update import assimilate_inertial
 from .propagation import MOVING, SAMPLES, Moving, Samples, propagate_inertial
 
-__all__ = ["AidTable", "Packet", "filter_inertial"]
+__all__ = ["PLAIN", "STEP", "AidTable", "Measured", "Packet", "filter_inertial"]
 
 #: The instruments of a filter: their codes, numbers of components, and places of bias and scale factor (i, 4); lever
 #: arms (i, 3) [m]; and the elements of their noise (i, 9).
 AidTable: TypeAlias = tuple[Integers, Array, Array]
 #: The k measurements of a step in order of their times: rows of their instruments (k,), times (k,) [s], values (k, 3);
-#: overwritten, a row of what `assimilate_inertial` returns for each (k, 2).
+#: overwritten, for each what `assimilate_inertial` returns, in a row of results (k, 8).
 Measured: TypeAlias = tuple[Integers, Array, Array, Array]
 
 
-@kernel(
-    f"i8({MOVING}, {SAMPLES}, i8, f8, f8[::1], UniTuple(f8[:, ::1], 3), UniTuple(f8[::1], 4), "
-    "Tuple((i8[:, ::1], f8[:, ::1], f8[:, ::1])), Tuple((i8[::1], f8[::1], f8[:, ::1], f8[:, ::1])))"
+#: Types of the arguments of `filter_inertial`.
+STEP = (
+    f"{MOVING}, {SAMPLES}, i8, f8, f8[::1], UniTuple(f8[:, ::1], 3), UniTuple(f8[::1], 4), "
+    "Tuple((i8[:, ::1], f8[:, ::1], f8[:, ::1])), Tuple((i8[::1], f8[::1], f8[:, ::1], f8[:, ::1]))"
 )
+
+
+@kernel(f"i8({STEP})")
 def filter_inertial(
     state: Moving, samples: Samples, first: int, until: float, noise: Array, matrices: tuple[Array, Array, Array],
     others: tuple[Array, Array, Array, Array], aids: AidTable, measured: Measured,
@@ -71,6 +76,10 @@ def filter_inertial(
     return first
 
 
+#: Every measurement is used with its nominal noise.
+PLAIN = StepRule(filter_inertial, ())
+
+
 class Packet:
     """The measurements of a step as arrays, which are used again at the next step.
 
@@ -80,15 +89,17 @@ class Packet:
         The instruments.
     aids : tuple of arrays
         Their parameters, in the order of the names, see `AidTable`.
+    rule : StepRule
+        How they are used.
     """
 
-    def __init__(self, names: Sequence[str], aids: AidTable):
-        self.aids = aids
+    def __init__(self, names: Sequence[str], aids: AidTable, rule: StepRule):
+        self.aids, self.rule = aids, rule
         self._row = {name: i for i, name in enumerate(names)}
         self._make_room(8)
 
     def _make_room(self, count: int) -> None:
-        self._room = np.zeros(count, np.int64), np.zeros(count), np.zeros((count, 3)), np.zeros((count, 2))
+        self._room = np.zeros(count, np.int64), np.zeros(count), np.zeros((count, 3)), np.zeros((count, RESULTS))
 
     def fill(self, measurements: Sequence[Measurement]) -> Measured:
         """The measurements as arrays; those of the call before are overwritten."""
