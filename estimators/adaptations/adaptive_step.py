@@ -1,4 +1,4 @@
-"""All measurements of a step of the inertial filter in one kernel, with a noise that is estimated from innovations.
+"""All measurements of a step of the inertial filter in one kernel, with a noise that is chosen by each innovation.
 
 For the rules of `RULES`. Each is a kernel of its adaptation, which also calls it by itself, so that a filter has the
 same noise measurement by measurement.
@@ -19,16 +19,24 @@ from simnav.estimators.models.inertial_update import absorb_inertial, innovate_i
 from simnav.estimators.models.propagation import Moving, Samples, propagate_inertial
 from simnav.types import Array, Flags, Integers
 
+from .correntropy import correntropy_rule
 from .innovation_based import innovation_noise
-from .noise import EstimatedNoise
+from .noise import EstimatedNoise, NoiseAdaptation
 from .prediction import IS_WRONG, judge_prediction
+from .robust import huber_noise, igg3_noise
 from .sage_husa import sage_husa_noise
+from .student_t import student_t_noise
 from .variational_bayes import variational_bayes_noise
 
 __all__ = ["RULES", "CompiledRules", "adapt_inertial"]
 
 #: The rules, in the order of the numbers by which a kernel knows them.
-RULES = (innovation_noise, sage_husa_noise, variational_bayes_noise)
+RULES = (
+    innovation_noise, sage_husa_noise, variational_bayes_noise, huber_noise, igg3_noise, correntropy_rule,
+    student_t_noise,
+)  # fmt: skip
+#: Those before this one are estimates; with a poor prediction the noise used last stands.
+WEIGHTS = 3
 #: What is known of the instruments of a filter, row by row: number of the rule; index of each among all instruments of
 #: the run (i,), whether its noise is estimated (i,), the noise used last (i, 9); settings (k, p), first elements of the
 #: memories (k + 1,) and memories of all of them; and of the test of the prediction, whether it is made, and its
@@ -51,7 +59,7 @@ def _choose(i: int, row: int, rule: Rule, innovation: Array, predicted: Array, n
     for a in range(m):
         before += last[row, a * (m + 1)]
         trace += predicted[a, a]
-    if trace > before:
+    if trace > before and code < WEIGHTS:
         used[:] = last[row, : m * m].reshape((m, m))
         return 0.0
     own = memory[first[i] : first[i + 1]]
@@ -59,7 +67,15 @@ def _choose(i: int, row: int, rule: Rule, innovation: Array, predicted: Array, n
         return innovation_noise(settings[i], own, innovation, predicted, nominal, used)
     if code == 1:
         return sage_husa_noise(settings[i], own, innovation, predicted, nominal, used)
-    return variational_bayes_noise(settings[i], own, innovation, predicted, nominal, used)
+    if code == 2:
+        return variational_bayes_noise(settings[i], own, innovation, predicted, nominal, used)
+    if code == 3:
+        return huber_noise(settings[i], own, innovation, predicted, nominal, used)
+    if code == 4:
+        return igg3_noise(settings[i], own, innovation, predicted, nominal, used)
+    if code == 5:
+        return correntropy_rule(settings[i], own, innovation, predicted, nominal, used)
+    return student_t_noise(settings[i], own, innovation, predicted, nominal, used)
 
 
 @kernel(
@@ -134,17 +150,17 @@ class CompiledRules:
 
     Parameters
     ----------
-    adaptation : EstimatedNoise
+    adaptation : NoiseAdaptation
         Begun for the run; a step changes its memory.
     """
 
-    def __init__(self, adaptation: EstimatedNoise):
+    def __init__(self, adaptation: NoiseAdaptation):
         self.adaptation = adaptation
 
     def step_rule(self, names: Sequence[str]) -> StepRule | None:
         """The rule, or None if the adaptation has no kernel, or bounds a full matrix, which is done by NumPy."""
         own = self.adaptation
-        if own.rule not in RULES or own.full:
+        if own.rule not in RULES or (isinstance(own, EstimatedNoise) and own.full):
             return None
         index = np.array([own.index[name] for name in names], np.int64)
         estimated = np.array([own.in_scope(own.instruments[name].kind) for name in names], bool)

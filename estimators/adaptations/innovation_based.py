@@ -123,9 +123,9 @@ def _contradiction(length: int, significance: float) -> tuple[float, float]:
 
 
 #: Places in the settings: smallest and largest length of the window; bounds v_min and v_max; weight of the new
-#: estimate; whether the newest H P H' is subtracted, the data are residuals, and the solver bounds the estimate by itself; bounds
-#: of the variance ratios; and from LIMITS on lower and upper limit of a mean square, for the shortest, the middle and
-#: the longest window.
+#: estimate; whether the newest H P H' is subtracted, the data are residuals, and NumPy bounds the estimate; bounds of
+#: the variance ratios; and from LIMITS on lower and upper limit of a mean square, for the shortest, the middle and the
+#: longest window.
 SHORTEST, LONGEST, LOW, HIGH, FORGETTING, NEWEST, RESIDUAL, FULL, LOWEST, HIGHEST, LIMITS = range(11)
 #: Places in the memory: number of rows so far; whether there is an estimate; its elements (room for 3 by 3), and the
 #: rows of `_push`.

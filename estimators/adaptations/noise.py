@@ -19,7 +19,7 @@ from .prediction import PredictionTest
 
 __all__ = [
     "RULE", "EstimatedNoise", "NoiseAdaptation", "Posterior", "Scope", "bound", "normalised_square", "posterior",
-    "scaled",
+    "scale", "scaled",
 ]  # fmt: skip
 
 #: Signature of a kernel that estimates a noise, from settings and memory of an instrument (which it updates),
@@ -73,7 +73,7 @@ def normalised_square(innovation: Array, predicted: Array, noise: Array) -> floa
 
 
 @kernel("void(f8[:, ::1], f8, f8, f8, f8[:, ::1])")
-def _scale(noise: Array, f0: float, f1: float, f2: float, product: Array) -> None:
+def scale(noise: Array, f0: float, f1: float, f2: float, product: Array) -> None:
     r0, r1, r2 = sqrt(f0), sqrt(f1), sqrt(f2)
     for i in range(noise.shape[0]):
         a = r0 if i == 0 else r1 if i == 1 else r2
@@ -142,7 +142,7 @@ def scaled(noise: Array, factors: list[float]) -> Array:
         return noise
     product: Array = np.empty((len(noise), len(noise)))
     first, second, third = (*factors, 1.0, 1.0)[:3]
-    _scale(noise, first, second, third, product)
+    scale(noise, first, second, third, product)
     return product
 
 
@@ -163,6 +163,14 @@ class NoiseAdaptation(Adaptation):
     """
 
     together = 3
+    #: The kernel that chooses, or that estimates (`RULE`); None if there is none, as for a subclass that chooses in its
+    #: own way.
+    rule: ClassVar[Kernel[..., float] | None] = None
+
+    def __init_subclass__(cls) -> None:
+        super().__init_subclass__()
+        if {"adapt", "choose", "estimate"} & vars(cls).keys() and "rule" not in vars(cls):
+            cls.rule = None
 
     def reset(self, instruments: Instruments) -> None:
         """Begin a run."""
@@ -174,6 +182,29 @@ class NoiseAdaptation(Adaptation):
         self._noted: dict[str, Sequence[float]] = {}
         for name, sheet in instruments.items():
             self._report.update(zip(self._labels[name], map(float, sheet.sigma)))
+        self.instruments, self.index = instruments, {name: i for i, name in enumerate(instruments)}
+        self.longer = {name: max(sheet.rate, 1.0) for name, sheet in instruments.items()}
+        self.settings = np.array([self.settings_of(longer) for longer in self.longer.values()], dtype=np.float64)
+        begun = [self.begun(longer, len(self._labels[name])) for name, longer in self.longer.items()]
+        self.first = np.cumsum([0, *map(len, begun)])
+        self.memory = np.concatenate([*begun, np.empty(0)])
+
+    def settings_of(self, longer: float) -> list[float]:
+        """What the rule needs to know of an instrument with so many measurements in a second, at least 1."""
+        return []
+
+    def begun(self, longer: float, m: int) -> Array:
+        """What the rule keeps of an instrument of m components, at the start of a run."""
+        return np.empty(0)
+
+    def memory_of(self, name: str) -> tuple[Array, Array]:
+        """Settings and memory of an instrument, views."""
+        i = self.index[name]
+        return self.settings[i], self.memory[self.first[i] : self.first[i + 1]]
+
+    def in_scope(self, kind: str) -> bool:
+        """Whether the noise of a kind of instrument is chosen; otherwise it is the nominal one."""
+        return True
 
     def noted(self, name: str, row: Sequence[float]) -> None:
         """Report what a kernel chose for an instrument; the row is that of `simnav.estimators.models.base.StepRule`."""
@@ -185,6 +216,12 @@ class NoiseAdaptation(Adaptation):
     def _note(self, name: str, chosen: Sequence[float]) -> None:
         """Report the sigmas and the further number that a kernel chose; they differ from those before."""
         self._report.update(zip(self._labels[name], chosen))
+
+    def _note_weight(self, name: str, chosen: Sequence[float]) -> None:
+        """`_note` where the further number is a weight."""
+        NoiseAdaptation._note(self, name, chosen)
+        if chosen[-1]:
+            self.report(f"weight.{name}", chosen[-1])
 
     @abstractmethod
     def choose(self, innovation: Innovation) -> Array | None:
@@ -245,14 +282,6 @@ class EstimatedNoise(NoiseAdaptation):
         If the bounds are not 0 < lowest <= highest, or the scope is unknown.
     """
 
-    #: The kernel that does `estimate` (`RULE`); None if there is none, as for a subclass that chooses in its own way.
-    rule: ClassVar[Kernel[..., float] | None] = None
-
-    def __init_subclass__(cls) -> None:
-        super().__init_subclass__()
-        if {"adapt", "choose", "estimate"} & vars(cls).keys() and "rule" not in vars(cls):
-            cls.rule = None
-
     def __init__(self, lowest: float, highest: float, full: bool = False, scope: Scope = "all"):
         if not 0.0 < lowest <= highest:
             raise ValueError(f"lowest = {lowest:g} and highest = {highest:g}: it must be 0 < lowest <= highest")
@@ -260,37 +289,12 @@ class EstimatedNoise(NoiseAdaptation):
             raise ValueError(f"scope = {scope!r}: it must be 'fixes' or 'all'")
         self.lowest, self.highest, self.full, self.scope = lowest, highest, full, scope
 
-    def reset(self, instruments: Instruments) -> None:
-        """Begin a run."""
-        super().reset(instruments)
-        self.longer = {name: max(sheet.rate, 1.0) for name, sheet in instruments.items()}
-
-        self.instruments, self.index = instruments, {name: i for i, name in enumerate(instruments)}
-        longer, sizes = list(self.longer.values()), [len(KINDS[sheet.kind].errors) for sheet in instruments.values()]
-        self.settings = np.array([self.settings_of(x) for x in longer], dtype=np.float64)
-        begun = [self.begun(x, m) for x, m in zip(longer, sizes, strict=True)]
-        self.first = np.cumsum([0, *map(len, begun)])
-        self.memory = np.concatenate([*begun, np.empty(0)])
-
-    @abstractmethod
-    def settings_of(self, longer: float) -> list[float]:
-        """What its kernel needs to know of an instrument with so many measurements in a second, at least 1."""
-
-    @abstractmethod
-    def begun(self, longer: float, m: int) -> Array:
-        """What its kernel keeps of an instrument of m components, at the start of a run."""
-
-    def memory_of(self, name: str) -> tuple[Array, Array]:
-        """Settings and memory of an instrument, views."""
-        i = self.index[name]
-        return self.settings[i], self.memory[self.first[i] : self.first[i + 1]]
-
     @abstractmethod
     def estimate(self, innovation: Innovation) -> Array:
         """The (m, m) estimate of the noise within the bounds, including this innovation."""
 
     def in_scope(self, kind: str) -> bool:
-        """Whether the noise of a kind of instrument is estimated."""
+        """Whether the noise of a kind of instrument is estimated, by the scope."""
         return self.scope == "all" or KINDS[kind].role == "fix"
 
     def choose(self, innovation: Innovation) -> Array:

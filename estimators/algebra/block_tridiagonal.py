@@ -55,7 +55,7 @@ __all__ = [
 #: A factor with a smaller weight than this is left out.
 LEAST_WEIGHT = 1e-9
 
-#: The elements of a sparse (n, n) matrix (`simnav.estimators.algebra.products`): values, columns, and number in each row.
+#: The elements of a sparse (n, n) matrix (`simnav.estimators.algebra.products`): values, columns, number in each row.
 Lists: TypeAlias = tuple[Array, Places, Places]
 #: Work space (n, w), where w is a multiple of eight.
 Room: TypeAlias = tuple[Array, Array, Array]

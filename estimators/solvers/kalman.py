@@ -27,7 +27,7 @@ import numpy as np
 from simnav.estimators.adaptations.adaptive_step import CompiledRules
 from simnav.estimators.adaptations.base import Adaptation, Innovation
 from simnav.estimators.adaptations.intersection import weaken_position
-from simnav.estimators.adaptations.noise import EstimatedNoise
+from simnav.estimators.adaptations.noise import NoiseAdaptation
 from simnav.estimators.composition import Solver
 from simnav.estimators.models.base import INNOVATION, NIS, ErrorModel, Linearised, Observation
 from simnav.estimators.models.channels import owners, summary
@@ -114,7 +114,7 @@ class KalmanEstimator(Solver):
         self._keys = {name: (f"innovation.{name}", f"nis.{name}") for name in self._names}
         self._blank = dict.fromkeys((label for pair in self._keys.values() for label in pair), np.nan)
         self._plain = self.assimilates and self.adaptation is None and not self._stepwise
-        self._rules = CompiledRules(self.adaptation) if isinstance(self.adaptation, EstimatedNoise) else None
+        self._rules = CompiledRules(self.adaptation) if isinstance(self.adaptation, NoiseAdaptation) else None
         known = self.adaptation is None or self._rules is not None
         single = self.iteration is not None or self.smoother is not None
         self._whole = self.assimilates and self.takes_steps and known and not single
