@@ -165,5 +165,5 @@ class CompiledRules:
         index = np.array([own.index[name] for name in names], np.int64)
         estimated = np.array([own.in_scope(own.instruments[name].kind) for name in names], bool)
         last = np.zeros((len(names), 9))
-        rule = RULES.index(own.rule), index, estimated, last, own.settings, own.first, own.memory
+        rule = RULES.index(own.rule), index, estimated, last, own.rule_settings, own.rule_first, own.rule_memory
         return StepRule(adapt_inertial, (rule, own.prediction.arrays))

@@ -184,10 +184,10 @@ class NoiseAdaptation(Adaptation):
             self._report.update(zip(self._labels[name], map(float, sheet.sigma)))
         self.instruments, self.index = instruments, {name: i for i, name in enumerate(instruments)}
         self.longer = {name: max(sheet.rate, 1.0) for name, sheet in instruments.items()}
-        self.settings = np.array([self.settings_of(longer) for longer in self.longer.values()], dtype=np.float64)
+        self.rule_settings = np.array([self.settings_of(longer) for longer in self.longer.values()], dtype=np.float64)
         begun = [self.begun(longer, len(self._labels[name])) for name, longer in self.longer.items()]
-        self.first = np.cumsum([0, *map(len, begun)])
-        self.memory = np.concatenate([*begun, np.empty(0)])
+        self.rule_first = np.cumsum([0, *map(len, begun)])
+        self.rule_memory = np.concatenate([*begun, np.empty(0)])
 
     def settings_of(self, longer: float) -> list[float]:
         """What the rule needs to know of an instrument with so many measurements in a second, at least 1."""
@@ -200,7 +200,7 @@ class NoiseAdaptation(Adaptation):
     def memory_of(self, name: str) -> tuple[Array, Array]:
         """Settings and memory of an instrument, views."""
         i = self.index[name]
-        return self.settings[i], self.memory[self.first[i] : self.first[i + 1]]
+        return self.rule_settings[i], self.rule_memory[self.rule_first[i] : self.rule_first[i + 1]]
 
     def in_scope(self, kind: str) -> bool:
         """Whether the noise of a kind of instrument is chosen; otherwise it is the nominal one."""

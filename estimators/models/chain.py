@@ -214,7 +214,7 @@ class Columns(dict[str, Any]):
         self._first += count
         self.clear()
 
-    def pop(self, count: int) -> None:
+    def shorten(self, count: int) -> None:
         """Take ``count`` rows off the end."""
         self._last -= count
         self.clear()
@@ -433,7 +433,7 @@ class Chain(ABC):
 
     def detach(self, count: int) -> None:
         """Remove the newest aiding factors."""
-        self.aids.pop(count)
+        self.aids.shorten(count)
 
     def drop(self, count: int) -> None:
         """Remove the oldest nodes and their factors from the window."""
