@@ -1,4 +1,4 @@
-"""The files of the cache of kernels, each with a checksum, so that a damaged file is never executed.
+"""The cache of kernels: files with a checksum, so that a damaged one is never executed, loaded without the compiler.
 
 Numba writes two files for each kernel, an index and the machine code. It reads them without a check, and damaged
 machine code may end the process. Here each file ends with its SHA-256 digest. A file whose digest is wrong is removed,
@@ -19,7 +19,8 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from numba.core import typeinfer
-from numba.core.caching import IndexDataCacheFile
+from numba.core.caching import FunctionCache, IndexDataCacheFile
+from numba.core.runtime.nrt import rtsys
 
 __all__ = ["WithDigests", "compile_with"]
 
@@ -27,6 +28,20 @@ _DIGEST = hashlib.sha256().digest_size
 
 
 _Files: Any = IndexDataCacheFile  # Numba has no annotations
+_Cache: Any = FunctionCache
+
+
+class WithoutCompiler(_Cache):  # type: ignore[misc]
+    """The cache of a kernel, which loads it without Numba's compiler.
+
+    Numba prepares its compiler before it looks for a file, which takes a third of a second in each process. A kernel
+    that was compiled needs the memory functions of Numba only; a compilation prepares the compiler by itself.
+    """
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        rtsys.initialize(target_context)
+        with self._guard_against_spurious_io_errors():
+            return self._load_overload(sig, target_context)
 
 
 class WithDigests(_Files):  # type: ignore[misc]
@@ -81,7 +96,8 @@ def compile_with(dispatcher: Any, signature: str | None) -> None:
     if cache is None:  # NUMBA_DISABLE_JIT: it is the plain function
         return
     if hasattr(cache, "_cache_file"):
-        cache._cache_file.__class__ = WithDigests  # Numba has no public way to choose the class
+        cache._cache_file.__class__ = WithDigests  # Numba has no public way to choose these classes
+        cache.__class__ = WithoutCompiler
     if signature is not None:
         with typeinfer.register_dispatcher(dispatcher):  # as `numba.jit` with a signature does
             dispatcher.compile(signature)

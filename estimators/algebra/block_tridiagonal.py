@@ -55,7 +55,7 @@ __all__ = [
 #: A factor with a smaller weight than this is left out.
 LEAST_WEIGHT = 1e-9
 
-#: The elements of a sparse (n, n) matrix (`simnav.estimators.algebra.products`): values, columns, number in each row.
+#: The elements of a sparse (n, n) matrix: values, columns, and their number in each row (`products`).
 Lists: TypeAlias = tuple[Array, Places, Places]
 #: Work space (n, w), where w is a multiple of eight.
 Room: TypeAlias = tuple[Array, Array, Array]
@@ -100,13 +100,15 @@ def _predict(P: Array, F: Array, Q: Array, weight: float, lists: Lists, room: Ro
 
 @kernel()
 def _absorb(
-    P: Array, d: Array, measured: tuple[Array, Array, Array, float, int], L: Array, white: tuple[Array, Array, Array]
-) -> bool:
+    P: Array, d: Array, measured: tuple[Array, Array, Array, float, int], L: Array, white: tuple[Array, Array, Array],
+    columns: Integers,
+) -> bool:  # fmt: skip
     """Update P and d with a measurement (H, r, R, weight, m) with the noise covariance ``R / weight``.
 
     With ``L L' = S = H P H' + R / weight`` the whitened quantities ``white`` = (U, G, y) are stored: ``U = L^-1 H P``,
     ``G = L^-1 H`` and ``y = L^-1 (r - H d)``; the update is ``d + U' y`` and ``P - U' U``. The last row of L holds the
-    pivots. If S is singular, nothing is changed and the result is False.
+    pivots. If S is singular, nothing is changed and the result is False. ``columns`` (3, n + 1) is work space: the
+    columns of H that are not zero, and their number.
     """
     H, r, R, weight, m = measured
     U, G, y = white
@@ -115,19 +117,23 @@ def _absorb(
         y[a] = r[a]
         for c in range(n):
             U[a, c] = 0.0
+        count = 0
         for c in range(n):  # most elements are zero
             x = H[a, c]
             G[a, c] = x
             if x != 0.0:
+                columns[a, count] = c
+                count += 1
                 y[a] -= x * d[c]
                 for j in range(n):
                     U[a, j] += x * P[c, j]
+        columns[a, n] = count
     for a in range(m):
         for b in range(a + 1):
             x = 0.5 * (R[a, b] + R[b, a]) / weight
-            for c in range(n):
-                if H[b, c] != 0.0:
-                    x += H[b, c] * U[a, c]
+            for k in range(columns[b, n]):
+                c = columns[b, k]
+                x += H[b, c] * U[a, c]
             L[a, b] = x
     if not factorise(L, m, 1e-14, L[3]):
         return False
@@ -143,13 +149,18 @@ def _absorb(
         for c in range(n):
             U[a, c] *= x
             G[a, c] *= x
-    for i in range(n):
-        for a in range(m):
+    for a in range(m):
+        for i in range(n):
             d[i] += U[a, i] * y[a]
+    for i in range(n):
         if m == 3:  # in one pass
             u, v, w = U[0, i], U[1, i], U[2, i]
             for j in range(n):
                 P[i, j] -= u * U[0, j] + v * U[1, j] + w * U[2, j]
+        elif m == 2:  # likewise
+            u, v = U[0, i], U[1, i]
+            for j in range(n):
+                P[i, j] = P[i, j] - u * U[0, j] - v * U[1, j]
         else:
             for a in range(m):
                 u = U[a, i]
@@ -268,7 +279,7 @@ def solve_chain(
     """
     prior_covariance, prior_shift = prior
     transition, noise, error, motion_weight = motion
-    node, base, _, components, jacobian, residual, aid_noise, aid_weight = aids
+    node, base, instrument, components, jacobian, residual, aid_noise, aid_weight = aids
     predicted, predicted_shift, filtered, filtered_shift, cross, white, innovation, used = left
     count, n = step.shape
     total = node.size
@@ -280,6 +291,11 @@ def solve_chain(
     damp_used = np.zeros((damps, n), dtype=np.bool_)
     unit, zero, damped = np.zeros((1, n)), np.zeros(1), np.empty((n, 1, 1))
     mean_jacobian, mean_residual, mean_noise = np.empty((3, n)), np.empty(3), np.empty((3, 3))
+
+    columns, most = np.empty((3, n + 1), dtype=np.int64), 0
+    for i in range(total):
+        most = max(most, instrument[i])
+    latest = np.full(most + 1, -1)
 
     i = 0
     while i < total and node[i] - base < first:
@@ -306,20 +322,24 @@ def solve_chain(
                 unit[0, r] = 1.0
                 damp_used[k, r] = _absorb(
                     P, d, (unit, zero, damped[r], damping, 1), L,
-                    (damp_crosses[k, r], damp_whites[k, r], damp_innovations[k, r]),
+                    (damp_crosses[k, r], damp_whites[k, r], damp_innovations[k, r]), columns,
                 )  # fmt: skip
                 unit[0, r] = 0.0
         end = i
+        several = False  # whether an instrument has several measurements here
         while end < total and node[end] - base == k:
             used[end] = 1 if components[end] > 0 and aid_weight[end] > LEAST_WEIGHT else 0
+            several |= latest[instrument[end]] == k
+            latest[instrument[end]] = k
             end += 1
         while i < end:
             if used[i] == 1:
                 m, whitened = components[i], (cross[i], white[i], innovation[i])
-                if _mean_of(i, end, aids, used, mean_jacobian, mean_residual, mean_noise) == 1:
-                    used[i] = _absorb(P, d, (jacobian[i], residual[i], aid_noise[i], aid_weight[i], m), L, whitened)
+                if not several or _mean_of(i, end, aids, used, mean_jacobian, mean_residual, mean_noise) == 1:
+                    measured = jacobian[i], residual[i], aid_noise[i], aid_weight[i], m
                 else:
-                    used[i] = _absorb(P, d, (mean_jacobian, mean_residual, mean_noise, 1.0, m), L, whitened)
+                    measured = mean_jacobian, mean_residual, mean_noise, 1.0, m
+                used[i] = _absorb(P, d, measured, L, whitened, columns)
             i += 1
 
     adjoint, after, z, variance, ratio = np.zeros(n), np.empty(n), np.empty(3), np.empty(n), np.empty(n)
@@ -403,11 +423,13 @@ def after_step(
         norm[k] = _whiten(error[k], whitener[k], whitened[k])
     for i in range(node.size):
         k = node[i] - base
-        for a in range(3):
-            x = residual[i, a]
-            for c in range(n):
-                x -= jacobian[i, a, c] * step[k, c]
-            residual[i, a] = x
+        x, y, z = residual[i, 0], residual[i, 1], residual[i, 2]
+        for c in range(n):
+            s = step[k, c]
+            x -= jacobian[i, 0, c] * s
+            y -= jacobian[i, 1, c] * s
+            z -= jacobian[i, 2, c] * s
+        residual[i, 0], residual[i, 1], residual[i, 2] = x, y, z
         aid_norm[i] = _whiten(residual[i], aid_whitener[i], aid_whitened[i])
 
 

@@ -124,10 +124,16 @@ def joseph_update(
             for r in range(n):
                 spread[i, r] += gain[k, r] * x
     for r in range(n):
-        for i in range(m):
-            x, y = spread[i, r], gain[i, r]
+        if m == 2:  # in one pass
+            s, t, u, v = spread[0, r], spread[1, r], gain[0, r], gain[1, r]
             for c in range(r + 1):
-                covariance[r, c] += x * gain[i, c] - y * projected[i, c]
+                first, second = s * gain[0, c] - u * projected[0, c], t * gain[1, c] - v * projected[1, c]
+                covariance[r, c] = covariance[r, c] + first + second
+        else:
+            for i in range(m):
+                x, y = spread[i, r], gain[i, r]
+                for c in range(r + 1):
+                    covariance[r, c] += x * gain[i, c] - y * projected[i, c]
         for c in range(r):
             covariance[c, r] = covariance[r, c]
     return nis

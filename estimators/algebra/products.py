@@ -1,4 +1,4 @@
-"""Products with a dense matrix, eight columns at a time: of a sparse matrix, in lists, and of a vector.
+"""Products with a dense matrix, eight columns at a time: of a sparse matrix with listed elements, and of a vector.
 
 The sums of eight columns stay in one vector register while the terms are added, in the order in which the elements are
 listed. Indices are unsigned: of a signed one the compiler has to ask whether it counts from the end, and then it does

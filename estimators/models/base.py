@@ -198,6 +198,21 @@ class ErrorModel(ABC):
         linearised = self.measure(measurement)
         return None if linearised is None else linearised.noise
 
+    def nominal_noises(self, measurements: Sequence[Measurement]) -> Array | None:
+        """`nominal_noise` of k readings of one time of the channels of one instrument, by one call.
+
+        Parameters
+        ----------
+        measurements : sequence of Measurement
+            Readings of channels of one instrument (`many`).
+
+        Returns
+        -------
+        (k, m, m) array or None
+            The noises. None where each reading has to be asked for by itself.
+        """
+        return None
+
     @abstractmethod
     def correct(self, dx: Array) -> None:
         """Add a correction to the state."""

@@ -275,6 +275,7 @@ class InertialModel(ErrorModel):
             self.own[sheet.name] = OwnObservation(sheet, self.blocks.places(sheet.name, _NAV), self.time)
         self.delayed = any(is_delayed(sheet) for sheet in own)
         self.many = of_instruments(self.own, self.bias_at)
+        self._many_of = {name: many for many in self.many for name in many.sources}
         self._fused = set(self.noise) - self.uncalibrated - set(self.own) if self.fused else set()
 
     def _more_blocks(self) -> None:
@@ -423,6 +424,13 @@ class InertialModel(ErrorModel):
             return self.noise[name] + more
         return super().nominal_noise(measurement)
 
+    def nominal_noises(self, measurements: Sequence[Measurement]) -> Array | None:
+        """As `ErrorModel.nominal_noises`, for a kind that predicts many readings at one time."""
+        name = measurements[0].instrument
+        many = self._many_of.get(name)
+        more = None if many is None else many.more_noise([m.side for m in measurements])
+        return None if more is None else self.noise[name] + more
+
     def innovate(self, measurement: Measurement, covariance: Array) -> Observation | None:
         """Linearise a measurement and project the covariance (`simnav.estimators.models.inertial_update`)."""
         name = measurement.instrument
@@ -485,19 +493,16 @@ class InertialModel(ErrorModel):
         self, measurements: Sequence[Measurement], covariance: Array, correction: Array
     ) -> tuple[Array, Array] | None:
         """As `ErrorModel.assimilate_together`, where a kind predicts many readings at one time."""
-        names = [m.instrument for m in measurements]
-        many = next((many for many in self.many if names[0] in many.sources), None)
-        if many is None or many.biased or not self.fused:
+        times, names, _, values, _, sides = zip(*measurements)
+        many = self._many_of.get(names[0])
+        if many is None or many.biased or many.has_noise or not self.fused:
             return None
-        if self.own[names[0]].has_noise:
-            return None
-        k, sides, sheet = len(names), np.array([m.side for m in measurements]), self.instruments[names[0]]
+        k, side, sheet = len(names), np.array(sides), self.instruments[names[0]]
         unit = np.eye(len(sheet.sigma))
-        noise = self.noise[names[0]] - sheet.sigma**2 * unit + many.noise(sides)[:, :, None] * unit
-        state = [np.broadcast_to(array, (k, *array.shape)) for array in self._state()]
+        noise = self.noise[names[0]] - sheet.sigma**2 * unit + many.noise(side)[:, :, None] * unit
         residual, jacobian = many.linearise(
-            np.array([m.time for m in measurements]), np.array([m.value for m in measurements]), many.channels(names),
-            state, sides, _NAV,
+            np.array(times), np.array(values), many.channels(names), [array[None] for array in self._state()],
+            np.zeros(k, dtype=np.intp), side, _NAV,
         )  # fmt: skip
         nis, size = np.empty(k), np.empty(k)
         joseph_sequence(covariance, residual, jacobian, noise, correction, nis, size)

@@ -27,9 +27,10 @@ from simnav.estimators.algebra.block_tridiagonal import error_after_step
 from simnav.geometry.rotation import cross, rotated, rotation_coefficients
 from simnav.types import Array, InitialState, Instruments, Integers
 
-from .chain import Chain, Columns, chain_of
+from .chain import Chain, chain_of
+from .columns import Columns
 from .inertial import InertialModel
-from .measurements import OWN, State, observe_inertial
+from .measurements import State, observe_inertial
 from .propagation import correct_inertial
 
 __all__ = ["InertialChain"]
@@ -362,10 +363,9 @@ class InertialChain(Chain):
         covariance = super().begin(start, instruments)
         front = self.front
         nothing = (0, np.zeros(3), -1, -1)
-        known = [front.aid_parameters.get(name, nothing) for name in self.names]
-        for i, name in enumerate(self.names):
-            if name in front.own:  # the compiled loop has no use for its states
-                known[i] = (OWN, np.zeros(3), -1, -1)
+        # The compiled loop leaves out what has an equation of its own.
+        self._own = np.array([name in front.own for name in self.names], dtype=bool)
+        known = [nothing if name in front.own else front.aid_parameters.get(name, nothing) for name in self.names]
         self._known = (
             np.array([code for code, *_ in known], dtype=np.int64),
             np.array([arm for _, arm, _, _ in known], dtype=np.float64).reshape(-1, 3),
@@ -386,13 +386,15 @@ class InertialChain(Chain):
         aids = self.aids
         wide = jacobian if self.size >= 15 else np.zeros((len(aids), 3, 15))
         position, velocity, dcm, bias, calibration = (states[prefix + name] for name in self.front.state)
+        compiled = np.where(self._own[aids["instrument"]], -1, row) if self.front.own else row
         _linearise_aids.unchecked(
-            first, (row, aids["instrument"], aids["value"]), self._known,
+            first, (compiled, aids["instrument"], aids["value"]), self._known,
             (position, velocity, dcm, states["raw_rate"], bias, calibration), aids["residual"], wide,
             aids["components"],
         )  # fmt: skip
         if self.front.own:
-            inertial = np.hstack([states[name] for name in self.node_arrays])
+            arrays = [states[name] for name in self.node_arrays]
+            inertial = arrays[0] if len(arrays) == 1 else np.hstack(arrays)
             self.observe_own(first, row, wide, position, velocity, dcm, inertial, bias, calibration)
         if wide is not jacobian:
             here = np.flatnonzero(row[first:] >= 0) + first

@@ -49,6 +49,9 @@ class _Stated(ErrorModel):
             return super().nominal_noise(measurement)
         return ErrorModel.nominal_noise(self, measurement)
 
+    def nominal_noises(self, measurements: Sequence[Measurement]) -> Array | None:
+        return None if any(map(self._states, measurements)) else super().nominal_noises(measurements)
+
     def innovate(self, measurement: Measurement, covariance: Array) -> Observation | None:
         if not self._states(measurement):
             return super().innovate(measurement, covariance)

@@ -18,7 +18,6 @@ Source: P. D. Groves 2013, sections 3.2 and 3.4.3.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from itertools import groupby
 from math import hypot
 from typing import ClassVar
 
@@ -36,7 +35,7 @@ from simnav.estimators.models.stated_sigmas import with_stated_sigmas
 from simnav.estimators.models.suitable import ModelChoice
 from simnav.types import Array, Estimate, InitialState, Instruments, Measurement, Measurements, NavigationStates
 
-from .admission import Admission
+from .admission import Admission, together
 from .innovation_consistency import InnovationTest
 from .iterated import Iteration, absorb_iterated
 from .smoother import Smoother
@@ -110,7 +109,7 @@ class KalmanEstimator(Solver):
         self._admission = Admission(instruments, self._names)
         self._innovation_test = InnovationTest()
         self._correction = np.empty(self.model.size)
-        self._owners = owners(instruments)
+        self._owners, self._mean_labels = owners(instruments), dict[str, str]()
         self._keys = {name: (f"innovation.{name}", f"nis.{name}") for name in self._names}
         self._blank = dict.fromkeys((label for pair in self._keys.values() for label in pair), np.nan)
         self._plain = self.assimilates and self.adaptation is None and not self._stepwise
@@ -148,7 +147,7 @@ class KalmanEstimator(Solver):
         if self.adaptation is not None:
             diagnostics.update(self.adaptation.diagnostics())
         if self._owners:
-            diagnostics.update(summary(diagnostics, self._owners))
+            diagnostics.update(summary(diagnostics, self._owners, self._mean_labels))
         estimate = self._estimate()
         estimate.diagnostics, estimate.flagged = diagnostics, flagged
         if self.smoother is not None:
@@ -245,8 +244,7 @@ class KalmanEstimator(Solver):
         """The measurements, those of the channels of one instrument at one time in one group if that is quicker."""
         if not (self._plain and self.model.many) or self.iteration is not None or self.smoother is not None:
             return ((m,) for m in measurements)
-        groups = groupby(measurements, lambda m: (m.time, self._owners.get(m.instrument, m.instrument)))
-        return (tuple(group) for _, group in groups)
+        return together(measurements, self._owners)
 
     def _take_step(
         self, measurements: Sequence[Measurement], until: float, diagnostics: dict[str, float | Array]

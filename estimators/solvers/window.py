@@ -43,7 +43,7 @@ from __future__ import annotations
 
 import contextlib
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import hypot, inf, isfinite
 from typing import ClassVar
@@ -62,7 +62,7 @@ from simnav.estimators.models.suitable import ModelChoice
 from simnav.estimators.weightings.base import Factors, Isolation, Weighting
 from simnav.types import Array, Estimate, InitialState, Instruments, Measurement, Measurements
 
-from .admission import Admission
+from .admission import Admission, together
 from .cost_consistency import CostTest
 from .looking_back import LooksBack
 
@@ -179,7 +179,8 @@ class WindowEstimator(LooksBack, Solver):
         self.chain.front.reports_all |= self.reports_all
         self.covariance = self.chain.begin(start, instruments)
         observed = [name for name, sheet in instruments.items() if self.chain.observes(sheet)]
-        self._admission, self._owners = Admission(instruments, observed), owners(instruments)
+        self._admission = Admission(instruments, observed)
+        self._owners, self._mean_labels = owners(instruments), dict[str, str]()
         for what in (self.adaptation, self.weighting, self.isolation):
             if what is not None:
                 what.reset(instruments)
@@ -205,9 +206,13 @@ class WindowEstimator(LooksBack, Solver):
         attached = 0
         samples = measurements.imu.time if self.every_sample and measurements.imu is not None else np.empty(0)
         admitted = self._admission.admit(measurements, chain.time)
-        for m in admitted:
-            self._advance(min(m.time, measurements.time), samples)
-            attached += self._take(m, m.time == admitted[-1].time, diagnostics, flagged)
+        for group in together(admitted, self._owners):
+            self._advance(min(group[0].time, measurements.time), samples)
+            last = group[0].time == admitted[-1].time
+            if len(group) == 1 or self.adaptation is not None or not self._take_together(group, last):
+                attached += sum([self._take(m, last, diagnostics, flagged) for m in group])
+            else:
+                attached += len(group)
         if attached:
             self._optimise(attached, diagnostics, flagged)
             self._marginalise()
@@ -217,7 +222,7 @@ class WindowEstimator(LooksBack, Solver):
             if what is not None:
                 diagnostics.update(what.diagnostics())
         if self._owners:
-            diagnostics.update(summary(diagnostics, self._owners))
+            diagnostics.update(summary(diagnostics, self._owners, self._mean_labels))
         estimate = chain.estimate(chain.predicted_covariance(self.covariance))
         diagnostics["inconsistent"] = float(self._cost_test.inconsistent)
         if self._cost_test.inconsistent and estimate.covariance is not None:
@@ -253,10 +258,24 @@ class WindowEstimator(LooksBack, Solver):
             self._admission.skipped += 1
         if noise is None:
             return False
-        if chain.ahead > 0.0 and (last or self.every_sample or chain.ahead >= self.spacing):
-            self._extend()
+        self._make_node(last)
         chain.attach(m, noise)
         return True
+
+    def _take_together(self, group: Sequence[Measurement], last: bool) -> bool:
+        """`_take` for readings of one instrument at one time; False if they have to be taken one by one."""
+        noise = self.chain.nominal_noises(group)
+        if noise is None:
+            return False
+        self._make_node(last)
+        self.chain.attach_together(group, noise)
+        return True
+
+    def _make_node(self, last: bool) -> None:
+        """Make the front a node for a measurement, unless that can be folded onto the newest one."""
+        chain = self.chain
+        if chain.ahead > 0.0 and (last or self.every_sample or chain.ahead >= self.spacing):
+            self._extend()
 
     def _adapted_noise(
         self,

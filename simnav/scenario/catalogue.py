@@ -19,7 +19,7 @@ from typing import Any
 
 from simnav.plugins import entry_points
 
-__all__ = ["NAME", "Header", "ScenarioWarning", "headers"]
+__all__ = ["NAME", "OWN_FOLDER", "Header", "ScenarioWarning", "headers"]
 
 _GROUP = "simnav.scenarios"
 
@@ -41,6 +41,9 @@ _CHANNELS = re.compile(
 #: Names of scenarios: kebab-case.
 NAME = re.compile(r"[a-z][a-z0-9]*(-[a-z0-9]+)*")
 
+
+#: Folder of the scenarios that come with simnav.
+OWN_FOLDER = (Path(__file__).parents[1] / "scenarios").resolve()
 
 #: The heads that were read, by path, time of the last change [ns] and size of the file.
 _known: dict[tuple[Path, int, int], Header] = {}
@@ -134,7 +137,7 @@ def _folders() -> Iterator[Path]:
     points = {(p.name, p.value): p for p in entry_points(_GROUP)}
     for point in sorted(points.values(), key=lambda p: (not _own(p), p.name)):
         if _own(point):
-            yield (Path(__file__).parents[1] / "scenarios").resolve()
+            yield OWN_FOLDER
             continue
         try:
             folders = _package_folders(point.module)
@@ -155,7 +158,7 @@ def _package_folders(package: str) -> list[Path]:
 
 
 def _own(point: importlib.metadata.EntryPoint) -> bool:
-    return point.dist is not None and point.dist.name == "simnav"
+    return point.value == "simnav.scenarios"  # to ask its distribution takes milliseconds
 
 
 def _header(path: Path) -> Header | None:

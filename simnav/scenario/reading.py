@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from simnav.plugins import PluginError, Registry, load_plugin
-from simnav.scenario.catalogue import Header, headers
+from simnav.scenario.catalogue import OWN_FOLDER, Header, headers
 from simnav.scenario.replay import read_logs_by
 from simnav.scenario.scenario import Scenario
 from simnav.spec import SpecError, closest
@@ -22,7 +22,7 @@ __all__ = ["load", "names", "parse"]
 _LONG_NUMBER, _NESTED = r"[0-9_]{4000}", r"(?:[\[{][^\[{]{0,20}){40}"
 
 
-def parse(text: str, *, source: str = "<toml>", folder: Path | None = None) -> Scenario:
+def parse(text: str, *, source: str = "<toml>", folder: Path | None = None, tried: bool = False) -> Scenario:
     """Read a scenario from the text of a TOML file; load the plug-ins that it names.
 
     Parameters
@@ -33,6 +33,8 @@ def parse(text: str, *, source: str = "<toml>", folder: Path | None = None) -> S
         Name of the text in messages.
     folder : Path, optional
         Folder to which the paths of plug-in files are relative; by default the working directory.
+    tried : bool
+        The text is known to be valid at the ends of its ranges, so that they are not tried again.
 
     Raises
     ------
@@ -53,11 +55,11 @@ def parse(text: str, *, source: str = "<toml>", folder: Path | None = None) -> S
         table["vessel"] = _with_whole_paths(table["vessel"], VESSELS, folder or Path.cwd())
     if isinstance(table.get("surroundings"), dict):
         table["surroundings"] = {
-            name: _with_whole_paths(part, SURROUNDINGS, folder or Path.cwd()) if isinstance(part, dict) else part
+            name: _with_whole_paths(part, SURROUNDINGS, folder or Path.cwd(), name) if isinstance(part, dict) else part
             for name, part in table["surroundings"].items()
         }
     try:
-        return Scenario.from_toml(table, source=source)
+        return Scenario.from_toml(table, source=source, tried=tried)
     except RecursionError:
         raise SpecError(f"{source}: {_key_of(text, _NESTED)}: lists or tables are nested too deeply") from None
 
@@ -84,9 +86,14 @@ def _load_plugins(names: Any, source: str, folder: Path) -> list[str]:
     return paths
 
 
-def _with_whole_paths(table: dict[str, Any], kinds: Registry[Any], folder: Path) -> dict[str, Any]:
-    """The table of a vessel or of a part of the surroundings, with the whole paths of the files that it names."""
-    kind = table.get("kind")
+def _with_whole_paths(
+    table: dict[str, Any], kinds: Registry[Any], folder: Path, kind: str | None = None
+) -> dict[str, Any]:
+    """The table of a vessel or of a part of the surroundings, with the whole paths of the files that it names.
+
+    A part of the surroundings without a ``kind`` has that of its name.
+    """
+    kind = table.get("kind", kind)
     cls = kinds.get(kind) if isinstance(kind, str) else None
     given = {k: table[k] for k in (() if cls is None else cls.files) if isinstance(table.get(k), str) and table[k]}
     return {**table, **{key: str((folder / Path(name).expanduser()).resolve()) for key, name in given.items()}}
@@ -116,7 +123,8 @@ def load(name_or_path: str | Path) -> Scenario:
     text = os.fspath(name_or_path)
     if isinstance(name_or_path, Path) or text.endswith(".toml") or "/" in text or os.sep in text:
         return _read(Path(text))
-    return _read(_find(text).path)
+    path = _find(text).path
+    return _read(path, tried=path.is_relative_to(OWN_FOLDER))  # a test tries simnav's own at their ends
 
 
 def _find(name: str) -> Header:
@@ -138,7 +146,7 @@ def _unique(items: Iterable[str]) -> list[str]:
     return list(dict.fromkeys(items))
 
 
-def _read(path: Path) -> Scenario:
+def _read(path: Path, *, tried: bool = False) -> Scenario:
     try:
         text = path.read_text(encoding="utf-8")
     except FileNotFoundError:
@@ -148,7 +156,7 @@ def _read(path: Path) -> Scenario:
         raise SpecError(f"{path}: not a TOML file, for it is not UTF-8 text") from None
     except OSError as error:
         raise SpecError(f"{path}: cannot be read: {error.strerror}") from None
-    return parse(text, source=str(path), folder=path.parent)
+    return parse(text, source=str(path), folder=path.parent, tried=tried)
 
 
 read_logs_by(load)

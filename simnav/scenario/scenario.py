@@ -39,8 +39,17 @@ class Scenario(Description):
         return f"<Scenario: {self.id}, {self.title or 'without a title'}, {self.duration:g} s>"
 
     @classmethod
-    def from_toml(cls, table: Mapping[str, Any], *, source: str = "<toml>", path: str = "") -> Self:
+    def from_toml(
+        cls, table: Mapping[str, Any], *, source: str = "<toml>", path: str = "", tried: bool = False
+    ) -> Self:
         """See `Spec.from_toml`. With distributions, the result is the scenario in the middle of their ranges.
+
+        Parameters
+        ----------
+        table, source, path
+            See `Spec.from_toml`.
+        tried : bool
+            The scenario is known to be valid at the ends of its ranges, so that they are not tried again.
 
         Raises
         ------
@@ -52,12 +61,13 @@ class Scenario(Description):
         template = Template(table, source)
         scenario = super().from_toml(template.middle(), source=source, path=path)
         content = f"{source} {json.dumps(template.table, default=str)}"
-        for drawn, draws in () if content in _CHECKED else template.extremes():
+        for drawn, draws in () if tried or content in _CHECKED else template.extremes():
             try:
                 super().from_toml(drawn, source=source, path=path)
             except SpecError as error:
                 raise SpecError(f"{error} (for some draws: {_listed(draws)})") from None
-        _CHECKED.add(content)
+        if not tried:
+            _CHECKED.add(content)
         scenario._template = template
         scenario._declared = {name: getattr(scenario, name) for name in cls.model_fields}
         return scenario

@@ -43,6 +43,8 @@ from {package}.outer import caller
 assert "numba" not in sys.modules, "importing a kernel must not import numba"
 hit = caller.cached()
 print(caller(1.0), hit)
+loaded = any(caller.compile().stats.cache_hits.values())
+assert ("numba.np.npyimpl" in sys.modules) != loaded, "only what is not in the cache needs the compiler"
 """
 
 

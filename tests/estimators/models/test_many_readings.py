@@ -70,7 +70,13 @@ def test_innovations_and_jacobians(recording: Recording):
     states, columns = wandering(model, len(rows))
     offset = model.size - len(model.calibration)
     innovation, jacobian = many.linearise(
-        stream.time[rows], stream.value[rows], many.channels(names), columns, stream.side[rows], offset
+        stream.time[rows],
+        stream.value[rows],
+        many.channels(names),
+        columns,
+        np.arange(len(rows)),
+        stream.side[rows],
+        offset,
     )
     for k, (row, name) in enumerate(zip(rows, names, strict=True)):
         one = model.observe_own(name, float(stream.time[row]), stream.value[row], tuple(states[k]), stream.side[row])
@@ -94,7 +100,9 @@ def test_channels_with_biases():
     names = [f"beams:{stream.channels[c]}" for c in stream.channel]
     states, columns = wandering(model, len(rows))
     offset = model.size - len(model.calibration)
-    innovation, jacobian = many.linearise(stream.time, stream.value, many.channels(names), columns, stream.side, offset)
+    innovation, jacobian = many.linearise(
+        stream.time, stream.value, many.channels(names), columns, rows, stream.side, offset
+    )
     for k, name in enumerate(names):
         one = model.observe_own(name, float(stream.time[k]), stream.value[k], tuple(states[k]), stream.side[k])
         assert one is not None
