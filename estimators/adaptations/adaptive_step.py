@@ -13,7 +13,7 @@ from typing import TypeAlias
 import numpy as np
 
 from simnav.compiled import kernel
-from simnav.estimators.models.base import INNOVATION, NIS, REPORT, SIGMA, StepRule
+from simnav.estimators.models.base import INNOVATION, NIS, REPORT, RESULTS, SIGMA, StepRule
 from simnav.estimators.models.inertial_step import STEP, AidTable, Measured
 from simnav.estimators.models.inertial_update import absorb_inertial, innovate_inertial
 from simnav.estimators.models.propagation import Moving, Samples, propagate_inertial
@@ -21,7 +21,7 @@ from simnav.types import Array, Flags, Integers
 
 from .correntropy import correntropy_rule
 from .innovation_based import innovation_noise
-from .noise import EstimatedNoise, NoiseAdaptation
+from .noise import EstimatedNoise, NoiseAdaptation, copied
 from .prediction import IS_WRONG, judge_prediction
 from .robust import huber_noise, igg3_noise
 from .sage_husa import sage_husa_noise
@@ -50,17 +50,16 @@ def _choose(i: int, row: int, rule: Rule, innovation: Array, predicted: Array, n
     """Write the noise of a measurement into ``used``; what the rule reports, 0 if it was not asked."""
     code, _, estimated, last, settings, first, memory = rule
     m = innovation.size
-    if last[row, 0] == 0.0:  # the first measurement
-        last[row, : m * m] = nominal.ravel()
+    copied(nominal, used)
     if not estimated[row]:
-        used[:] = nominal
         return 0.0
     before, trace = 0.0, 0.0
     for a in range(m):
-        before += last[row, a * (m + 1)]
+        before += last[row, a * (m + 1)] if last[row, 0] > 0.0 else nominal[a, a]
         trace += predicted[a, a]
     if trace > before and code < WEIGHTS:
-        used[:] = last[row, : m * m].reshape((m, m))
+        for a in range(m * m):
+            used[a // m, a % m] = last[row, a] if last[row, 0] > 0.0 else nominal[a // m, a % m]
         return 0.0
     own = memory[first[i] : first[i + 1]]
     if code == 0:
@@ -79,20 +78,20 @@ def _choose(i: int, row: int, rule: Rule, innovation: Array, predicted: Array, n
 
 
 @kernel(
-    f"i8({STEP}, Tuple((i8, i8[::1], b1[::1], f8[:, ::1], f8[:, ::1], i8[::1], f8[::1])), "
-    "Tuple((b1, f8[::1], Tuple((i8[:, ::1], f8[::1], b1[:, ::1])), f8[:, ::1])))"
+    f"i8({STEP}, Tuple((Tuple((i8, i8[::1], b1[::1], f8[:, ::1], f8[:, ::1], i8[::1], f8[::1])), "
+    "Tuple((b1, f8[::1], Tuple((i8[:, ::1], f8[::1], b1[:, ::1])), f8[:, ::1])))))"
 )
 def adapt_inertial(
     state: Moving, samples: Samples, start: int, until: float, noise: Array, matrices: tuple[Array, Array, Array],
-    others: tuple[Array, Array, Array, Array], aids: AidTable, measured: Measured, rule: Rule, test: Test,
+    others: tuple[Array, Array, Array, Array], packet: tuple[AidTable, Measured], choice: tuple[Rule, Test],
 ) -> int:  # fmt: skip
     """Do what `simnav.estimators.models.inertial_step.filter_inertial` does, with an estimated noise.
 
     Parameters
     ----------
-    state, samples, start, until, noise, matrices, others, aids, measured
+    state, samples, start, until, noise, matrices, others, packet
         As of `filter_inertial`; ``start`` is its ``first``. A row of results is that of `StepRule`.
-    rule, test : tuples
+    choice : tuple of tuples
         The rule, and the test of the prediction, see `Rule`.
 
     Returns
@@ -100,22 +99,26 @@ def adapt_inertial(
     int
         Index of the first sample that is not completely used.
     """
-    codes, arms, noises = aids
-    which, times, values, results = measured
+    (codes, arms, noises), (which, times, values, results) = packet
+    rule, test = choice
     position, velocity, dcm, _, bias, _, clock = state
     calibration, rate, density, correction = others
     calibrated, covariance = (calibration, rate, density), matrices[2]
     now = position, velocity, dcm, clock[12:15], bias, calibration
     index, last = rule[1], rule[3]
     tests, settings, known, memory = test
-    for k in range(which.size):
-        time, row = min(times[k], until), which[k]
+    for k in range(which.size + 1):
+        time = min(times[k], until) if k < which.size else until
         if time > clock[0]:
             start = propagate_inertial(state, samples, start, time, noise, matrices, calibrated, time - clock[0])
+        if k == which.size:
+            break
+        row = which[k]
         code, d, bias_at, scale_at = codes[row, 0], codes[row, 1], codes[row, 2], codes[row, 3]
         innovation, cross, predicted = np.empty(d), np.empty((covariance.shape[0], d)), np.empty((d, d))
         nominal, used, result = noises[row, : d * d].reshape((d, d)), np.empty((d, d)), results[k]
-        result[:] = 0.0
+        for a in range(RESULTS):
+            result[a] = 0.0
         result[NIS], result[SIGMA] = -1.0, nan
         if not innovate_inertial(
             (code, arms[row], bias_at, scale_at), values[k, :d], now, covariance, innovation, cross, predicted
@@ -125,23 +128,20 @@ def adapt_inertial(
         for a in range(d):
             noisy = noisy and nominal[a, a] > 0.0
         i = index[row]
-        if not noisy:
-            used[:] = nominal
-        else:
-            if tests and judge_prediction(
-                innovation, predicted, nominal, i, times[k], settings, known, memory
-            ) & IS_WRONG:  # fmt: skip
-                used[:] = nominal
-            else:
+        copied(nominal, used)
+        if noisy:
+            said = (
+                judge_prediction(innovation, predicted, nominal, i, times[k], settings, known, memory) if tests else 0
+            )
+            if said & IS_WRONG == 0:
                 result[REPORT] = _choose(i, row, rule, innovation, predicted, nominal, used)
-            last[row, : d * d] = used.ravel()
+            for a in range(d * d):
+                last[row, a] = used[a // d, a % d]
             for a in range(d):
                 result[SIGMA + a] = sqrt(used[a, a])
         for a in range(d):
             result[INNOVATION + a] = innovation[a]
         result[NIS] = absorb_inertial(covariance, cross, predicted, used, innovation, now, correction)
-    if until > clock[0]:
-        start = propagate_inertial(state, samples, start, until, noise, matrices, calibrated, until - clock[0])
     return start
 
 
@@ -166,4 +166,4 @@ class CompiledRules:
         estimated = np.array([own.in_scope(own.instruments[name].kind) for name in names], bool)
         last = np.zeros((len(names), 9))
         rule = RULES.index(own.rule), index, estimated, last, own.rule_settings, own.rule_first, own.rule_memory
-        return StepRule(adapt_inertial, (rule, own.prediction.arrays))
+        return StepRule(adapt_inertial, ((rule, own.prediction.arrays),))

@@ -12,7 +12,7 @@ from simnav.compiled import kernel
 from simnav.types import Array
 
 from .base import Innovation
-from .noise import RULE, EstimatedNoise, Scope, bound, posterior
+from .noise import RULE, EstimatedNoise, Scope, bound, copied, posterior
 
 __all__ = ["FixedWindow", "InnovationBased", "adaptive_window", "innovation_noise"]
 
@@ -135,7 +135,8 @@ COUNT, BEGUN, ESTIMATE, ROWS = 0, 1, 2, 11
 @kernel()
 def _rows(settings: Array, memory: Array, m: int) -> Array:
     """The ring buffer in the memory."""
-    return memory[ROWS:].reshape((int(settings[LONGEST]), m + 3 * m * m))
+    count, width = int(settings[LONGEST]), m + 3 * m * m
+    return memory[ROWS : ROWS + count * width].reshape((count, width))
 
 
 @kernel("void(f8[::1], f8[::1], f8[::1], f8[:, ::1], f8[:, ::1])")
@@ -173,8 +174,9 @@ def innovation_noise(
         Length of the window; its negative if the innovations contradict the nominal noise.
     """
     m = innovation.size
+    rows = _rows(settings, memory, m)
     if settings[RESIDUAL] == 0.0:
-        _push(_rows(settings, memory, m), int(memory[COUNT]), innovation, innovation, 1.0, predicted)
+        _push(rows, int(memory[COUNT]), innovation, innovation, 1.0, predicted)
         memory[COUNT] += 1.0
     forgetting = settings[FORGETTING]
     if memory[BEGUN] == 0.0:
@@ -182,7 +184,7 @@ def innovation_noise(
     estimate = memory[ESTIMATE : ESTIMATE + m * m].reshape((m, m))
     shortest, longest = int(settings[SHORTEST]), int(settings[LONGEST])
     length = _average(
-        _rows(settings, memory, m), int(memory[COUNT]), predicted, nominal,
+        rows, int(memory[COUNT]), predicted, nominal,
         (shortest, longest, settings[LOW], settings[HIGH]), settings[NEWEST] > 0.0, forgetting, estimate,
     )  # fmt: skip
     place = LIMITS if length == shortest else LIMITS + 4 if length == longest else LIMITS + 2
@@ -190,7 +192,7 @@ def innovation_noise(
     if contradicted:
         bound(estimate, nominal, settings[LOWEST], settings[HIGHEST], noise)
     else:
-        noise[:] = nominal
+        copied(nominal, noise)
     if settings[RESIDUAL] > 0.0 and settings[FULL] == 0.0:
         _remember(settings, memory, innovation, predicted, noise)
     return -float(length) if contradicted else float(length)

@@ -18,7 +18,7 @@ from .base import Adaptation, Innovation
 from .prediction import PredictionTest
 
 __all__ = [
-    "RULE", "EstimatedNoise", "NoiseAdaptation", "Posterior", "Scope", "bound", "normalised_square", "posterior",
+    "RULE", "EstimatedNoise", "NoiseAdaptation", "Posterior", "Scope", "bound", "copied", "normalised_square", "posterior",
     "scale", "scaled",
 ]  # fmt: skip
 
@@ -90,6 +90,14 @@ def bound(estimate: Array, nominal: Array, low: float, high: float, bounded: Arr
             bounded[i, j] = bounded[j, i] = nominal[i, j] * bounded[i, i] * bounded[j, j]
     for i in range(nominal.shape[0]):
         bounded[i, i] *= nominal[i, i] * bounded[i, i]
+
+
+@kernel()
+def copied(noise: Array, used: Array) -> None:
+    """Copy an (m, m) array into another; a slice would take seconds to compile."""
+    for i in range(noise.shape[0]):
+        for j in range(noise.shape[0]):
+            used[i, j] = noise[i, j]
 
 
 @kernel("UniTuple(f8, 3)(f8[:, ::1])")

@@ -9,7 +9,7 @@ from simnav.compiled import kernel
 from simnav.types import Array
 
 from .base import Innovation
-from .noise import RULE, NoiseAdaptation, scale, scaled
+from .noise import RULE, NoiseAdaptation, copied, scale, scaled
 from .prediction import standardised
 
 __all__ = ["EquivalentWeights", "HuberWeights", "Igg3Weights", "huber", "huber_noise", "igg3", "igg3_noise"]
@@ -58,7 +58,7 @@ def _weigh(w0: float, w1: float, w2: float, smallest: float, nominal: Array, noi
     """Divide a noise by the weights of up to three components; the least, which is the weight of the largest one."""
     least = max(min(w0, w1, w2), smallest)
     if least == 1.0:
-        noise[:] = nominal
+        copied(nominal, noise)
     else:
         scale(nominal, 1.0 / max(w0, smallest), 1.0 / max(w1, smallest), 1.0 / max(w2, smallest), noise)
     return least

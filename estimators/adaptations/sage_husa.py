@@ -8,7 +8,7 @@ from simnav.compiled import kernel
 from simnav.types import Array
 
 from .base import Innovation
-from .noise import RULE, EstimatedNoise, Scope, bound
+from .noise import RULE, EstimatedNoise, Scope, bound, copied
 
 __all__ = ["SageHusa", "sage_husa_noise"]
 
@@ -28,7 +28,7 @@ def sage_husa_noise(
     estimate = memory[ESTIMATE : ESTIMATE + m * m].reshape((m, m))
     if memory[BEGUN] == 0.0:
         memory[BEGUN] = 1.0
-        estimate[:] = nominal
+        copied(nominal, estimate)
     memory[COUNT] += 1.0
     b, k = settings[FADING], memory[COUNT]
     d = 1.0 / (k + 1.0) if b == 1.0 else (1.0 - b) / (1.0 - b ** (k + 1.0))
@@ -97,4 +97,8 @@ class SageHusa(EstimatedNoise):
         settings, memory = self.memory_of(innovation.measurement.instrument)
         noise = np.empty_like(nominal)
         sage_husa_noise(settings, memory, residual, predicted, nominal, noise)
-        return self.bounded(memory[ESTIMATE:].reshape(nominal.shape), nominal) if self.full else noise
+        return (
+            self.bounded(memory[ESTIMATE : ESTIMATE + nominal.size].reshape(nominal.shape), nominal)
+            if self.full
+            else noise
+        )

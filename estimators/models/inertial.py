@@ -482,7 +482,7 @@ class InertialModel(ErrorModel):
         self._first = rule.kernel.unchecked(
             (self.position, self.velocity, self.dcm, self._memory, self.bias, self._turn, self._clock), self._samples,
             self._first, until, self._noise, (self.transition, self.process_noise, covariance),
-            (self.calibration, self._decay, self._density, correction), self._packet.aids, measured,
+            (self.calibration, self._decay, self._density, correction), (self._packet.aids, measured),
             *rule.arrays,
         )  # fmt: skip
         self.time = float(self._clock[0])

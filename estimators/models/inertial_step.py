@@ -27,14 +27,14 @@ Measured: TypeAlias = tuple[Integers, Array, Array, Array]
 #: Types of the arguments of `filter_inertial`.
 STEP = (
     f"{MOVING}, {SAMPLES}, i8, f8, f8[::1], UniTuple(f8[:, ::1], 3), UniTuple(f8[::1], 4), "
-    "Tuple((i8[:, ::1], f8[:, ::1], f8[:, ::1])), Tuple((i8[::1], f8[::1], f8[:, ::1], f8[:, ::1]))"
+    "Tuple((Tuple((i8[:, ::1], f8[:, ::1], f8[:, ::1])), Tuple((i8[::1], f8[::1], f8[:, ::1], f8[:, ::1]))))"
 )
 
 
 @kernel(f"i8({STEP})")
 def filter_inertial(
     state: Moving, samples: Samples, first: int, until: float, noise: Array, matrices: tuple[Array, Array, Array],
-    others: tuple[Array, Array, Array, Array], aids: AidTable, measured: Measured,
+    others: tuple[Array, Array, Array, Array], packet: tuple[AidTable, Measured],
 ) -> int:  # fmt: skip
     """Do `propagate_inertial` and `assimilate_inertial` for each measurement of a step, and propagate to its end.
 
@@ -46,33 +46,31 @@ def filter_inertial(
         End of the step [s].
     others : tuple of arrays
         As of `propagate_inertial`; and the correction (n,), overwritten with that by the last measurement.
-    aids : tuple of arrays
-        The instruments, see `AidTable`.
-    measured : tuple of arrays
-        The measurements, see `Measured`.
+    packet : tuple of tuples
+        The instruments and the measurements, see `AidTable` and `Measured`.
 
     Returns
     -------
     int
         Index of the first sample that is not completely used.
     """
-    codes, arms, noises = aids
-    which, times, values, results = measured
+    (codes, arms, noises), (which, times, values, results) = packet
     position, velocity, dcm, _, bias, _, clock = state
     calibration, rate, density, correction = others
     calibrated, covariance = (calibration, rate, density), matrices[2]
     now = position, velocity, dcm, clock[12:15], bias, calibration
-    for k in range(which.size):
-        time, row = min(times[k], until), which[k]
+    for k in range(which.size + 1):
+        time = min(times[k], until) if k < which.size else until
         if time > clock[0]:
             first = propagate_inertial(state, samples, first, time, noise, matrices, calibrated, time - clock[0])
+        if k == which.size:
+            break
+        row = which[k]
         code, d, bias_at, scale_at = codes[row, 0], codes[row, 1], codes[row, 2], codes[row, 3]
         results[k, 0], results[k, 1] = assimilate_inertial(
             (code, arms[row], bias_at, scale_at), values[k, :d], now, covariance,
             noises[row, : d * d].reshape((d, d)), correction,
         )  # fmt: skip
-    if until > clock[0]:
-        first = propagate_inertial(state, samples, first, until, noise, matrices, calibrated, until - clock[0])
     return first
 
 
