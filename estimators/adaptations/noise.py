@@ -18,8 +18,8 @@ from .base import Adaptation, Innovation
 from .prediction import PredictionTest
 
 __all__ = [
-    "RULE", "EstimatedNoise", "NoiseAdaptation", "Posterior", "Scope", "bound", "copied", "normalised_square", "posterior",
-    "scale", "scaled",
+    "RULE", "EstimatedNoise", "NoiseAdaptation", "Posterior", "Scope", "bound", "copied", "normalised_square",
+    "posterior", "scale", "scaled",
 ]  # fmt: skip
 
 #: Signature of a kernel that estimates a noise, from settings and memory of an instrument (which it updates),
