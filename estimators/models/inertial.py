@@ -276,6 +276,12 @@ class InertialModel(ErrorModel):
         self.delayed = any(is_delayed(sheet) for sheet in own)
         self.many = of_instruments(self.own, self.bias_at)
         self._many_of = {name: many for many in self.many for name in many.sources}
+        #: Of these: the noise without that of the datasheet, and a unit matrix.
+        self._beyond: dict[str, tuple[Array, Array]] = {}
+        for name in self._many_of:
+            sigma = self.instruments[name].sigma
+            unit = np.eye(len(sigma))
+            self._beyond[name] = self.noise[name] - sigma**2 * unit, unit
         self._fused = set(self.noise) - self.uncalibrated - set(self.own) if self.fused else set()
 
     def _more_blocks(self) -> None:
@@ -497,9 +503,8 @@ class InertialModel(ErrorModel):
         many = self._many_of.get(names[0])
         if many is None or many.biased or many.has_noise or not self.fused:
             return None
-        k, side, sheet = len(names), np.array(sides), self.instruments[names[0]]
-        unit = np.eye(len(sheet.sigma))
-        noise = self.noise[names[0]] - sheet.sigma**2 * unit + many.noise(side)[:, :, None] * unit
+        k, side, (beyond, unit) = len(names), np.array(sides), self._beyond[names[0]]
+        noise = beyond + many.noise(side)[:, :, None] * unit
         residual, jacobian = many.linearise(
             np.array(times), np.array(values), many.channels(names), [array[None] for array in self._state()],
             np.zeros(k, dtype=np.intp), side, _NAV,

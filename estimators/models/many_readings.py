@@ -25,7 +25,9 @@ from .own_observation import OwnObservation
 __all__ = ["ManyReadings", "of_instruments"]
 
 
-def of_instruments(own: Mapping[str, OwnObservation], bias_at: Mapping[str, int]) -> list[ManyReadings]:
+def of_instruments(
+    own: Mapping[str, OwnObservation], bias_at: Mapping[str, int], form: type[ManyReadings] | None = None
+) -> list[ManyReadings]:
     """One `ManyReadings` for each instrument with channels whose kind can predict many readings at one time.
 
     Parameters
@@ -34,13 +36,15 @@ def of_instruments(own: Mapping[str, OwnObservation], bias_at: Mapping[str, int]
         The equation of each source of readings, by its name.
     bias_at : mapping of str to int
         Index in the error state of the first bias of a source; sources without one are not in it.
+    form : type, optional
+        The class for the states of the model. Default: `ManyReadings`, for those of an inertial model.
     """
     groups: dict[str, list[str]] = {}
     for name, observation in own.items():
         sheet = observation.sheet
         if isinstance(sheet, ChannelDatasheet) and observation.observations is not None:
             groups.setdefault(sheet.instrument, []).append(name)
-    return [ManyReadings({name: own[name] for name in names}, bias_at) for names in groups.values()]
+    return [(form or ManyReadings)({name: own[name] for name in names}, bias_at) for names in groups.values()]
 
 
 class ManyReadings:
@@ -117,18 +121,16 @@ class ManyReadings:
         jacobian : (n, d, offset + m) array
             Derivative of the prediction by the error state.
         """
-        position, velocity, dcm, rate, bias, calibration = states
-        turning = rate[:, :3] - bias[:, :3] - np.einsum("nji,nj->ni", dcm, earth_rate(position[:, 0]))
-        n, own = len(time), calibration.take(row, axis=0)
-        blocks = {name: np.broadcast_to(zero, (n, zero.shape[1])) for name, zero in self._zeros.items()}
+        own = states[-1].take(row, axis=0)
+        blocks = {name: np.broadcast_to(zero, (len(time), zero.shape[1])) for name, zero in self._zeros.items()}
         for name, at in self._at:
             blocks[name] = own[:, at]
-        places, velocities, dcms, rates = (column.take(row, axis=0) for column in (position, velocity, dcm, turning))
-        points = NavigationPoints(time, places, velocities, dcms, rates, blocks, channel, side)
+        position, velocity, dcm, turning = self._navigation(states, row, own)
+        points = NavigationPoints(time, position, velocity, dcm, turning, blocks, channel, side)
         reading, given = self._observations(points, self._sheet)
-        jacobian = np.empty((n, value.shape[1], offset + own.shape[1])) if out is None else out
+        jacobian = np.empty((len(time), value.shape[1], offset + own.shape[1])) if out is None else out
         jacobian[...] = 0.0
-        jacobian[:, :, :9] = given[NAVIGATION]
+        self._by_navigation(given[NAVIGATION], own, jacobian)
         for name, at in self._at:
             jacobian[:, :, at.start + offset : at.stop + offset] = given[name]
         if self.biased and len(biased := np.flatnonzero(self._bias_at[channel] >= 0)):
@@ -138,6 +140,16 @@ class ManyReadings:
             reading = np.array(reading)
             reading[biased] = self.kind.add_error(reading[biased], own[biased[:, None], columns - offset])
         return innovation_of(self.kind, self._sheet, value, reading), jacobian
+
+    def _navigation(self, states: Sequence[Array], row: NDArray[np.intp], own: Array) -> tuple[Array, ...]:
+        """Position, velocity, DCM and angular rate at each of n readings; ``own`` is the (n, m) calibration there."""
+        position, velocity, dcm, rate, bias, _ = states
+        turning = rate[:, :3] - bias[:, :3] - np.einsum("nji,nj->ni", dcm, earth_rate(position[:, 0]))
+        return tuple(column.take(row, axis=0) for column in (position, velocity, dcm, turning))
+
+    def _by_navigation(self, given: Array, own: Array, jacobian: Array) -> None:
+        """Write the (n, d, 9) derivative by the navigation state into that by the error state."""
+        jacobian[:, :, :9] = given
 
     def more_noise(self, sides: Sequence[Array]) -> Array | None:
         """`OwnObservation.noise_without_state` of n readings.
@@ -179,7 +191,7 @@ class ManyReadings:
         if function is None:
             return np.broadcast_to(self._sheet.sigma**2, shape)
         sigma = np.asarray(function(side, self._sheet), dtype=np.float64)
-        if sigma.shape != shape or not (np.isfinite(sigma).all() and np.all(sigma >= 0.0)):
+        if sigma.shape != shape or not (isfinite(sigma.sum()) and sigma.min() >= 0.0):
             raise ValueError(
                 f"reading_sigma of kind {self._sheet.kind!r}, for the instrument {self._sheet.name!r}, should return "
                 f"an array of shape {shape} for so many readings, finite and not negative, not {sigma.tolist()!r:.200}"

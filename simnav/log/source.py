@@ -195,16 +195,17 @@ class LogSource:
             if self._imu is not None:
                 self._imu, self._imu_labels = layer.apply_imu(self._imu, self._imu_labels)
 
+    def _called(self) -> str:
+        return f"recording {self.recording!r}" if self.recording else "the recording"
+
     def _length(self, wanted: float, available: float) -> float:
         if wanted <= available + TIME_TOLERANCE:
             return float(wanted)
         steps = math.floor(available / self.step + 1e-9)
         if steps < 1:
-            raise LogError(f"recording {self.recording!r}: IMU and reference have only {available:.3f} s in common")
+            raise LogError(f"{self._called()}: IMU and reference have only {available:.3f} s in common")
         length = steps * self.step
-        message = (
-            f"recording {self.recording!r}: the run ends at {length:g} s, where the log does ({wanted:g} s are wanted)"
-        )
+        message = f"{self._called()}: the run ends at {length:g} s, where the log does ({wanted:g} s are wanted)"
         warnings.warn(message, LogWarning, 3)
         return length
 
