@@ -354,7 +354,7 @@ class Chain(ABC):
             instrument=[self._index[m.instrument] for m in measurements], components=noise.shape[1],
             time=[m.time for m in measurements],
         )  # fmt: skip
-        _attach_all(
+        _attach_all.unchecked(
             np.ascontiguousarray(noise, dtype=np.float64), np.array([m.value for m in measurements], dtype=np.float64),
             aids["noise"][-k:], aids["whitener"][-k:], aids["value"][-k:],
         )  # fmt: skip

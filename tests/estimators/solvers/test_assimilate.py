@@ -31,6 +31,10 @@ def test_projection():
     project(P, H, cross, predicted)
     np.testing.assert_allclose(cross, P @ H.T, rtol=1e-13, atol=1e-13)
     np.testing.assert_allclose(predicted, H @ P @ H.T, rtol=1e-13, atol=1e-13)
+    again = np.empty((7, 3)), np.empty((3, 3))
+    project.unchecked(P, H, *again)
+    np.testing.assert_array_equal(again[0], cross)
+    np.testing.assert_array_equal(again[1], predicted)
 
 
 @pytest.mark.parametrize("row", [Ekf, Ekf23])
