@@ -28,40 +28,37 @@ from .persistence import add_innovation, begun, is_correlated, is_large
 __all__ = ["FixTest"]
 
 
-@kernel("i8(f8[::1], f8, f8[::1], UniTuple(f8, 2), f8[:, ::1], UniTuple(f8, 2), UniTuple(f8, 3), f8[::1])")
+@kernel("i8(UniTuple(f8, 3), UniTuple(f8, 3), UniTuple(f8, 2), UniTuple(f8, 4), UniTuple(f8, 3), f8[::1])")
 def _judge(
-    fix: Array, time: float, position: Array, antenna: tuple[float, float], covariance: Array,
-    variance: tuple[float, float], limits: tuple[float, float, float], course: Array,
+    fix: tuple[float, float, float], position: tuple[float, float, float], antenna: tuple[float, float],
+    variances: tuple[float, float, float, float], limits: tuple[float, float, float], course: Array,
 ) -> int:  # fmt: skip
     """Whether the fixes of a receiver are off in one direction; -1 if this one cannot be compared.
 
     Parameters
     ----------
-    fix, time : (3,) array and float
-        Latitude, longitude [rad] and height [m]; time [s].
-    position : (3,) array
-        The estimate.
+    fix : (float, float, float)
+        Time [s]; latitude and longitude [rad].
+    position : (float, float, float)
+        The estimate: latitude, longitude [rad] and height [m].
     antenna : (float, float)
         Where the antenna is, north and east of the estimate [m].
-    covariance : (9, 9) array
-        Covariance of the estimate.
-    variance : (float, float)
-        Variances of a fix, north and east [m^2].
+    variances : (float, float, float, float)
+        Variances of the estimate and of a fix, each north and east [m^2].
     limits : (float, float, float)
         Limit of chi-square for one fix; normal quantiles of a direction, and of too large a distance.
     course : array
         The course of the receiver (`simnav.estimators.persistence`); updated.
     """
     north, east = antenna
-    first, second = variance
     limit, persistent, large = limits
     meridian, prime_vertical = radii_scalar(sin(position[0]))
-    north = (fix[0] - position[0]) * (meridian + position[2]) - north
-    east = (fix[1] - position[1]) * (prime_vertical + position[2]) * cos(position[0]) - east
-    u, v = north / sqrt(covariance[0, 0] + first), east / sqrt(covariance[1, 1] + second)
+    north = (fix[1] - position[0]) * (meridian + position[2]) - north
+    east = (fix[2] - position[1]) * (prime_vertical + position[2]) * cos(position[0]) - east
+    u, v = north / sqrt(variances[0] + variances[2]), east / sqrt(variances[1] + variances[3])
     if not isfinite(u + v):
         return -1
-    add_innovation(course, u, v, 0.0, 2, time, u * u + v * v > limit)
+    add_innovation(course, u, v, 0.0, 2, fix[0], u * u + v * v > limit)
     return 1 if is_correlated(course, persistent) and is_large(course, large) else 0
 
 
@@ -137,7 +134,10 @@ class FixTest:
                 north, east = north + c * forward - s * starboard, east + s * forward + c * starboard
             else:  # it lies in some direction
                 first, second = (v + hypot(forward, starboard) ** 2 for v in (first, second))
-        against = _judge(m.value, m.time, position, (north, east), covariance, (first, second), self._limits, course)
+        fix, variances = m.value.tolist(), (covariance.item(0, 0), covariance.item(1, 1), first, second)
+        against = _judge.unchecked(
+            (m.time, fix[0], fix[1]), tuple(position.tolist()), (north, east), variances, self._limits, course
+        )
         if against >= 0:
             self._against[m.instrument] = self._against[m.instrument] + 1 if against else 0
             self.contradicted = max(self._against.values()) >= self.PATIENCE

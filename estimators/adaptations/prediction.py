@@ -14,7 +14,7 @@ from simnav.types import Array, Flags, Instruments, Integers
 
 from .base import Innovation
 
-__all__ = ["PredictionTest", "standardised"]
+__all__ = ["IS_WRONG", "PredictionTest", "judge_prediction", "standardised"]
 
 
 @kernel("UniTuple(f8, 3)(f8[::1], f8[:, ::1], f8[:, ::1])")
@@ -34,7 +34,7 @@ WRONG, FAILURES, TESTED, CONDEMNED = range(COURSE, COURSE + 4)
 #: Places of the settings: number of joint failures; whether there is an IMU; the normal quantiles of the class; and,
 #: from LIMITS on, the limits of chi-square for 0 to 3 components.
 TOGETHER, INERTIAL, LARGE, PERSISTENT, WHITE, ALONE, RECENT, LIMITS = range(8)
-#: What `_judge` says of an innovation: bits of an integer.
+#: What `judge_prediction` says of an innovation: bits of an integer.
 IS_WRONG, IS_DISTURBED, HAS_PASSED = 1, 2, 4
 
 
@@ -83,7 +83,7 @@ def _persists(
 
 
 @kernel("i8(f8[::1], f8[:, ::1], f8[:, ::1], i8, f8, f8[::1], Tuple((i8[:, ::1], f8[::1], b1[:, ::1])), f8[:, ::1])")
-def _judge(
+def judge_prediction(
     residual: Array, predicted: Array, noise: Array, i: int, time: float, settings: Array,
     known: tuple[Integers, Array, Flags], memory: Array,
 ) -> int:  # fmt: skip
@@ -210,6 +210,11 @@ class PredictionTest:
         self._first: Array | None = None
         self._blamed = 0
 
+    @property
+    def arrays(self) -> tuple[bool, Array, tuple[Integers, Array, Flags], Array]:
+        """Whether a test is made, and the last three arguments of `judge_prediction`."""
+        return self._tests, self._settings, self._known, self._memory
+
     def fails(self, innovation: Innovation) -> bool:
         """Whether the prediction of this innovation is taken as wrong, by one of the tests."""
         self.disturbed = False
@@ -217,7 +222,7 @@ class PredictionTest:
             return False
         m, residual, predicted, noise, *_ = innovation
         i = self._index.get(m.instrument, -1)
-        found = _judge(residual, predicted, noise, i, m.time, self._settings, self._known, self._memory)
+        found = judge_prediction(residual, predicted, noise, i, m.time, self._settings, self._known, self._memory)
         if found & HAS_PASSED:
             self._blamed = 0
         self.disturbed = found & IS_DISTURBED > 0

@@ -50,7 +50,7 @@ from .many_readings import ManyReadings
 __all__ = ["Chain", "chain_of"]
 
 
-@kernel()
+@kernel("void(f8[:, ::1], f8[::1], f8[:, ::1], f8[:, ::1], f8[::1])")
 def _attach(noise: Array, value: Array, full: Array, whitener: Array, values: Array) -> None:
     """Extend the (m, m) noise and the value of a measurement to three components, and compute the whitener."""
     for i in range(3):
@@ -334,7 +334,17 @@ class Chain(ABC):
 
         The noise of the motion between them is added at the first linearisation.
         """
-        self.attach_together([measurement], noise[None])
+        aids, ahead = self.aids, self.ahead > 0.0
+        aids.append(
+            node=self.base + len(self.nodes) - 1, fold=self._fold() if ahead else -1, bare=ahead, weight=1.0,
+            instrument=self._index[measurement.instrument], components=len(noise), time=measurement.time,
+        )  # fmt: skip
+        _attach(
+            np.ascontiguousarray(noise, dtype=np.float64), np.ascontiguousarray(measurement.value, dtype=np.float64),
+            aids.newest("noise"), aids.newest("whitener"), aids.newest("value"),
+        )  # fmt: skip
+        if self._sides:
+            aids.newest("side")[: len(measurement.side)] = measurement.side
 
     def attach_together(self, measurements: Sequence[Measurement], noise: Array) -> None:
         """`attach` for k measurements of one time and m components, with their (k, m, m) noise."""

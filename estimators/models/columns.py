@@ -66,8 +66,8 @@ class Columns(dict[str, Any]):
 
     def append_rows(self, count: int, **values: Any) -> None:
         """Add rows with given entries, or one entry for all; what is not given keeps any value."""
-        while self._last + count > self._capacity:
-            self._make_room()
+        if self._last + count > self._capacity:
+            self._make_room(count)
         for name, value in values.items():
             self._columns[name][self._last : self._last + count] = value
         self._last += count
@@ -83,10 +83,11 @@ class Columns(dict[str, Any]):
         self._last -= count
         self.clear()
 
-    def _make_room(self) -> None:
-        """Move the rows to the front; twice the space where they fill more than half of it."""
-        rows = len(self)
-        grown = 2 * self._capacity if 2 * rows > self._capacity else self._capacity
+    def _make_room(self, count: int = 1) -> None:
+        """Move the rows to the front; more space where they fill more than half of it, or more rows do not fit."""
+        rows, grown = len(self), self._capacity
+        while 2 * rows > grown or rows + count > grown:
+            grown *= 2
         for name, column in self._columns.items():
             if grown > self._capacity:
                 new = np.zeros((grown, *column.shape[1:]), column.dtype)

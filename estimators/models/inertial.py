@@ -57,11 +57,11 @@ from simnav.types import (
     Measurement,
 )
 
-from .base import ErrorModel, Linearised, Observation
+from .base import ErrorModel, Linearised, Observation, StepRules
 from .declared_errors import CURRENT, bias_of, bias_of_triad
 from .delayed import is_delayed
 from .equations import EQUATIONS, equation_of
-from .inertial_step import AidTable, Packet, filter_inertial
+from .inertial_step import PLAIN, AidTable, Packet
 from .inertial_update import absorb_inertial, assimilate_inertial, innovate_inertial
 from .levered import is_own, with_lever_arms
 from .many_readings import of_instruments
@@ -276,6 +276,12 @@ class InertialModel(ErrorModel):
         self.delayed = any(is_delayed(sheet) for sheet in own)
         self.many = of_instruments(self.own, self.bias_at)
         self._many_of = {name: many for many in self.many for name in many.sources}
+        #: Of these: the noise without that of the datasheet, and a unit matrix.
+        self._beyond: dict[str, tuple[Array, Array]] = {}
+        for name in self._many_of:
+            sigma = self.instruments[name].sigma
+            unit = np.eye(len(sigma))
+            self._beyond[name] = self.noise[name] - sigma**2 * unit, unit
         self._fused = set(self.noise) - self.uncalibrated - set(self.own) if self.fused else set()
 
     def _more_blocks(self) -> None:
@@ -468,18 +474,22 @@ class InertialModel(ErrorModel):
         return nis, size
 
     def assimilate_step(
-        self, measurements: Sequence[Measurement], until: float, covariance: Array, correction: Array
-    ) -> list[list[float]] | None:
+        self, measurements: Sequence[Measurement], until: float, covariance: Array, correction: Array,
+        rules: StepRules | None = None,
+    ) -> list[list[float]] | None:  # fmt: skip
         """As `ErrorModel.assimilate_step`, in one kernel, if no instrument has an equation or a clock of its own."""
         if self._packet is None:
-            if self._fused != set(self.noise) or self.blocks.clocks:
+            names = list(self.noise)
+            rule = PLAIN if rules is None else rules.step_rule(names)
+            if self._fused != set(names) or self.blocks.clocks or rule is None:
                 return None
-            self._packet = Packet(list(self.noise), self._table(list(self.noise)))
-        measured = self._packet.fill(measurements)
-        self._first = filter_inertial.unchecked(
+            self._packet = Packet(names, self._table(names), rule)
+        measured, rule = self._packet.fill(measurements), self._packet.rule
+        self._first = rule.kernel.unchecked(
             (self.position, self.velocity, self.dcm, self._memory, self.bias, self._turn, self._clock), self._samples,
             self._first, until, self._noise, (self.transition, self.process_noise, covariance),
-            (self.calibration, self._decay, self._density, correction), self._packet.aids, measured,
+            (self.calibration, self._decay, self._density, correction), (self._packet.aids, measured),
+            *rule.arrays,
         )  # fmt: skip
         self.time = float(self._clock[0])
         used: list[list[float]] = measured[3][: len(measurements)].tolist()
@@ -493,9 +503,8 @@ class InertialModel(ErrorModel):
         many = self._many_of.get(names[0])
         if many is None or many.biased or many.has_noise or not self.fused:
             return None
-        k, side, sheet = len(names), np.array(sides), self.instruments[names[0]]
-        unit = np.eye(len(sheet.sigma))
-        noise = self.noise[names[0]] - sheet.sigma**2 * unit + many.noise(side)[:, :, None] * unit
+        k, side, (beyond, unit) = len(names), np.array(sides), self._beyond[names[0]]
+        noise = beyond + many.noise(side)[:, :, None] * unit
         residual, jacobian = many.linearise(
             np.array(times), np.array(values), many.channels(names), [array[None] for array in self._state()],
             np.zeros(k, dtype=np.intp), side, _NAV,

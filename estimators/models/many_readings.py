@@ -191,7 +191,7 @@ class ManyReadings:
         if function is None:
             return np.broadcast_to(self._sheet.sigma**2, shape)
         sigma = np.asarray(function(side, self._sheet), dtype=np.float64)
-        if sigma.shape != shape or not (np.isfinite(sigma).all() and np.all(sigma >= 0.0)):
+        if sigma.shape != shape or not (isfinite(sigma.sum()) and sigma.min() >= 0.0):
             raise ValueError(
                 f"reading_sigma of kind {self._sheet.kind!r}, for the instrument {self._sheet.name!r}, should return "
                 f"an array of shape {shape} for so many readings, finite and not negative, not {sigma.tolist()!r:.200}"

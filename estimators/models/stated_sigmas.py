@@ -15,7 +15,7 @@ import numpy as np
 
 from simnav.types import Array, Instruments, Measurement
 
-from .base import ErrorModel, Linearised, Observation
+from .base import ErrorModel, Linearised, Observation, StepRules
 from .chain import Chain
 
 __all__ = ["with_stated_sigmas"]
@@ -61,9 +61,10 @@ class _Stated(ErrorModel):
         return None if self._states(measurement) else super().assimilate(measurement, covariance, correction)
 
     def assimilate_step(
-        self, measurements: Sequence[Measurement], until: float, covariance: Array, correction: Array
-    ) -> list[list[float]] | None:
-        if any(map(self._states, measurements)):
+        self, measurements: Sequence[Measurement], until: float, covariance: Array, correction: Array,
+        rules: StepRules | None = None,
+    ) -> list[list[float]] | None:  # fmt: skip
+        if rules is not None or any(map(self._states, measurements)):
             return None
         return super().assimilate_step(measurements, until, covariance, correction)
 

@@ -23,10 +23,12 @@ from typing import ClassVar
 
 import numpy as np
 
+from simnav.estimators.adaptations.adaptive_step import CompiledRules
 from simnav.estimators.adaptations.base import Adaptation, Innovation
 from simnav.estimators.adaptations.intersection import weaken_position
+from simnav.estimators.adaptations.noise import NoiseAdaptation
 from simnav.estimators.composition import Solver
-from simnav.estimators.models.base import ErrorModel, Linearised, Observation
+from simnav.estimators.models.base import INNOVATION, NIS, ErrorModel, Linearised, Observation
 from simnav.estimators.models.channels import owners, summary
 from simnav.estimators.models.coupling import by_source
 from simnav.estimators.models.stated_sigmas import with_stated_sigmas
@@ -111,7 +113,10 @@ class KalmanEstimator(Solver):
         self._keys = {name: (f"innovation.{name}", f"nis.{name}") for name in self._names}
         self._blank = dict.fromkeys((label for pair in self._keys.values() for label in pair), np.nan)
         self._plain = self.assimilates and self.adaptation is None and not self._stepwise
-        self._whole = self._plain and self.takes_steps and self.iteration is None and self.smoother is None
+        self._rules = CompiledRules(self.adaptation) if isinstance(self.adaptation, NoiseAdaptation) else None
+        known = self.adaptation is None or self._rules is not None
+        single = self.iteration is not None or self.smoother is not None
+        self._whole = self.assimilates and self.takes_steps and known and not single
         self._linearised: Linearised | None = None
         if self.smoother is not None:
             self.smoother.begin(self.model, [instruments[name] for name in self._names])
@@ -245,11 +250,18 @@ class KalmanEstimator(Solver):
         self, measurements: Sequence[Measurement], until: float, diagnostics: dict[str, float | Array]
     ) -> bool:
         """Use the measurements of a step, and propagate to its end; False if they have to be taken one by one."""
-        used = self.model.assimilate_step(measurements, until, self.covariance, self._correction)
+        rules = self._rules
+        used = self.model.assimilate_step(measurements, until, self.covariance, self._correction, rules)
         if used is None:
+            self._whole = self._whole and rules is None  # otherwise it is so for the run
             return False
-        for m, (nis, size) in zip(measurements, used, strict=True):
-            self._note(m, nis, size, diagnostics)
+        if rules is None:
+            for m, row in zip(measurements, used, strict=True):
+                self._note(m, row[0], row[1], diagnostics)
+            return True
+        for m, row in zip(measurements, used, strict=True):
+            rules.adaptation.noted(m.instrument, row)
+            self._note(m, row[NIS], hypot(*row[INNOVATION : INNOVATION + len(m.value)]), diagnostics)
         return True
 
     def _take_together(self, group: Sequence[Measurement], diagnostics: dict[str, float | Array]) -> bool:

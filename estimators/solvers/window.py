@@ -206,13 +206,15 @@ class WindowEstimator(LooksBack, Solver):
         attached = 0
         samples = measurements.imu.time if self.every_sample and measurements.imu is not None else np.empty(0)
         admitted = self._admission.admit(measurements, chain.time)
-        for group in together(admitted, self._owners):
+        plain = self.adaptation is None and bool(self._owners)
+        for group in together(admitted, self._owners) if plain else [[m] for m in admitted]:
             self._advance(min(group[0].time, measurements.time), samples)
             last = group[0].time == admitted[-1].time
-            if len(group) == 1 or self.adaptation is not None or not self._take_together(group, last):
-                attached += sum([self._take(m, last, diagnostics, flagged) for m in group])
-            else:
+            if len(group) > 1 and self._take_together(group, last):
                 attached += len(group)
+                continue
+            for m in group:
+                attached += self._take(m, last, diagnostics, flagged)
         if attached:
             self._optimise(attached, diagnostics, flagged)
             self._marginalise()

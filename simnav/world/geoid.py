@@ -10,7 +10,6 @@ NASA/TP-1998-206861; PROJ interpolates linearly between the nodes, for EGM96 on 
 
 from __future__ import annotations
 
-import hashlib
 import os
 from functools import lru_cache
 from math import degrees
@@ -52,13 +51,13 @@ class Geoid:
 
     Attributes
     ----------
-    digest : str
-        Of the content of the grid.
+    path : Path
+        The grid.
     """
 
     def __init__(self, path: Path):
         pyproj = _library(path)
-        self.path, self.digest = path, hashlib.blake2b(path.read_bytes(), digest_size=16).hexdigest()
+        self.path = path
         try:
             self._shift = pyproj.Transformer.from_pipeline(f'+proj=vgridshift +grids="{path}" +multiplier=1')
         except pyproj.exceptions.ProjError:

@@ -15,10 +15,17 @@ of a geoid model at the place, such as EGM2008.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
-from pydantic import BeforeValidator, SerializerFunctionWrapHandler, model_serializer, model_validator
+from pydantic import (
+    BeforeValidator,
+    SerializerFunctionWrapHandler,
+    field_validator,
+    model_serializer,
+    model_validator,
+)
 
 from simnav.geometry.earth import relative_position
 from simnav.spec import Positive, quantity, register_unit, without_later
@@ -67,6 +74,7 @@ class WaterLevel(SurroundingSpec):
     """
 
     files: ClassVar[tuple[str, ...]] = ("geoid_grid",)
+    later: ClassVar[Mapping[str, Any]] = {"geoid_grid": ""}
 
     kind: Literal["water_level"] = "water_level"
     geoid: float = quantity("m", 0.0)
@@ -88,19 +96,22 @@ class WaterLevel(SurroundingSpec):
             )
         if any(not period > 0.0 for period in self.tide_period):
             raise ValueError(f"tide_period_h = {[p / 3600.0 for p in self.tide_period]}: periods are greater than 0")
-        if self.geoid_grid:
-            if {"geoid", "geoid_slope"} & self.model_fields_set:
-                raise ValueError(
-                    f"geoid_grid = {self.geoid_grid!r} has the undulations; geoid_m and geoid_slope_mm_km go without"
-                )
-            read_geoid(self.geoid_grid)  # an error of the file is one of the scenario
+        if self.geoid_grid and {"geoid", "geoid_slope"} & self.model_fields_set:
+            raise ValueError(
+                f"geoid_grid = {self.geoid_grid!r} has the undulations; geoid_m and geoid_slope_mm_km go without"
+            )
         return self
 
+    @field_validator("geoid_grid")
+    @classmethod
+    def _found(cls, name: str) -> str:
+        """Where the grid is: an error of the file is one of the scenario."""
+        return str(read_geoid(name).path) if name else name
+
     @model_serializer(mode="wrap")
-    def _with_content(self, serialize: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """The digest of a scenario changes with the content of its grid."""
-        table = without_later(serialize(self), {"geoid_grid": ""})
-        return table | {"content": read_geoid(self.geoid_grid).digest} if self.geoid_grid else table
+    def _without_later(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """See `simnav.spec.without_later`."""
+        return without_later(handler(self), self.later)
 
     def check(self, name: str, start: Start | None) -> None:
         """See `SurroundingSpec.check`."""

@@ -7,7 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from simnav.estimator import make
+from simnav.estimators.adaptations.adaptive_step import CompiledRules
 from simnav.estimators.adaptations.base import Adaptation
+from simnav.estimators.adaptations.sage_husa import SageHusa
 from simnav.estimators.algebra.joseph import project
 from simnav.estimators.composition import Row
 from simnav.estimators.models.inertial import InertialModel
@@ -62,25 +65,49 @@ def counted(model, name: str) -> list[int]:
     return times
 
 
-def test_a_step_in_one_call_has_the_same_bits(recording_of):
-    """Readings between the samples of the IMU, two at one time, more of them than before, none, and no IMU."""
-    recording = recording_of(2, 30.0)
-    whole, single = Ekf(), Ekf()
+ADAPTIVE = ("iae", "rae", "sage-husa", "vb-akf", "huber-kf", "igg3", "mckf", "student-t")
+
+
+@pytest.mark.parametrize("row", ["ekf", *ADAPTIVE])
+def test_a_step_in_one_call_has_the_same_bits(recording_of, row: str):
+    """Readings between the samples of the IMU, two at one time, many of them, wrong ones, none, and no IMU."""
+    recording = recording_of(2, 40.0)
+    whole, single = make(row), make(row)
     single.solver.takes_steps = False
     for estimator in (whole, single):
         estimator.reset(recording.start, recording.instruments)
-    times, rng = counted(whole.model, "assimilate_step"), np.random.default_rng(3)
+    times, rng, used = counted(whole.model, "assimilate_step"), np.random.default_rng(3), set()
     for k, packet in enumerate(recording.steps()):
         aids = [m for _ in range(4) for m in packet.aids] if k % 5 == 1 else packet.aids if k % 5 else []
         late = sorted(min(m.time, packet.time - rng.uniform(0.0, 0.9)) for m in aids)
         aids = [m._replace(time=time) for m, time in zip(aids, late, strict=True)]
+        if k % 4 == 2:
+            aids = [m._replace(value=m.value + 1e-5 * rng.standard_normal(len(m.value))) for m in aids]
         packet = replace(packet, aids=aids, imu=None if k % 7 == 3 else packet.imu)
         a, b = whole.update(packet), single.update(packet)
         np.testing.assert_equal(a.diagnostics, b.diagnostics)
         for state in (*whole.model.state, *whole.model.memory):
             np.testing.assert_array_equal(getattr(whole.model, state), getattr(single.model, state))
         np.testing.assert_array_equal(whole.covariance, single.covariance)
-    assert times[0] == 30
+        used.add(tuple(value for name, value in a.diagnostics.items() if name.startswith("sigma_")))
+    assert times[0] == 40
+    assert (len(used) > 5) == (row in ADAPTIVE)
+
+
+def test_an_adaptation_that_chooses_in_its_own_way_is_asked(recording_of, run_over):
+    asked = []
+
+    class Own(SageHusa):
+        def estimate(self, innovation):
+            asked.append(innovation)
+            return super().estimate(innovation)
+
+    run_over(KalmanEstimator(InertialModel(), Own()), recording_of(2, 5.0))
+    assert asked
+    assert Own.rule is None is not SageHusa.rule
+    rules = CompiledRules(SageHusa(full=True))
+    rules.adaptation.reset(recording_of(2, 5.0).instruments)
+    assert rules.step_rule(list(recording_of(2, 5.0).instruments)) is None  # NumPy bounds a full matrix
 
 
 @pytest.mark.parametrize("hook", ["_observe", "_absorb"])
