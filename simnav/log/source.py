@@ -178,6 +178,13 @@ class LogSource:
         if heading is None and scenario.initial_error.attitude[2] >= _UNKNOWN_HEADING:
             heading = 0.0, "unknown"
         true_start, made = _start(reference, self.initial_truth, imu, begin, heading)
+        if "heading (unknown)" in made:
+            warnings.warn(
+                f"{self._called()}: the heading at the start is unknown; only estimators that search it can use such a "
+                "start, as their lines in 'simnav list estimators' say; the others take it as nearly known",
+                LogWarning,
+                2,
+            )
         if made:
             notes.append(f"start {' and '.join(made)} not from the reference")
         simulated = [n for n, i in log.instruments.items() if i.source == "reference"]

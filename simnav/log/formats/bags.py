@@ -153,6 +153,7 @@ def _mcap(path: Path, topic: str | None) -> Iterator[tuple[int, Any]]:
     decode: dict[int, Any] = {}
     summary = summary_of(path)
     chosen, total = _choose(path, topic, _topics(path, summary)), 0
+    messages: Iterator[tuple[Any, Any, Any]]
     with open(path, "rb") as stream:
         if summary is None:
             messages = (m for m in messages_in_order(path) if m[1].topic == chosen)

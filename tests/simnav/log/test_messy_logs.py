@@ -270,7 +270,9 @@ def test_a_vessel_that_starts_moored(tiny):
 
 def test_a_heading_that_nobody_knows(tiny):
     moored(tiny).replace("attitude_deg = [0.1, 0.1, 1.0]", "attitude_deg = [0.1, 0.1, 180.0]")
-    assert "heading (unknown)" in LogSource(tiny.scenario(), 0).note
+    with pytest.warns(LogWarning, match="the heading at the start is unknown; only estimators that search it can use"):
+        source = LogSource(tiny.scenario(), 0)
+    assert "heading (unknown)" in source.note
 
 
 def test_a_compass_gives_the_heading_of_a_moored_vessel(tiny):
