@@ -339,7 +339,7 @@ class Chain(ABC):
             node=self.base + len(self.nodes) - 1, fold=self._fold() if ahead else -1, bare=ahead, weight=1.0,
             instrument=self._index[measurement.instrument], components=len(noise), time=measurement.time,
         )  # fmt: skip
-        _attach(
+        _attach.unchecked(
             np.ascontiguousarray(noise, dtype=np.float64), np.ascontiguousarray(measurement.value, dtype=np.float64),
             aids.newest("noise"), aids.newest("whitener"), aids.newest("value"),
         )  # fmt: skip
