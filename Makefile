@@ -34,11 +34,11 @@ leaderboard: $(VENV)/installed
 	$(BIN)/simnav campaign --profile quick --output $(RESULTS)
 	$(BIN)/simnav leaderboard $(RESULTS) --output $(SITE)
 
-# Kernels are compiled once, on all cores, and not by each process of the tests. Some tests wait for other processes: five
+# Kernels are compiled once, on all cores, and not by each process of the tests. Some tests wait for other processes: four
 # workers keep two cores busy. The tests start hundreds of processes: Python keeps what it compiled for them.
 test: $(VENV)/installed-test
 	$(BIN)/simnav warmup
-	env -u PYTHONDONTWRITEBYTECODE OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest --numprocesses=5 --dist=worksteal
+	env -u PYTHONDONTWRITEBYTECODE OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest --numprocesses=4 --dist=worksteal
 
 bench: $(VENV)/installed-test
 	$(BIN)/simnav warmup

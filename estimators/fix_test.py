@@ -23,29 +23,49 @@ from simnav.geometry.earth import radii_scalar
 from simnav.kinds import kinds_with
 from simnav.types import Array, Datasheet, Estimate, Instruments, Measurement, Measurements
 
-from .persistence import Course
+from .persistence import add_innovation, begun, is_correlated, is_large
 
 __all__ = ["FixTest"]
 
 
-@kernel("UniTuple(f8, 2)(f8[::1], f8[::1], f8, f8, f8[:, ::1], f8, f8)")
-def _standardised(
-    fix: Array, position: Array, north: float, east: float, covariance: Array, first: float, second: float
-) -> tuple[float, float]:
-    """From an antenna, north and east of a position [m], to a fix, each component divided by its sigma.
+@kernel("i8(UniTuple(f8, 3), UniTuple(f8, 3), UniTuple(f8, 2), UniTuple(f8, 4), UniTuple(f8, 3), f8[::1])")
+def _judge(
+    fix: tuple[float, float, float], position: tuple[float, float, float], antenna: tuple[float, float],
+    variances: tuple[float, float, float, float], limits: tuple[float, float, float], course: Array,
+) -> int:  # fmt: skip
+    """Whether the fixes of a receiver are off in one direction; -1 if this one cannot be compared.
 
-    The variances of the fix [m^2] are ``first`` and ``second``.
+    Parameters
+    ----------
+    fix : (float, float, float)
+        Time [s]; latitude and longitude [rad].
+    position : (float, float, float)
+        The estimate: latitude, longitude [rad] and height [m].
+    antenna : (float, float)
+        Where the antenna is, north and east of the estimate [m].
+    variances : (float, float, float, float)
+        Variances of the estimate and of a fix, each north and east [m^2].
+    limits : (float, float, float)
+        Limit of chi-square for one fix; normal quantiles of a direction, and of too large a distance.
+    course : array
+        The course of the receiver (`simnav.estimators.persistence`); updated.
     """
+    north, east = antenna
+    limit, persistent, large = limits
     meridian, prime_vertical = radii_scalar(sin(position[0]))
-    north = (fix[0] - position[0]) * (meridian + position[2]) - north
-    east = (fix[1] - position[1]) * (prime_vertical + position[2]) * cos(position[0]) - east
-    return north / sqrt(covariance[0, 0] + first), east / sqrt(covariance[1, 1] + second)
+    north = (fix[1] - position[0]) * (meridian + position[2]) - north
+    east = (fix[2] - position[1]) * (prime_vertical + position[2]) * cos(position[0]) - east
+    u, v = north / sqrt(variances[0] + variances[2]), east / sqrt(variances[1] + variances[3])
+    if not isfinite(u + v):
+        return -1
+    add_innovation(course, u, v, 0.0, 2, fix[0], u * u + v * v > limit)
+    return 1 if is_correlated(course, persistent) and is_large(course, large) else 0
 
 
 class _Receiver(NamedTuple):
     """A receiver: the horizontal lever arm, forward and starboard [m], and the variances of a fix [m^2]."""
 
-    course: Course
+    course: Array
     forward: float
     starboard: float
     north: float
@@ -71,8 +91,8 @@ class FixTest:
     PATIENCE = 5  # fixes in a row that must contradict
 
     def __init__(self, instruments: Instruments):
-        self._persistent, self._large = normal_quantile(self.PERSISTENT), normal_quantile(self.SOUND)
-        self._limit = chi_square_limits(self.SOUND)[2]
+        quantiles = normal_quantile(self.PERSISTENT), normal_quantile(self.SOUND)
+        self._limits = chi_square_limits(self.SOUND)[2], *quantiles
         kinds = kinds_with("position", "horizontal_position")
         self._receivers = {n: _receiver(s) for n, s in instruments.items() if s.kind in kinds}
         self._against = dict.fromkeys(self._receivers, 0)
@@ -114,13 +134,13 @@ class FixTest:
                 north, east = north + c * forward - s * starboard, east + s * forward + c * starboard
             else:  # it lies in some direction
                 first, second = (v + hypot(forward, starboard) ** 2 for v in (first, second))
-        u, v = _standardised(m.value, position, north, east, covariance, first, second)
-        if not isfinite(u + v):
-            return
-        course.add((u, v, 0.0), 2, m.time, u * u + v * v > self._limit)
-        against = course.correlated(self._persistent) and course.large(self._large)
-        self._against[m.instrument] = self._against[m.instrument] + 1 if against else 0
-        self.contradicted = max(self._against.values()) >= self.PATIENCE
+        fix, variances = m.value.tolist(), (covariance.item(0, 0), covariance.item(1, 1), first, second)
+        against = _judge.unchecked(
+            (m.time, fix[0], fix[1]), tuple(position.tolist()), (north, east), variances, self._limits, course
+        )
+        if against >= 0:
+            self._against[m.instrument] = self._against[m.instrument] + 1 if against else 0
+            self.contradicted = max(self._against.values()) >= self.PATIENCE
 
 
 def _receiver(sheet: Datasheet) -> _Receiver:
@@ -129,4 +149,4 @@ def _receiver(sheet: Datasheet) -> _Receiver:
     if isfinite(sheet.correlation_time):
         variance = variance + sheet.bias_instability**2
     forward, starboard, _ = sheet.lever_arm.tolist()
-    return _Receiver(Course(), forward, starboard, float(variance[0]), float(variance[1]))
+    return _Receiver(begun(1)[0], forward, starboard, float(variance[0]), float(variance[1]))

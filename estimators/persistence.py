@@ -14,10 +14,66 @@ from math import sqrt
 
 import numpy as np
 
-__all__ = ["Course"]
+from simnav.compiled import kernel
+from simnav.types import Array
+
+__all__ = ["COURSE", "TIME", "Course", "add_innovation", "begun", "is_correlated", "is_directed", "is_large"]
 
 #: Memory of a course [innovations].
 MEMORY = 20
+#: Places in the array of a course: time of the last innovation [s], its three components, their number, and whether it
+#: failed its test; the fading sums of products, of their squares, of squares, and of components; of the present run,
+#: number of pairs and sum of their cosines. And the length of the array.
+TIME, BEFORE, COUNT, FAILED, PRODUCT, SQUARE, SQUARES, FREEDOM, PAIRS, COSINES, COURSE = 0, 1, *range(4, 13)
+
+
+def begun(count: int, more: int = 0) -> Array:
+    """(count, COURSE + more) array: courses without innovations, each with so many further zeros."""
+    courses = np.zeros((count, COURSE + more))
+    courses[:, TIME], courses[:, COUNT] = -np.inf, 1.0
+    return courses
+
+
+@kernel()
+def add_innovation(course: Array, u0: float, u1: float, u2: float, count: int, time: float, failed: bool) -> None:
+    """Do `Course.add` on the array of a course."""
+    b0, b1, b2 = course[BEFORE], course[BEFORE + 1], course[BEFORE + 2]
+    fading = 1.0 - 1.0 / MEMORY
+    p0, p1, p2 = u0 * b0, u1 * b1, u2 * b2
+    course[PRODUCT] = fading * course[PRODUCT] + p0 + p1 + p2
+    course[SQUARE] = fading * course[SQUARE] + p0 * p0 + p1 * p1 + p2 * p2
+    course[SQUARES] = fading * course[SQUARES] + u0 * u0 + u1 * u1 + u2 * u2
+    course[FREEDOM] = fading * course[FREEDOM] + count
+    if failed and course[FAILED] > 0.0:
+        course[PAIRS] += 1.0
+        course[COSINES] += (p0 + p1 + p2) / sqrt((u0 * u0 + u1 * u1 + u2 * u2) * (b0 * b0 + b1 * b1 + b2 * b2))
+    else:
+        course[PAIRS], course[COSINES] = 0.0, 0.0
+    course[BEFORE], course[BEFORE + 1], course[BEFORE + 2], course[TIME] = u0, u1, u2, time
+    course[FAILED], course[COUNT] = 1.0 if failed else 0.0, count
+
+
+@kernel()
+def is_correlated(course: Array, quantile: float) -> bool:
+    """Do `Course.correlated` on the array of a course."""
+    found: bool = course[PRODUCT] > 0.0 and course[PRODUCT] * course[PRODUCT] > quantile * quantile * course[SQUARE]
+    return found
+
+
+@kernel()
+def is_directed(course: Array, quantile: float) -> bool:
+    """Do `Course.directed` on the array of a course."""
+    found: bool = course[PAIRS] > 0.0 and course[COSINES] * sqrt(course[COUNT] / course[PAIRS]) > quantile
+    return found
+
+
+@kernel()
+def is_large(course: Array, quantile: float) -> bool:
+    """Do `Course.large` on the array of a course."""
+    spread = 2.0 / (9.0 * course[FREEDOM])
+    root = 1.0 - spread + quantile * sqrt(spread)
+    found: bool = course[SQUARES] > course[FREEDOM] * (root * root * root)
+    return found
 
 
 class Course:
@@ -34,19 +90,14 @@ class Course:
 
     Attributes
     ----------
-    time : float
-        Time of the last innovation [s].
+    array : (COURSE,) array
+        Its numbers, in the order of the constants of this module.
     """
 
-    __slots__ = (
-        "_before", "_cosines", "_count", "_failed", "_freedom", "_pairs", "_product", "_square", "_squares", "time",
-    )  # fmt: skip
+    __slots__ = ("array",)
 
     def __init__(self) -> None:
-        self.time = -np.inf
-        self._before = (0.0, 0.0, 0.0)
-        self._product = self._square = self._squares = self._freedom = 0.0
-        self._failed, self._pairs, self._cosines, self._count = False, 0, 0.0, 1
+        self.array = begun(1)[0]
 
     def add(self, components: tuple[float, float, float], count: int, time: float, failed: bool = False) -> None:
         """Add an innovation.
@@ -62,28 +113,15 @@ class Course:
         failed : bool
             Whether the innovation has failed its chi-square test.
         """
-        u0, u1, u2 = components
-        b0, b1, b2 = self._before
-        fading = 1.0 - 1.0 / MEMORY
-        p0, p1, p2 = u0 * b0, u1 * b1, u2 * b2
-        self._product = fading * self._product + p0 + p1 + p2
-        self._square = fading * self._square + p0 * p0 + p1 * p1 + p2 * p2
-        self._squares = fading * self._squares + u0 * u0 + u1 * u1 + u2 * u2
-        self._freedom = fading * self._freedom + count
-        if failed and self._failed:
-            self._pairs += 1
-            self._cosines += (p0 + p1 + p2) / sqrt((u0 * u0 + u1 * u1 + u2 * u2) * (b0 * b0 + b1 * b1 + b2 * b2))
-        else:
-            self._pairs, self._cosines = 0, 0.0
-        self._before, self.time, self._failed, self._count = components, time, failed, count
+        add_innovation(self.array, *components, count, time, failed)
 
     def correlated(self, quantile: float) -> bool:
         """Whether successive innovations have a correlation above zero, by a quantile of the normal distribution."""
-        return self._product > 0.0 and self._product * self._product > quantile * quantile * self._square
+        return bool(is_correlated(self.array, quantile))
 
     def directed(self, quantile: float) -> bool:
         """Whether the innovations of the present run have a common direction, by a normal quantile."""
-        return self._pairs > 0 and self._cosines * sqrt(self._count / self._pairs) > quantile
+        return bool(is_directed(self.array, quantile))
 
     def large(self, quantile: float) -> bool:
         """Whether the squares are too large for R and H P H', by a quantile of the normal distribution.
@@ -91,5 +129,4 @@ class Course:
         The limit of chi-square follows from it by the approximation of E. B. Wilson and M. M. Hilferty, *The
         distribution of chi-square*, PNAS 17, 1931.
         """
-        spread = 2.0 / (9.0 * self._freedom)
-        return bool(self._squares > self._freedom * (1.0 - spread + quantile * spread**0.5) ** 3)
+        return bool(is_large(self.array, quantile))

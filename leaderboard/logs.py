@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -93,6 +94,8 @@ def export(request: ExportRequest) -> list[Path]:
             with mistakes(ValueError, OSError):
                 recording = record(scenario, seal.seed(scenario.id, number))
                 told = recording if request.truth else without_truth(recording)
+                if not seal.secret:  # who has the scenario and the seed can make the run again, as it was asked for
+                    told = replace(told, seed=recording.seed)
                 several = runs > 1 or len(chosen) > 1 or request.blind
                 ending = "" if request.form == "csv" else f".{request.form}"
                 target = output / f"{scenario.id}-{number}{ending}" if several else output
@@ -128,7 +131,7 @@ def inspect_log(request: InspectRequest) -> tuple[list[Stream], list[str]]:
         streams, failed = inspect_log([absolute(path) for path in given])
         if target is not None and streams:
             words = "".join(c if c.isascii() and c.isalnum() else " " for c in target.stem.lower()).split()
-            write_whole(target, draft(streams, "-".join(words) or "my-log"))
+            write_whole(target, draft(streams, "-".join(words) or "my-log", target.name))
     return streams, failed
 
 

@@ -20,7 +20,7 @@ from typing import Any, BinaryIO
 
 from numba.core import typeinfer
 from numba.core.caching import FunctionCache, IndexDataCacheFile
-from numba.core.runtime import rtsys
+from numba.core.runtime.nrt import rtsys
 
 __all__ = ["WithDigests", "compile_with"]
 

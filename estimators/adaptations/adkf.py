@@ -168,7 +168,7 @@ class AdaptiveFactor(NoiseAdaptation):
             statistic = sqrt(nis / len(innovation.residual)) if residual else self._statistic(innovation)
         factor = max(self.factor(statistic, self.c0, self.c1), self.SMALLEST)
         if self.target == "P":
-            self.inflation = self._prediction.limited(1.0 / factor, innovation)
+            self.inflation = self.prediction.limited(1.0 / factor, innovation)
         self.report(f"factor.{name}", factor)
         if self.target == "P" or factor == 1.0:
             return innovation.noise

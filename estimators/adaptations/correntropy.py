@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import exp, sqrt
 from typing import Literal
 
@@ -11,9 +12,9 @@ from simnav.compiled import kernel
 from simnav.types import Array
 
 from .base import Innovation
-from .noise import NoiseAdaptation, posterior
+from .noise import RULE, NoiseAdaptation, posterior
 
-__all__ = ["MaximumCorrentropy", "correntropy_noise"]
+__all__ = ["MaximumCorrentropy", "correntropy_noise", "correntropy_rule"]
 
 
 @kernel("f8(f8[::1], f8[:, ::1], f8[:, ::1], f8, f8, i8, b1, f8[:, ::1])")
@@ -64,6 +65,16 @@ def correntropy_noise(
     return least
 
 
+@kernel(RULE)
+def correntropy_rule(
+    settings: Array, memory: Array, innovation: Array, predicted: Array, nominal: Array, noise: Array
+) -> float:
+    """Call `correntropy_noise`; settings: bandwidth, smallest weight, iterations, whether it begins with the update."""
+    return correntropy_noise(
+        innovation, predicted, nominal, settings[0], settings[1], int(settings[2]), settings[3] > 0.0, noise
+    )
+
+
 class MaximumCorrentropy(NoiseAdaptation):
     """Weights ``exp(-e^2 / (2 bandwidth^2))`` of the residuals after the update, by fixed-point iteration.
 
@@ -89,6 +100,8 @@ class MaximumCorrentropy(NoiseAdaptation):
         The first weights are those of the residual after the plain update, or those of the innovation.
     """
 
+    rule = correntropy_rule
+
     def __init__(
         self,
         bandwidth: float = 4.0,
@@ -106,13 +119,17 @@ class MaximumCorrentropy(NoiseAdaptation):
             raise ValueError(f"begin = {begin!r}: it must be 'update' or 'prediction'")
         self.bandwidth, self.iterations, self.smallest, self.begin = bandwidth, iterations, smallest, begin
 
+    def settings_of(self, longer: float) -> list[float]:
+        """As `NoiseAdaptation.settings_of`."""
+        return [self.bandwidth, self.smallest, self.iterations, self.begin == "update"]
+
     def choose(self, innovation: Innovation) -> Array:
         """The noise divided by the weights; the smallest weight is reported."""
-        nominal = innovation.noise
+        m, residual, predicted, nominal, *_ = innovation
         noise: Array = np.empty((len(nominal), len(nominal)))
-        least = correntropy_noise(
-            innovation.residual, innovation.predicted, nominal, self.bandwidth, self.smallest, self.iterations,
-            self.begin == "update", noise,
-        )  # fmt: skip
-        self.report(f"weight.{innovation.measurement.instrument}", least)
+        least = correntropy_rule(*self.memory_of(m.instrument), residual, predicted, nominal, noise)
+        self.report(f"weight.{m.instrument}", least)
         return noise
+
+    def _note(self, name: str, chosen: Sequence[float]) -> None:
+        self._note_weight(name, chosen)

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cache
 from typing import Literal
 
 import numpy as np
 
 from simnav.compiled import kernel
-from simnav.types import Array, Instruments
+from simnav.types import Array
 
 from .base import Innovation
-from .noise import EstimatedNoise, Posterior, Scope
+from .noise import RULE, EstimatedNoise, Scope, bound, copied, posterior
 
-__all__ = ["FixedWindow", "InnovationBased", "adaptive_window"]
+__all__ = ["FixedWindow", "InnovationBased", "adaptive_window", "innovation_noise"]
 
 
 @kernel("i8(f8, f8, f8, f8, i8, i8)")
@@ -121,26 +122,80 @@ def _contradiction(length: int, significance: float) -> tuple[float, float]:
     return float(chdtri(length, 1.0 - significance)) / length, float(chdtri(length, significance)) / length
 
 
-class _Window:
-    """Ring buffer of the last rows of one instrument, the number of all rows, and the last estimate, for eq. 18.
+#: Places in the settings: smallest and largest length of the window; bounds v_min and v_max; weight of the new
+#: estimate; whether the newest H P H' is subtracted, the data are residuals, and NumPy bounds the estimate; bounds of
+#: the variance ratios; and from LIMITS on lower and upper limit of a mean square, for the shortest, the middle and the
+#: longest window.
+SHORTEST, LONGEST, LOW, HIGH, FORGETTING, NEWEST, RESIDUAL, FULL, LOWEST, HIGHEST, LIMITS = range(11)
+#: Places in the memory: number of rows so far; whether there is an estimate; its elements (room for 3 by 3), and the
+#: rows of `_push`.
+COUNT, BEGUN, ESTIMATE, ROWS = 0, 1, 2, 11
 
-    Attributes
-    ----------
-    shortest, longest, forgetting
-        Parameters of `InnovationBased` at the rate of the instrument.
+
+@kernel()
+def _rows(settings: Array, memory: Array, m: int) -> Array:
+    """The ring buffer in the memory."""
+    count, width = int(settings[LONGEST]), m + 3 * m * m
+    return memory[ROWS : ROWS + count * width].reshape((count, width))
+
+
+@kernel("void(f8[::1], f8[::1], f8[::1], f8[:, ::1], f8[:, ::1])")
+def _remember(settings: Array, memory: Array, innovation: Array, predicted: Array, noise: Array) -> None:
+    """Store the residual after an update with the noise."""
+    m = innovation.size
+    residual, after = np.empty(m), np.empty((m, m))
+    posterior(innovation, predicted, noise, residual, after)
+    _push(_rows(settings, memory, m), int(memory[COUNT]), innovation, residual, -1.0, after)
+    memory[COUNT] += 1.0
+
+
+@kernel()
+def _contradicted(settings: Array, place: int, estimate: Array, nominal: Array, predicted: Array) -> bool:
+    """Whether the innovations contradict the nominal noise in a component, by the limits from a place on."""
+    low, high = settings[place], settings[place + 1]
+    for i in range(nominal.shape[0]):
+        noise, prior = nominal[i, i], predicted[i, i]
+        # Variance of the squared quantity: an innovation, or a residual, which is R S^-1 times the innovation.
+        variance = noise * noise / (noise + prior) if settings[RESIDUAL] > 0.0 else noise + prior
+        if not low <= 1.0 + (estimate[i, i] - noise) / variance <= high:
+            return True
+    return False
+
+
+@kernel(RULE)
+def innovation_noise(
+    settings: Array, memory: Array, innovation: Array, predicted: Array, nominal: Array, noise: Array
+) -> float:
+    """Estimate the noise (`InnovationBased`), and write it into ``noise`` within its bounds, or the nominal one.
+
+    Returns
+    -------
+    float
+        Length of the window; its negative if the innovations contradict the nominal noise.
     """
-
-    __slots__ = ("count", "estimate", "forgetting", "longest", "rows", "shortest")
-
-    def __init__(self, shortest: int, longest: int, forgetting: float, m: int):
-        self.shortest, self.longest, self.forgetting = shortest, longest, forgetting
-        self.rows, self.count = np.zeros((longest, m + 3 * m * m)), 0
-        self.estimate: Array | None = None
-
-    def push(self, innovation: Array, residual: Array, sign: float, predicted: Array) -> None:
-        """Store a row in place of the oldest one."""
-        _push(self.rows, self.count, innovation, residual, sign, predicted)
-        self.count += 1
+    m = innovation.size
+    rows = _rows(settings, memory, m)
+    if settings[RESIDUAL] == 0.0:
+        _push(rows, int(memory[COUNT]), innovation, innovation, 1.0, predicted)
+        memory[COUNT] += 1.0
+    forgetting = settings[FORGETTING]
+    if memory[BEGUN] == 0.0:
+        memory[BEGUN], forgetting = 1.0, 1.0
+    estimate = memory[ESTIMATE : ESTIMATE + m * m].reshape((m, m))
+    shortest, longest = int(settings[SHORTEST]), int(settings[LONGEST])
+    length = _average(
+        rows, int(memory[COUNT]), predicted, nominal,
+        (shortest, longest, settings[LOW], settings[HIGH]), settings[NEWEST] > 0.0, forgetting, estimate,
+    )  # fmt: skip
+    place = LIMITS if length == shortest else LIMITS + 4 if length == longest else LIMITS + 2
+    contradicted = _contradicted(settings, place, estimate, nominal, predicted)
+    if contradicted:
+        bound(estimate, nominal, settings[LOWEST], settings[HIGHEST], noise)
+    else:
+        copied(nominal, noise)
+    if settings[RESIDUAL] > 0.0 and settings[FULL] == 0.0:
+        _remember(settings, memory, innovation, predicted, noise)
+    return -float(length) if contradicted else float(length)
 
 
 class InnovationBased(EstimatedNoise):
@@ -182,6 +237,8 @@ class InnovationBased(EstimatedNoise):
         (0, 1]; 1: the estimate is always used, as printed.
     """
 
+    rule = innovation_noise
+
     def __init__(
         self,
         source: Literal["innovation", "residual"] = "innovation",
@@ -210,56 +267,39 @@ class InnovationBased(EstimatedNoise):
         self.source, self.shortest, self.longest = source, shortest, longest
         self.low, self.high, self.forgetting, self.newest = low, high, forgetting, newest
 
-    def reset(self, instruments: Instruments) -> None:
-        """Begin a run."""
-        super().reset(instruments)
-        self._windows: dict[str, _Window] = {}
+    def settings_of(self, longer: float) -> list[float]:
+        """As `EstimatedNoise.settings_of`."""
+        shortest, longest = round(self.shortest * longer), round(self.longest * longer)
+        limits = [_contradiction(n, self.significance) for n in (shortest, (shortest + longest) // 2, longest)]
+        residual = self.source == "residual"
+        return [
+            shortest, longest, self.low, self.high, 1.0 - (1.0 - self.forgetting) ** (1.0 / longer),
+            self.newest and not residual, residual, self.full,
+            self.lowest * self.lowest, self.highest * self.highest, *limits[0], *limits[1], *limits[2],
+        ]  # fmt: skip
+
+    def begun(self, longer: float, m: int) -> Array:
+        """As `EstimatedNoise.begun`: an empty window."""
+        return np.zeros(ROWS + round(self.longest * longer) * (m + 3 * m * m))
 
     def estimate(self, innovation: Innovation) -> Array:
         """The bounded estimate."""
-        name, nominal = innovation.measurement.instrument, innovation.noise
-        window = self._windows.get(name)
-        if window is None:
-            window = self._windows[name] = self._begun(name, len(nominal))
-        if self.source == "residual":
-            noise = self._believed(self._mean(name, window, innovation), innovation)
-            after = Posterior(innovation, noise)
-            window.push(innovation.residual, after.residual, -1.0, after.predicted)
-            return noise
-        window.push(innovation.residual, innovation.residual, 1.0, innovation.predicted)
-        return self._believed(self._mean(name, window, innovation), innovation)
+        m, residual, predicted, nominal, *_ = innovation
+        own, noise = self.memory_of(m.instrument), np.empty_like(nominal)
+        found = innovation_noise(*own, residual, predicted, nominal, noise)
+        self.report(f"window.{m.instrument}", int(abs(found)))
+        if self.full:
+            if found < 0.0:
+                elements = own[1][ESTIMATE : ESTIMATE + nominal.size]
+                noise = self.bounded(elements.reshape(nominal.shape), nominal)
+            if self.source == "residual":
+                _remember(*own, residual, predicted, noise)
+        return noise if found < 0.0 else nominal
 
-    def _begun(self, name: str, m: int) -> _Window:
-        """The empty window of an instrument."""
-        longer = self.longer[name]
-        forgetting = 1.0 - (1.0 - self.forgetting) ** (1.0 / longer)
-        return _Window(round(self.shortest * longer), round(self.longest * longer), forgetting, m)
-
-    def _believed(self, estimate: Array, innovation: Innovation) -> Array:
-        """The bounded estimate, or the nominal noise if the innovations do not contradict it."""
-        nominal = innovation.noise
-        low, high = _contradiction(self._length, self.significance)
-        variances = (m.diagonal().tolist() for m in (estimate, nominal, innovation.predicted))
-        for found, noise, predicted in zip(*variances, strict=True):
-            # Variance of the squared quantity: an innovation, or a residual, which is R S^-1 times the innovation.
-            variance = noise + predicted if self.source == "innovation" else noise * noise / (noise + predicted)
-            if not low <= 1.0 + (found - noise) / variance <= high:
-                return self.bounded(estimate, nominal)
-        return nominal
-
-    def _mean(self, name: str, window: _Window, innovation: Innovation) -> Array:
-        """Eqs. 16-20."""
-        forgetting = window.forgetting
-        if window.estimate is None:
-            window.estimate, forgetting = np.zeros_like(innovation.noise), 1.0
-        bounds = window.shortest, window.longest, self.low, self.high
-        length = _average(
-            window.rows, window.count, innovation.predicted, innovation.noise, bounds,
-            self.newest and self.source == "innovation", forgetting, window.estimate,
-        )  # fmt: skip
-        self._length = length
-        self.report(f"window.{name}", length)
-        return window.estimate
+    def _note(self, name: str, chosen: Sequence[float]) -> None:
+        super()._note(name, chosen)
+        if chosen[-1]:
+            self.report(f"window.{name}", int(abs(chosen[-1])))
 
 
 class FixedWindow(InnovationBased):

@@ -3,19 +3,29 @@
 from __future__ import annotations
 
 from abc import abstractmethod
+from collections.abc import Sequence
 from math import sqrt
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 
-from simnav.compiled import kernel
+from simnav.compiled import Kernel, kernel
 from simnav.estimators.algebra.joseph import joseph_update
+from simnav.estimators.models.base import SIGMA
 from simnav.types import KINDS, Array, Instruments
 
 from .base import Adaptation, Innovation
 from .prediction import PredictionTest
 
-__all__ = ["EstimatedNoise", "NoiseAdaptation", "Posterior", "Scope", "normalised_square", "posterior", "scaled"]
+__all__ = [
+    "RULE", "EstimatedNoise", "NoiseAdaptation", "Posterior", "Scope", "bound", "copied", "normalised_square",
+    "posterior", "scale", "scaled",
+]  # fmt: skip
+
+#: Signature of a kernel that estimates a noise, from settings and memory of an instrument (which it updates),
+#: innovation (m,), H P H' (m, m) and the nominal R (m, m). It overwrites the last array (m, m), and returns a number to
+#: be reported, or 0.
+RULE = "f8(f8[::1], f8[::1], f8[::1], f8[:, ::1], f8[:, ::1], f8[:, ::1])"
 
 Scope = Literal["fixes", "all"]
 
@@ -63,7 +73,7 @@ def normalised_square(innovation: Array, predicted: Array, noise: Array) -> floa
 
 
 @kernel("void(f8[:, ::1], f8, f8, f8, f8[:, ::1])")
-def _scale(noise: Array, f0: float, f1: float, f2: float, product: Array) -> None:
+def scale(noise: Array, f0: float, f1: float, f2: float, product: Array) -> None:
     r0, r1, r2 = sqrt(f0), sqrt(f1), sqrt(f2)
     for i in range(noise.shape[0]):
         a = r0 if i == 0 else r1 if i == 1 else r2
@@ -72,7 +82,7 @@ def _scale(noise: Array, f0: float, f1: float, f2: float, product: Array) -> Non
 
 
 @kernel("void(f8[:, ::1], f8[:, ::1], f8, f8, f8[:, ::1])")
-def _bound(estimate: Array, nominal: Array, low: float, high: float, bounded: Array) -> None:
+def bound(estimate: Array, nominal: Array, low: float, high: float, bounded: Array) -> None:
     for i in range(nominal.shape[0]):
         bounded[i, i] = sqrt(min(max(estimate[i, i] / nominal[i, i], low), high))
     for i in range(nominal.shape[0]):
@@ -80,6 +90,14 @@ def _bound(estimate: Array, nominal: Array, low: float, high: float, bounded: Ar
             bounded[i, j] = bounded[j, i] = nominal[i, j] * bounded[i, i] * bounded[j, j]
     for i in range(nominal.shape[0]):
         bounded[i, i] *= nominal[i, i] * bounded[i, i]
+
+
+@kernel()
+def copied(noise: Array, used: Array) -> None:
+    """Copy an (m, m) array into another; a slice would take seconds to compile."""
+    for i in range(noise.shape[0]):
+        for j in range(noise.shape[0]):
+            used[i, j] = noise[i, j]
 
 
 @kernel("UniTuple(f8, 3)(f8[:, ::1])")
@@ -132,7 +150,7 @@ def scaled(noise: Array, factors: list[float]) -> Array:
         return noise
     product: Array = np.empty((len(noise), len(noise)))
     first, second, third = (*factors, 1.0, 1.0)[:3]
-    _scale(noise, first, second, third, product)
+    scale(noise, first, second, third, product)
     return product
 
 
@@ -153,16 +171,65 @@ class NoiseAdaptation(Adaptation):
     """
 
     together = 3
+    #: The kernel that chooses, or that estimates (`RULE`); None if there is none, as for a subclass that chooses in its
+    #: own way.
+    rule: ClassVar[Kernel[..., float] | None] = None
+
+    def __init_subclass__(cls) -> None:
+        super().__init_subclass__()
+        if {"adapt", "choose", "estimate"} & vars(cls).keys() and "rule" not in vars(cls):
+            cls.rule = None
 
     def reset(self, instruments: Instruments) -> None:
         """Begin a run."""
-        self._prediction = PredictionTest(instruments, self.together)
+        self.prediction = PredictionTest(instruments, self.together)
         self._labels = {n: [f"sigma_{e}.{n}" for e in KINDS[s.kind].errors] for n, s in instruments.items()}
         self._report: dict[str, float | Array] = {}
         self._noisy: dict[str, Array] = {}  # a noise found above zero, and the one reported last
         self._reported: dict[str, Array] = {}
+        self._noted: dict[str, Sequence[float]] = {}
         for name, sheet in instruments.items():
             self._report.update(zip(self._labels[name], map(float, sheet.sigma)))
+        self.instruments, self.index = instruments, {name: i for i, name in enumerate(instruments)}
+        self.longer = {name: max(sheet.rate, 1.0) for name, sheet in instruments.items()}
+        self.rule_settings = np.array([self.settings_of(longer) for longer in self.longer.values()], dtype=np.float64)
+        begun = [self.begun(longer, len(self._labels[name])) for name, longer in self.longer.items()]
+        self.rule_first = np.cumsum([0, *map(len, begun)])
+        self.rule_memory = np.concatenate([*begun, np.empty(0)])
+
+    def settings_of(self, longer: float) -> list[float]:
+        """What the rule needs to know of an instrument with so many measurements in a second, at least 1."""
+        return []
+
+    def begun(self, longer: float, m: int) -> Array:
+        """What the rule keeps of an instrument of m components, at the start of a run."""
+        return np.empty(0)
+
+    def memory_of(self, name: str) -> tuple[Array, Array]:
+        """Settings and memory of an instrument, views."""
+        i = self.index[name]
+        return self.rule_settings[i], self.rule_memory[self.rule_first[i] : self.rule_first[i + 1]]
+
+    def in_scope(self, kind: str) -> bool:
+        """Whether the noise of a kind of instrument is chosen; otherwise it is the nominal one."""
+        return True
+
+    def noted(self, name: str, row: Sequence[float]) -> None:
+        """Report what a kernel chose for an instrument; the row is that of `simnav.estimators.models.base.StepRule`."""
+        chosen = row[SIGMA:]
+        if chosen[0] == chosen[0] and chosen != self._noted.get(name):
+            self._noted[name] = chosen
+            self._note(name, chosen)
+
+    def _note(self, name: str, chosen: Sequence[float]) -> None:
+        """Report the sigmas and the further number that a kernel chose; they differ from those before."""
+        self._report.update(zip(self._labels[name], chosen))
+
+    def _note_weight(self, name: str, chosen: Sequence[float]) -> None:
+        """`_note` where the further number is a weight."""
+        NoiseAdaptation._note(self, name, chosen)
+        if chosen[-1]:
+            self.report(f"weight.{name}", chosen[-1])
 
     @abstractmethod
     def choose(self, innovation: Innovation) -> Array | None:
@@ -180,10 +247,10 @@ class NoiseAdaptation(Adaptation):
             if min(innovation.noise.diagonal().tolist()) <= 0.0:
                 return innovation.noise
             self._noisy[name] = innovation.noise
-        if self._prediction.fails(innovation):
+        if self.prediction.fails(innovation):
             noise: Array | None = innovation.noise
-            if self._prediction.disturbed and (self.inflates or self.inflates_motion):
-                self.inflation = self._prediction.inflation(innovation)
+            if self.prediction.disturbed and (self.inflates or self.inflates_motion):
+                self.inflation = self.prediction.inflation(innovation)
         else:
             noise = self.choose(innovation)
         if noise is not None and noise is not self._reported.get(name):
@@ -230,18 +297,17 @@ class EstimatedNoise(NoiseAdaptation):
             raise ValueError(f"scope = {scope!r}: it must be 'fixes' or 'all'")
         self.lowest, self.highest, self.full, self.scope = lowest, highest, full, scope
 
-    def reset(self, instruments: Instruments) -> None:
-        """Begin a run."""
-        super().reset(instruments)
-        self.longer = {name: max(sheet.rate, 1.0) for name, sheet in instruments.items()}
-
     @abstractmethod
     def estimate(self, innovation: Innovation) -> Array:
         """The (m, m) estimate of the noise within the bounds, including this innovation."""
 
+    def in_scope(self, kind: str) -> bool:
+        """Whether the noise of a kind of instrument is estimated, by the scope."""
+        return self.scope == "all" or KINDS[kind].role == "fix"
+
     def choose(self, innovation: Innovation) -> Array:
         """The estimate; for an instrument out of scope the nominal noise; for a poor prediction the last noise."""
-        if self.scope == "fixes" and KINDS[innovation.measurement.kind].role != "fix":
+        if not self.in_scope(innovation.measurement.kind):
             return innovation.noise
         before = self._reported.get(innovation.measurement.instrument, innovation.noise)
         if _trace(innovation.predicted) > _trace(before):
@@ -264,5 +330,5 @@ class EstimatedNoise(NoiseAdaptation):
             values, axes = np.linalg.eigh(estimate / unit)
             return np.asarray((axes * np.clip(values, low, high)) @ axes.T * unit)
         bounded: Array = np.empty((m, m))
-        _bound(estimate, nominal, low, high, bounded)
+        bound(estimate, nominal, low, high, bounded)
         return bounded

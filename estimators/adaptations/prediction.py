@@ -9,12 +9,12 @@ import numpy as np
 from simnav.compiled import kernel
 from simnav.estimators.algebra.chi_square import chi_square_limits, normal_quantile
 from simnav.estimators.models.roles import fixes_and_logs, witnesses
-from simnav.estimators.persistence import Course
-from simnav.types import Array, Instruments
+from simnav.estimators.persistence import COURSE, TIME, add_innovation, begun, is_correlated, is_directed, is_large
+from simnav.types import Array, Flags, Instruments, Integers
 
 from .base import Innovation
 
-__all__ = ["PredictionTest", "standardised"]
+__all__ = ["IS_WRONG", "PredictionTest", "judge_prediction", "standardised"]
 
 
 @kernel("UniTuple(f8, 3)(f8[::1], f8[:, ::1], f8[:, ::1])")
@@ -25,6 +25,108 @@ def standardised(residual: Array, predicted: Array, noise: Array) -> tuple[float
     u1 = residual[1] / sqrt(predicted[1, 1] + noise[1, 1]) if m > 1 else 0.0
     u2 = residual[2] / sqrt(predicted[2, 2] + noise[2, 2]) if m > 2 else 0.0
     return u0, u1, u2
+
+
+#: Places in the memory of an instrument, after its course (`simnav.estimators.persistence`): time at which it last
+#: found the prediction wrong, -inf if it no longer does; number of failures in a row of its joint test, and time of the
+#: last test; and whether a log was against it since its innovations persist.
+WRONG, FAILURES, TESTED, CONDEMNED = range(COURSE, COURSE + 4)
+#: Places of the settings: number of joint failures; whether there is an IMU; the normal quantiles of the class; and,
+#: from LIMITS on, the limits of chi-square for 0 to 3 components.
+TOGETHER, INERTIAL, LARGE, PERSISTENT, WHITE, ALONE, RECENT, LIMITS = range(8)
+#: What `judge_prediction` says of an innovation: bits of an integer.
+IS_WRONG, IS_DISTURBED, HAS_PASSED = 1, 2, 4
+
+
+@kernel()
+def _fails_jointly(
+    i: int, time: float, square: float, limit: float, settings: Array, sort: Integers, memory: Array
+) -> int:
+    """Whether instrument i and one of the other group have failed often enough in a row, this time included.
+
+    The statistic is the sum of the squared standardised components of the innovation.
+    """
+    memory[i, TESTED] = time
+    if square <= limit:
+        memory[i, FAILURES] = 0.0
+        return HAS_PASSED
+    memory[i, FAILURES] += 1.0
+    if memory[i, FAILURES] >= settings[TOGETHER]:
+        for k in range(sort.shape[0]):
+            often = sort[k, 0] != sort[i, 0] and memory[k, FAILURES] >= settings[TOGETHER]
+            if often and time - memory[k, TESTED] <= settings[RECENT]:
+                return IS_DISTURBED
+    return 0
+
+
+@kernel()
+def _persists(
+    i: int, time: float, settings: Array, sort: Integers, recent: Array, witness: Flags, memory: Array
+) -> bool:
+    """Whether the innovations of instrument i persist, and no witness is against it."""
+    heard, sound = False, False
+    for k in range(recent.size):
+        if witness[i, k] and time - memory[k, TIME] <= recent[k]:
+            heard = True
+            sound = sound or not is_correlated(memory[k], settings[WHITE])
+    if sort[i, 0] == 0 and not heard and is_directed(memory[i], settings[ALONE]):
+        return True
+    persistent = is_correlated(memory[i], settings[PERSISTENT]) and is_large(memory[i], settings[LARGE])
+    if not persistent or not heard:
+        memory[i, CONDEMNED] = 0.0
+        return persistent
+    if memory[i, CONDEMNED] > 0.0 or sound:
+        if sort[i, 0] == 1:
+            memory[i, CONDEMNED] = 1.0
+        return False
+    return True
+
+
+@kernel("i8(f8[::1], f8[:, ::1], f8[:, ::1], i8, f8, f8[::1], Tuple((i8[:, ::1], f8[::1], b1[:, ::1])), f8[:, ::1])")
+def judge_prediction(
+    residual: Array, predicted: Array, noise: Array, i: int, time: float, settings: Array,
+    known: tuple[Integers, Array, Flags], memory: Array,
+) -> int:  # fmt: skip
+    """Make the tests of `PredictionTest` for an innovation of m components.
+
+    Parameters
+    ----------
+    residual, predicted, noise : (m,), (m, m), (m, m) arrays
+        Innovation, H P H' and R.
+    i : int
+        Index of the instrument among the k instruments; -1 for another one.
+    time : float
+        Time of the measurement [s].
+    settings : array
+        See `TOGETHER` and the constants after it.
+    known : (k, 2) int, (k,) and (k, k) bool arrays
+        Group of each instrument (0 log, 1 fix, -1 none) and whether the test of persistence is made; time for which it
+        is heard [s]; which others are witnesses of its prediction.
+    memory : (k, ...) array
+        See `WRONG` and the constants after it; updated.
+
+    Returns
+    -------
+    int
+        Sum of `IS_WRONG`, `IS_DISTURBED` and `HAS_PASSED`, the last for the joint test.
+    """
+    sort, recent, witness = known
+    if i < 0 or (sort[i, 0] < 0 and sort[i, 1] == 0):
+        for k in range(recent.size):
+            if time - memory[k, WRONG] <= recent[k]:
+                return IS_WRONG
+        return 0
+    u0, u1, u2 = standardised(residual, predicted, noise)
+    square, limit = u0 * u0 + u1 * u1 + u2 * u2, settings[LIMITS + residual.size]
+    found = 0
+    if sort[i, 0] >= 0:
+        found = _fails_jointly(i, time, square, limit, settings, sort, memory)
+    wrong = found == IS_DISTURBED
+    if sort[i, 1] == 1:
+        add_innovation(memory[i], u0, u1, u2, residual.size, time, square > limit)
+        wrong = _persists(i, time, settings, sort, recent, witness, memory) or wrong
+    memory[i, WRONG] = time if wrong and settings[INERTIAL] > 0.0 else -np.inf
+    return found + IS_WRONG if wrong else found
 
 
 class PredictionTest:
@@ -88,83 +190,43 @@ class PredictionTest:
 
     def __init__(self, instruments: Instruments, together: int = 3, probability: float = 0.999):
         self.together, self.disturbed = together, False
-        self._limits = chi_square_limits(probability)
-        self._large = normal_quantile(probability)
-        self._persistent, self._white = normal_quantile(self.PERSISTENT), normal_quantile(self.WHITE)
-        self._alone = normal_quantile(self.ALONE)
-        self._group = fixes_and_logs(instruments) if together else {}
-        self._inertial = instruments.imu is not None
-        if not self._inertial and len(set(self._group.values())) < 2:
-            self._group = {}
-        self._recent = {name: max(self.RECENT, 3.0 / sheet.rate) for name, sheet in instruments.items()}
-        self._witnesses = witnesses(instruments) if together and self._inertial else {}
-        self._condemned: set[str] = set()  # fixes that a log was against since their innovations persist
-        self._courses: dict[str, Course] = {}
-        self._wrong: dict[str, float] = {}  # when an instrument last found the prediction wrong, if it still does
-        self._failures: dict[str, tuple[int, float]] = {}
+        group = fixes_and_logs(instruments) if together else {}
+        inertial = instruments.imu is not None
+        if not inertial and len(set(group.values())) < 2:
+            group = {}
+        against = witnesses(instruments) if together and inertial else {}
+        quantiles = [normal_quantile(p) for p in (probability, self.PERSISTENT, self.WHITE, self.ALONE)]
+        self._settings = np.array([together, inertial, *quantiles, self.RECENT, *chi_square_limits(probability)])
+        self._index = {name: i for i, name in enumerate(instruments)}
+        self._known = (
+            np.array([(group.get(n, -1), n in against) for n in instruments], np.int64).reshape(-1, 2),
+            np.array([max(self.RECENT, 3.0 / sheet.rate) for sheet in instruments.values()]),
+            np.array([[other in against.get(n, ()) for other in instruments] for n in instruments], bool),
+        )
+        self._memory = begun(len(instruments), more=4)
+        self._memory[:, WRONG] = -np.inf
+        self._count = len(group)
+        self._tests = bool(group or against)
         self._first: Array | None = None
         self._blamed = 0
+
+    @property
+    def arrays(self) -> tuple[bool, Array, tuple[Integers, Array, Flags], Array]:
+        """Whether a test is made, and the last three arguments of `judge_prediction`."""
+        return self._tests, self._settings, self._known, self._memory
 
     def fails(self, innovation: Innovation) -> bool:
         """Whether the prediction of this innovation is taken as wrong, by one of the tests."""
         self.disturbed = False
-        name, time = innovation.measurement.instrument, innovation.measurement.time
-        if name not in self._group and name not in self._witnesses:
-            return any(time - t <= self._recent[other] for other, t in self._wrong.items())
-        components = standardised(innovation.residual, innovation.predicted, innovation.noise)
-        count = len(innovation.residual)
-        if name in self._group:
-            self.disturbed = self._fails_jointly(name, time, components, count)
-        wrong = (name in self._witnesses and self._persists(name, time, components, count)) or self.disturbed
-        if wrong and self._inertial:
-            self._wrong[name] = time
-        else:
-            self._wrong.pop(name, None)
-        return wrong
-
-    def _fails_jointly(self, name: str, time: float, components: tuple[float, float, float], count: int) -> bool:
-        """Whether this instrument and one of the other group have failed often enough in a row, this time included.
-
-        The statistic is the sum of the squared standardised components of the innovation.
-        """
-        if sum(u * u for u in components) <= self._limits[count]:
-            self._failures[name] = 0, time
+        if not self._tests:
+            return False
+        m, residual, predicted, noise, *_ = innovation
+        i = self._index.get(m.instrument, -1)
+        found = judge_prediction(residual, predicted, noise, i, m.time, self._settings, self._known, self._memory)
+        if found & HAS_PASSED:
             self._blamed = 0
-            return False
-        failed = self._failures.get(name, (0, time))[0] + 1
-        self._failures[name] = failed, time
-        return failed >= self.together and any(
-            self._group[other] != self._group[name] and n >= self.together and time - t <= self.RECENT
-            for other, (n, t) in self._failures.items()
-        )
-
-    def _persists(self, name: str, time: float, components: tuple[float, float, float], count: int) -> bool:
-        """Whether the innovations of an instrument persist, and no witness is against it."""
-        course = self._courses.get(name)
-        if course is None:
-            course = self._courses[name] = Course()
-        course.add(components, count, time, sum(u * u for u in components) > self._limits[count])
-        if self._group.get(name) is False and course.directed(self._alone) and not self._heard(name, time):
-            return True
-        if not (course.correlated(self._persistent) and course.large(self._large)):
-            self._condemned.discard(name)
-            return False
-        heard = self._heard(name, time)
-        if not heard:
-            self._condemned.discard(name)
-        elif name in self._condemned or not all(witness.correlated(self._white) for witness in heard):
-            if self._group.get(name):
-                self._condemned.add(name)
-            return False
-        return True
-
-    def _heard(self, name: str, time: float) -> list[Course]:
-        """The courses of those witnesses of an instrument that are heard."""
-        return [
-            self._courses[other]
-            for other in self._witnesses[name]
-            if other in self._courses and time - self._courses[other].time <= self._recent[other]
-        ]
+        self.disturbed = found & IS_DISTURBED > 0
+        return found & IS_WRONG > 0
 
     def inflation(self, innovation: Innovation) -> float:
         """Factor of P after a failure of the prediction: once for every ``together`` failures.
@@ -173,7 +235,7 @@ class PredictionTest:
         `limited`.
         """
         self._blamed += 1
-        if (self._blamed - 1) % (self.together * len(self._group)):
+        if (self._blamed - 1) % (self.together * self._count):
             return 1.0
         components = standardised(innovation.residual, innovation.predicted, innovation.noise)
         return self.limited(0.5 * sqrt(sum(u * u for u in components) / len(innovation.residual)), innovation)

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 
+from simnav.compiled import kernel
 from simnav.types import Array
 
 from .base import Innovation
-from .noise import NoiseAdaptation, scaled
+from .noise import RULE, NoiseAdaptation, copied, scale, scaled
 from .prediction import standardised
 
-__all__ = ["EquivalentWeights", "HuberWeights", "Igg3Weights", "huber", "igg3"]
+__all__ = ["EquivalentWeights", "HuberWeights", "Igg3Weights", "huber", "huber_noise", "igg3", "igg3_noise"]
 
 
+@kernel()
 def huber(u: float, k: float = 1.345) -> float:
     """Huber's weight: 1 up to k, then ``k/|u|`` (Huber 1964); continuous.
 
@@ -26,8 +28,11 @@ def huber(u: float, k: float = 1.345) -> float:
     return 1.0 if u <= k else k / u
 
 
-def igg3(u: float, k0: float = 2.5, k1: float = 8.0) -> float:
+@kernel()
+def igg3(u: float, k0: float = 2.5, k1: float = 8.0, two: float = 2.0) -> float:
     """IGG-III weight: 1 up to k0, ``k0/|u| ((k1 - |u|)/(k1 - k0))^2`` up to k1, then 0 (Yang 1999); continuous.
+
+    The exponent is an argument, because a compiler replaces a constant one by a product, which differs in the last bit.
 
     Examples
     --------
@@ -37,7 +42,48 @@ def igg3(u: float, k0: float = 2.5, k1: float = 8.0) -> float:
     u = abs(u)
     if u <= k0:
         return 1.0
-    return k0 / u * ((k1 - u) / (k1 - k0)) ** 2 if u < k1 else 0.0
+    return k0 / u * ((k1 - u) / (k1 - k0)) ** two if u < k1 else 0.0
+
+
+def _with_huber(k: float, u: float) -> float:
+    return huber(u, k)
+
+
+def _with_igg3(k0: float, k1: float, u: float) -> float:
+    return igg3(u, k0, k1)
+
+
+@kernel()
+def _weigh(w0: float, w1: float, w2: float, smallest: float, nominal: Array, noise: Array) -> float:
+    """Divide a noise by the weights of up to three components; the least, which is the weight of the largest one."""
+    least = max(min(w0, w1, w2), smallest)
+    if least == 1.0:
+        copied(nominal, noise)
+    else:
+        scale(nominal, 1.0 / max(w0, smallest), 1.0 / max(w1, smallest), 1.0 / max(w2, smallest), noise)
+    return least
+
+
+@kernel(RULE)
+def huber_noise(
+    settings: Array, memory: Array, innovation: Array, predicted: Array, nominal: Array, noise: Array
+) -> float:
+    """Divide the nominal noise by Huber's weights; the least. The settings are k and the smallest weight."""
+    u0, u1, u2 = standardised(innovation, predicted, nominal)
+    k = settings[0]
+    return _weigh(huber(u0, k), huber(u1, k), huber(u2, k), settings[1], nominal, noise)
+
+
+@kernel(RULE)
+def igg3_noise(
+    settings: Array, memory: Array, innovation: Array, predicted: Array, nominal: Array, noise: Array
+) -> float:
+    """Divide the nominal noise by IGG-III weights; the least. The settings are k0, k1, 2 and the smallest weight."""
+    u0, u1, u2 = standardised(innovation, predicted, nominal)
+    k0, k1, two = settings[0], settings[1], settings[2]
+    return _weigh(
+        igg3(u0, k0, k1, two), igg3(u1, k0, k1, two), igg3(u2, k0, k1, two), settings[3], nominal, noise
+    )  # fmt: skip
 
 
 class EquivalentWeights(NoiseAdaptation):
@@ -62,6 +108,9 @@ class EquivalentWeights(NoiseAdaptation):
             raise ValueError(f"smallest = {smallest:g}: it must lie in (0, 1]")
         self.weight, self.smallest = weight, smallest
 
+    def _note(self, name: str, chosen: Sequence[float]) -> None:
+        self._note_weight(name, chosen)
+
     def choose(self, innovation: Innovation) -> Array:
         """The noise divided by the weights; the smallest weight is reported."""
         components = standardised(innovation.residual, innovation.predicted, innovation.noise)
@@ -84,10 +133,17 @@ class HuberWeights(EquivalentWeights):
         Innovation above which the weight is less than 1 [sigma], above 0.
     """
 
+    rule = huber_noise
+
     def __init__(self, k: float = 2.0):
         if not k > 0.0:
             raise ValueError(f"k = {k:g}: it must be above 0")
-        super().__init__(partial(huber, k=k))
+        super().__init__(partial(_with_huber, k))
+        self.k = k
+
+    def settings_of(self, longer: float) -> list[float]:
+        """As `NoiseAdaptation.settings_of`."""
+        return [self.k, self.smallest]
 
 
 class Igg3Weights(EquivalentWeights):
@@ -99,7 +155,14 @@ class Igg3Weights(EquivalentWeights):
         Innovation above which the weight decreases, and innovation at which it is zero [sigma], ``0 < k0 < k1``.
     """
 
+    rule = igg3_noise
+
     def __init__(self, k0: float = 2.5, k1: float = 8.0):
         if not 0.0 < k0 < k1:
             raise ValueError(f"k0 = {k0:g} and k1 = {k1:g}: it must be 0 < k0 < k1")
-        super().__init__(partial(igg3, k0=k0, k1=k1))
+        super().__init__(partial(_with_igg3, k0, k1))
+        self.k0, self.k1 = k0, k1
+
+    def settings_of(self, longer: float) -> list[float]:
+        """As `NoiseAdaptation.settings_of`."""
+        return [self.k0, self.k1, 2.0, self.smallest]

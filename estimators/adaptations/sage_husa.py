@@ -2,22 +2,42 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from simnav.compiled import kernel
-from simnav.types import Array, Instruments
+from simnav.types import Array
 
 from .base import Innovation
-from .noise import EstimatedNoise, Scope
+from .noise import RULE, EstimatedNoise, Scope, bound, copied
 
-__all__ = ["SageHusa"]
+__all__ = ["SageHusa", "sage_husa_noise"]
 
 
-@kernel("void(f8[:, ::1], f8, f8[::1], f8[:, ::1])")
-def _fade(estimate: Array, d: float, innovation: Array, predicted: Array) -> None:
-    """Update the estimate by the recursion of `SageHusa`, in place."""
-    for i in range(innovation.size):
-        for j in range(innovation.size):
+#: Places in the settings: forgetting factor, and bounds of the variance ratios; in the memory: weight of the estimate
+#: [innovations], whether there is one, and its elements.
+FADING, LOWEST, HIGHEST = range(3)
+COUNT, BEGUN, ESTIMATE = range(3)
+
+
+@kernel(RULE)
+def sage_husa_noise(
+    settings: Array, memory: Array, innovation: Array, predicted: Array, nominal: Array, noise: Array
+) -> float:
+    """Update the estimate by the recursion of `SageHusa`, and write it into ``noise`` within its bounds; 0."""
+    m = innovation.size
+    estimate = memory[ESTIMATE : ESTIMATE + m * m].reshape((m, m))
+    if memory[BEGUN] == 0.0:
+        memory[BEGUN] = 1.0
+        copied(nominal, estimate)
+    memory[COUNT] += 1.0
+    b, k = settings[FADING], memory[COUNT]
+    d = 1.0 / (k + 1.0) if b == 1.0 else (1.0 - b) / (1.0 - b ** (k + 1.0))
+    for i in range(m):
+        for j in range(m):
             sample = innovation[i] * innovation[j] - predicted[i, j]
             estimate[i, j] += d * (sample - estimate[i, j])
+    bound(estimate, nominal, settings[LOWEST], settings[HIGHEST], noise)
+    return 0.0
 
 
 class SageHusa(EstimatedNoise):
@@ -45,6 +65,8 @@ class SageHusa(EstimatedNoise):
         instrument of more than 1 Hz, so many for each hertz.
     """
 
+    rule = sage_husa_noise
+
     def __init__(
         self,
         fading: float = 0.96,
@@ -61,19 +83,22 @@ class SageHusa(EstimatedNoise):
             raise ValueError(f"prior = {prior}: it must not be negative")
         self.fading, self.prior = fading, prior
 
-    def reset(self, instruments: Instruments) -> None:
-        """Begin a run."""
-        super().reset(instruments)
-        self._estimates: dict[str, tuple[int, Array]] = {}
+    def settings_of(self, longer: float) -> list[float]:
+        """As `EstimatedNoise.settings_of`."""
+        return [self.fading ** (1.0 / longer), self.lowest * self.lowest, self.highest * self.highest]
+
+    def begun(self, longer: float, m: int) -> Array:
+        """As `EstimatedNoise.begun`."""
+        return np.array([round(self.prior * longer), *np.zeros(1 + m * m)])
 
     def estimate(self, innovation: Innovation) -> Array:
         """The bounded estimate, this innovation included."""
-        name = innovation.measurement.instrument
-        longer = self.longer[name]
-        k, estimate = self._estimates.get(name) or (round(self.prior * longer), innovation.noise.copy())
-        k += 1
-        b = self.fading ** (1.0 / longer)
-        d = 1.0 / (k + 1) if b == 1.0 else (1.0 - b) / (1.0 - b ** (k + 1))
-        _fade(estimate, d, innovation.residual, innovation.predicted)
-        self._estimates[name] = k, estimate
-        return self.bounded(estimate, innovation.noise)
+        _, residual, predicted, nominal, *_ = innovation
+        settings, memory = self.memory_of(innovation.measurement.instrument)
+        noise = np.empty_like(nominal)
+        sage_husa_noise(settings, memory, residual, predicted, nominal, noise)
+        return (
+            self.bounded(memory[ESTIMATE : ESTIMATE + nominal.size].reshape(nominal.shape), nominal)
+            if self.full
+            else noise
+        )

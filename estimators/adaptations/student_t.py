@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from simnav.compiled import kernel
@@ -9,9 +11,9 @@ from simnav.estimators.algebra.cholesky import factorise, invert_factor
 from simnav.types import Array
 
 from .base import Innovation
-from .noise import NoiseAdaptation, posterior
+from .noise import RULE, NoiseAdaptation, posterior
 
-__all__ = ["StudentT", "normalised_trace", "student_weight"]
+__all__ = ["StudentT", "normalised_trace", "student_t_noise", "student_weight"]
 
 
 @kernel("f8(f8[:, ::1], f8[::1], f8[:, ::1])")
@@ -61,6 +63,18 @@ def student_weight(innovation: Array, predicted: Array, noise: Array, dof: float
     return weight
 
 
+@kernel(RULE)
+def student_t_noise(
+    settings: Array, memory: Array, innovation: Array, predicted: Array, nominal: Array, noise: Array
+) -> float:
+    """Divide the nominal noise by `student_weight`, which is returned; settings: degrees of freedom, iterations."""
+    weight = student_weight(innovation, predicted, nominal, settings[0], int(settings[1]))
+    for i in range(innovation.size):
+        for j in range(innovation.size):
+            noise[i, j] = nominal[i, j] / weight
+    return weight
+
+
 class StudentT(NoiseAdaptation):
     """The noise of every measurement has Student's t distribution, with the datasheet's covariance R as scale matrix.
 
@@ -87,6 +101,8 @@ class StudentT(NoiseAdaptation):
         Number of alternating updates of state and weight for a measurement; at least 1.
     """
 
+    rule = student_t_noise
+
     def __init__(self, dof: float = 8.0, turns: int = 5):
         if not dof > 0.0:
             raise ValueError(f"dof = {dof:g}: it must be above 0")
@@ -94,8 +110,17 @@ class StudentT(NoiseAdaptation):
             raise ValueError(f"turns = {turns}: it must be at least 1")
         self.dof, self.turns = min(dof, 1e12), turns
 
+    def settings_of(self, longer: float) -> list[float]:
+        """As `NoiseAdaptation.settings_of`."""
+        return [self.dof, self.turns]
+
     def choose(self, innovation: Innovation) -> Array:
         """The noise divided by the weight, which is reported."""
-        weight = student_weight(innovation.residual, innovation.predicted, innovation.noise, self.dof, self.turns)
-        self.report(f"weight.{innovation.measurement.instrument}", weight)
-        return np.asarray(innovation.noise / weight)
+        m, residual, predicted, nominal, *_ = innovation
+        noise: Array = np.empty((len(nominal), len(nominal)))
+        weight = student_t_noise(*self.memory_of(m.instrument), residual, predicted, nominal, noise)
+        self.report(f"weight.{m.instrument}", weight)
+        return noise
+
+    def _note(self, name: str, chosen: Sequence[float]) -> None:
+        self._note_weight(name, chosen)

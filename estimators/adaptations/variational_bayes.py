@@ -7,12 +7,12 @@ from math import sqrt
 import numpy as np
 
 from simnav.compiled import kernel
-from simnav.types import Array, Instruments
+from simnav.types import Array
 
 from .base import Innovation
-from .noise import EstimatedNoise, Scope, posterior
+from .noise import RULE, EstimatedNoise, Scope, posterior
 
-__all__ = ["VariationalBayes", "variational_noise"]
+__all__ = ["VariationalBayes", "variational_bayes_noise", "variational_noise"]
 
 
 @kernel("void(f8[::1], f8[:, ::1], f8[:, ::1], f8, i8, f8, f8, f8[::1], f8[:, ::1])")
@@ -56,6 +56,28 @@ def variational_noise(
                 ratio[i] = min(max(scales[i] / shape, lowest), highest)
 
 
+#: Places in the settings: forgetting factor, iterations, and bounds of the variance ratios; in the memory: the shape of
+#: the densities, and their scales.
+FORGETTING, ITERATIONS, LOWEST, HIGHEST = range(4)
+SHAPE, SCALES = range(2)
+
+
+@kernel(RULE)
+def variational_bayes_noise(
+    settings: Array, memory: Array, innovation: Array, predicted: Array, nominal: Array, noise: Array
+) -> float:
+    """Make one step of `VariationalBayes`, and write the noise of its last iteration into ``noise``; 0."""
+    memory[SHAPE] = settings[FORGETTING] * memory[SHAPE] + 0.5
+    scales = memory[SCALES : SCALES + innovation.size]
+    for i in range(innovation.size):
+        scales[i] *= settings[FORGETTING]
+    variational_noise(
+        innovation, predicted, nominal, memory[SHAPE], int(settings[ITERATIONS]), settings[LOWEST], settings[HIGHEST],
+        scales, noise,
+    )  # fmt: skip
+    return 0.0
+
+
 class VariationalBayes(EstimatedNoise):
     """Estimates state and noise variances together; the variances are inverse-gamma distributed, with forgetting.
 
@@ -83,6 +105,8 @@ class VariationalBayes(EstimatedNoise):
         Number of alternating updates of state and noise for a measurement; at least 1.
     """
 
+    rule = variational_bayes_noise
+
     def __init__(
         self,
         forgetting: float = 0.902,
@@ -101,22 +125,17 @@ class VariationalBayes(EstimatedNoise):
             raise ValueError(f"iterations = {iterations}: it must be at least 1")
         self.forgetting, self.prior, self.iterations = forgetting, prior, iterations
 
-    def reset(self, instruments: Instruments) -> None:
-        """Begin a run."""
-        super().reset(instruments)
-        self._gammas: dict[str, tuple[float, Array]] = {}
+    def settings_of(self, longer: float) -> list[float]:
+        """As `EstimatedNoise.settings_of`."""
+        return [self.forgetting ** (1.0 / longer), self.iterations, self.lowest**2, self.highest**2]
+
+    def begun(self, longer: float, m: int) -> Array:
+        """As `EstimatedNoise.begun`: shape and scales of the datasheet's noise."""
+        return np.full(1 + m, 0.5 * self.prior * longer)
 
     def estimate(self, innovation: Innovation) -> Array:
         """The noise of the last iteration, bounded."""
-        name, nominal = innovation.measurement.instrument, innovation.noise
-        longer = self.longer[name]
-        first, forgetting = 0.5 * self.prior * longer, self.forgetting ** (1.0 / longer)
-        shape, scales = self._gammas.get(name) or (first, np.full(len(nominal), first))
-        shape, scales = forgetting * shape + 0.5, forgetting * scales
-        noise: Array = np.empty((len(nominal), len(nominal)))
-        variational_noise(
-            innovation.residual, innovation.predicted, nominal, shape, self.iterations, self.lowest**2, self.highest**2,
-            scales, noise,
-        )  # fmt: skip
-        self._gammas[name] = shape, scales
+        _, residual, predicted, nominal, *_ = innovation
+        noise: Array = np.empty_like(nominal)
+        variational_bayes_noise(*self.memory_of(innovation.measurement.instrument), residual, predicted, nominal, noise)
         return noise

@@ -46,6 +46,7 @@ from simnav.compiled import kernel
 from simnav.types import Array, Integers
 
 from .cholesky import factorise
+from .products import Places, add_product, list_elements, padded, sparse_product
 
 __all__ = [
     "Aids", "Elimination", "after_step", "error_after_step", "half_squares", "keep_weights", "solve_chain", "whiten",
@@ -54,6 +55,10 @@ __all__ = [
 #: A factor with a smaller weight than this is left out.
 LEAST_WEIGHT = 1e-9
 
+#: The elements of a sparse (n, n) matrix: values, columns, and their number in each row (`products`).
+Lists: TypeAlias = tuple[Array, Places, Places]
+#: Work space (n, w), where w is a multiple of eight.
+Room: TypeAlias = tuple[Array, Array, Array]
 #: The M aiding factors: their nodes (M,), in ascending order, and the number of the first node of all; which instrument
 #: each comes from (M,), measurements of one instrument on one node are taken as their mean; components (M,), 0 for a
 #: factor that says nothing; Jacobians with respect to the nodes (M, 3, n); residuals, measured less predicted (M, 3);
@@ -71,44 +76,39 @@ _ELIMINATION = (
 
 
 @kernel()
-def _predict(P: Array, F: Array, Q: Array, weight: float, work: Array, turned: Array, out: Array) -> None:
+def _predict(P: Array, F: Array, Q: Array, weight: float, lists: Lists, room: Room, out: Array) -> None:
     """Compute ``out = F P F' + Q / weight``, for a sparse F."""
     n = P.shape[0]
+    value, column, count = lists
+    full, work, turned = room
+    list_elements(F, value, column, count)
     for i in range(n):
         for j in range(n):
-            work[i, j] = 0.0
-        for k in range(n):
-            x = F[i, k]
-            if x != 0.0:
-                for j in range(n):
-                    work[i, j] += x * P[k, j]
+            full[i, j] = P[i, j]
+    sparse_product(value, column, count, full, work)
     for i in range(n):
         for j in range(n):
             turned[i, j] = work[j, i]
-            out[i, j] = 0.0
-    for i in range(n):
-        for k in range(n):
-            x = F[i, k]
-            if x != 0.0:
-                for j in range(n):
-                    out[i, j] += x * turned[k, j]
+    sparse_product(value, column, count, turned, full)
     scale = 1.0 / weight
     for i in range(n):
         for j in range(i + 1):
-            x = 0.5 * (out[i, j] + out[j, i]) + scale * Q[i, j]
+            x = 0.5 * (full[i, j] + full[j, i]) + scale * Q[i, j]
             out[i, j] = x
             out[j, i] = x
 
 
 @kernel()
 def _absorb(
-    P: Array, d: Array, measured: tuple[Array, Array, Array, float, int], L: Array, white: tuple[Array, Array, Array]
-) -> bool:
+    P: Array, d: Array, measured: tuple[Array, Array, Array, float, int], L: Array, white: tuple[Array, Array, Array],
+    columns: Integers,
+) -> bool:  # fmt: skip
     """Update P and d with a measurement (H, r, R, weight, m) with the noise covariance ``R / weight``.
 
     With ``L L' = S = H P H' + R / weight`` the whitened quantities ``white`` = (U, G, y) are stored: ``U = L^-1 H P``,
     ``G = L^-1 H`` and ``y = L^-1 (r - H d)``; the update is ``d + U' y`` and ``P - U' U``. The last row of L holds the
-    pivots. If S is singular, nothing is changed and the result is False.
+    pivots. If S is singular, nothing is changed and the result is False. ``columns`` (3, n + 1) is work space: the
+    columns of H that are not zero, and their number.
     """
     H, r, R, weight, m = measured
     U, G, y = white
@@ -117,19 +117,23 @@ def _absorb(
         y[a] = r[a]
         for c in range(n):
             U[a, c] = 0.0
+        count = 0
         for c in range(n):  # most elements are zero
             x = H[a, c]
             G[a, c] = x
             if x != 0.0:
+                columns[a, count] = c
+                count += 1
                 y[a] -= x * d[c]
                 for j in range(n):
                     U[a, j] += x * P[c, j]
+        columns[a, n] = count
     for a in range(m):
         for b in range(a + 1):
             x = 0.5 * (R[a, b] + R[b, a]) / weight
-            for c in range(n):
-                if H[b, c] != 0.0:
-                    x += H[b, c] * U[a, c]
+            for k in range(columns[b, n]):
+                c = columns[b, k]
+                x += H[b, c] * U[a, c]
             L[a, b] = x
     if not factorise(L, m, 1e-14, L[3]):
         return False
@@ -145,13 +149,18 @@ def _absorb(
         for c in range(n):
             U[a, c] *= x
             G[a, c] *= x
-    for i in range(n):
-        for a in range(m):
+    for a in range(m):
+        for i in range(n):
             d[i] += U[a, i] * y[a]
+    for i in range(n):
         if m == 3:  # in one pass
             u, v, w = U[0, i], U[1, i], U[2, i]
             for j in range(n):
                 P[i, j] -= u * U[0, j] + v * U[1, j] + w * U[2, j]
+        elif m == 2:  # likewise
+            u, v = U[0, i], U[1, i]
+            for j in range(n):
+                P[i, j] = P[i, j] - u * U[0, j] - v * U[1, j]
         else:
             for a in range(m):
                 u = U[a, i]
@@ -233,22 +242,6 @@ def _return(adjoint: Array, U: Array, G: Array, y: Array, m: int, z: Array) -> N
             adjoint[c] += G[a, c] * z[a]
 
 
-@kernel()
-def _add_rows(M: Array, x: Array, total: Array) -> None:
-    """Compute ``total += M' x`` row by row, four at a time: fewer sums go through memory, in the same order."""
-    n = x.size
-    k = 0
-    while k + 3 < n:
-        a, b, c, d = x[k], x[k + 1], x[k + 2], x[k + 3]
-        for j in range(n):
-            total[j] = total[j] + M[k, j] * a + M[k + 1, j] * b + M[k + 2, j] * c + M[k + 3, j] * d
-        k += 4
-    while k < n:
-        for j in range(n):
-            total[j] += M[k, j] * x[k]
-        k += 1
-
-
 @kernel(
     "UniTuple(f8, 2)(Tuple((f8[:, ::1], f8[::1])), Tuple((f8[:, :, ::1], f8[:, :, ::1], f8[:, ::1], f8[::1])), "
     f"{_AIDS}, f8, i8, {_ELIMINATION}, f8[:, ::1], f8[::1])"
@@ -286,17 +279,23 @@ def solve_chain(
     """
     prior_covariance, prior_shift = prior
     transition, noise, error, motion_weight = motion
-    node, base, _, components, jacobian, residual, aid_noise, aid_weight = aids
+    node, base, instrument, components, jacobian, residual, aid_noise, aid_weight = aids
     predicted, predicted_shift, filtered, filtered_shift, cross, white, innovation, used = left
     count, n = step.shape
     total = node.size
-    work, turned, L = np.empty((n, n)), np.empty((n, n)), np.empty((4, 3))
+    L, lists = np.empty((4, 3)), (np.empty((n, n)), np.empty((n, n), np.uint64), np.empty(n, np.uint64))
+    room = np.zeros((n, padded(n))), np.zeros((n, padded(n))), np.zeros((n, padded(n)))
     damps = count if damping > 0.0 else 0
     damp_crosses, damp_whites = np.empty((damps, n, 1, n)), np.empty((damps, n, 1, n))
     damp_innovations = np.empty((damps, n, 1))
     damp_used = np.zeros((damps, n), dtype=np.bool_)
-    unit, zero, variance = np.zeros((1, n)), np.zeros(1), np.empty((n, 1, 1))
+    unit, zero, damped = np.zeros((1, n)), np.zeros(1), np.empty((n, 1, 1))
     mean_jacobian, mean_residual, mean_noise = np.empty((3, n)), np.empty(3), np.empty((3, 3))
+
+    columns, most = np.empty((3, n + 1), dtype=np.int64), 0
+    for i in range(total):
+        most = max(most, instrument[i])
+    latest = np.full(most + 1, -1)
 
     i = 0
     while i < total and node[i] - base < first:
@@ -307,7 +306,7 @@ def solve_chain(
             P[:] = prior_covariance
             d[:] = prior_shift
         else:
-            _predict(filtered[k - 1], transition[k - 1], noise[k - 1], motion_weight[k - 1], work, turned, P)
+            _predict(filtered[k - 1], transition[k - 1], noise[k - 1], motion_weight[k - 1], lists, room, P)
             for r in range(n):
                 x = -error[k - 1, r]
                 for c in range(n):
@@ -318,44 +317,50 @@ def solve_chain(
         d[:] = predicted_shift[k]
         if damps:
             for r in range(n):
-                variance[r, 0, 0] = P[r, r]
+                damped[r, 0, 0] = P[r, r]
             for r in range(n):
                 unit[0, r] = 1.0
                 damp_used[k, r] = _absorb(
-                    P, d, (unit, zero, variance[r], damping, 1), L,
-                    (damp_crosses[k, r], damp_whites[k, r], damp_innovations[k, r]),
+                    P, d, (unit, zero, damped[r], damping, 1), L,
+                    (damp_crosses[k, r], damp_whites[k, r], damp_innovations[k, r]), columns,
                 )  # fmt: skip
                 unit[0, r] = 0.0
         end = i
+        several = False  # whether an instrument has several measurements here
         while end < total and node[end] - base == k:
             used[end] = 1 if components[end] > 0 and aid_weight[end] > LEAST_WEIGHT else 0
+            several |= latest[instrument[end]] == k
+            latest[instrument[end]] = k
             end += 1
         while i < end:
             if used[i] == 1:
                 m, whitened = components[i], (cross[i], white[i], innovation[i])
-                if _mean_of(i, end, aids, used, mean_jacobian, mean_residual, mean_noise) == 1:
-                    used[i] = _absorb(P, d, (jacobian[i], residual[i], aid_noise[i], aid_weight[i], m), L, whitened)
+                if not several or _mean_of(i, end, aids, used, mean_jacobian, mean_residual, mean_noise) == 1:
+                    measured = jacobian[i], residual[i], aid_noise[i], aid_weight[i], m
                 else:
-                    used[i] = _absorb(P, d, (mean_jacobian, mean_residual, mean_noise, 1.0, m), L, whitened)
+                    measured = mean_jacobian, mean_residual, mean_noise, 1.0, m
+                used[i] = _absorb(P, d, measured, L, whitened, columns)
             i += 1
 
-    adjoint, after, z = np.zeros(n), np.empty(n), np.empty(3)
+    adjoint, after, z, variance, ratio = np.zeros(n), np.empty(n), np.empty(3), np.empty(n), np.empty(n)
     largest = older = 0.0
     i = total - 1
     for k in range(count - 1, -1, -1):
         if k < count - 1:
             after[:] = 0.0
-            _add_rows(transition[k], adjoint, after)
+            add_product(transition[k], adjoint, after)
             adjoint[:] = after
         for r in range(n):
             step[k, r] = filtered_shift[k, r]
-        _add_rows(filtered[k], adjoint, step[k])
+        add_product(filtered[k], adjoint, step[k])
+        for r in range(n):
+            variance[r] = filtered[k, r, r]
+        for r in range(n):
+            ratio[r] = abs(step[k, r]) / sqrt(variance[r])
         size[k] = 0.0
         for r in range(n):
-            if not filtered[k, r, r] <= 0.0:
-                x = abs(step[k, r]) / sqrt(filtered[k, r, r])
-                if x > size[k] or x != x:
-                    size[k] = x
+            if not variance[r] <= 0.0 and (ratio[r] > size[k] or ratio[r] != ratio[r]):
+                size[k] = ratio[r]
         if size[k] > largest or size[k] != size[k]:
             largest = size[k]
         if k < first and (size[k] > older or size[k] != size[k]):
@@ -418,11 +423,13 @@ def after_step(
         norm[k] = _whiten(error[k], whitener[k], whitened[k])
     for i in range(node.size):
         k = node[i] - base
-        for a in range(3):
-            x = residual[i, a]
-            for c in range(n):
-                x -= jacobian[i, a, c] * step[k, c]
-            residual[i, a] = x
+        x, y, z = residual[i, 0], residual[i, 1], residual[i, 2]
+        for c in range(n):
+            s = step[k, c]
+            x -= jacobian[i, 0, c] * s
+            y -= jacobian[i, 1, c] * s
+            z -= jacobian[i, 2, c] * s
+        residual[i, 0], residual[i, 1], residual[i, 2] = x, y, z
         aid_norm[i] = _whiten(residual[i], aid_whitener[i], aid_whitened[i])
 
 

@@ -32,15 +32,17 @@ def project(covariance: Array, jacobian: Array, cross: Array, predicted: Array) 
         Overwritten with H P H'.
     """
     m, n = jacobian.shape
-    for r in range(n):
-        for i in range(m):
-            cross[r, i] = 0.0
+    column = np.empty(n)
     for i in range(m):
+        for r in range(n):
+            column[r] = 0.0
         for c in range(n):
             x = jacobian[i, c]
             if x != 0.0:
                 for r in range(n):
-                    cross[r, i] += x * covariance[c, r]
+                    column[r] += x * covariance[c, r]
+        for r in range(n):
+            cross[r, i] = column[r]
     for i in range(m):
         for k in range(m):
             predicted[i, k] = 0.0
@@ -83,18 +85,26 @@ def joseph_update(
     if not factorise(L, m, 1e-14, white):
         return -1.0
     # Whitened: U = P H' L^-T, so that K S K' = U U', K (P H')' = U U'; Joseph's sum needs the gain K = U L^-1.
-    gain = np.empty((n, m))
-    for r in range(n):
-        for i in range(m):
-            x = cross[r, i]
-            for k in range(i):
-                x -= L[i, k] * gain[r, k]
-            gain[r, i] = x / L[i, i]
-        for i in range(m - 1, -1, -1):
-            x = gain[r, i]
-            for k in range(i + 1, m):
-                x -= L[k, i] * gain[r, k]
-            gain[r, i] = x / L[i, i]
+    # The inner loops are those over the states, on rows of transposed matrices: they use vector instructions.
+    projected, gain, spread = np.empty((m, n)), np.empty((m, n)), np.empty((m, n))
+    for i in range(m):
+        for r in range(n):
+            projected[i, r] = gain[i, r] = cross[r, i]
+        for k in range(i):
+            x = L[i, k]
+            for r in range(n):
+                gain[i, r] -= x * gain[k, r]
+        x = L[i, i]
+        for r in range(n):
+            gain[i, r] /= x
+    for i in range(m - 1, -1, -1):
+        for k in range(i + 1, m):
+            x = L[k, i]
+            for r in range(n):
+                gain[i, r] -= x * gain[k, r]
+        x = L[i, i]
+        for r in range(n):
+            gain[i, r] /= x
     for i in range(m):
         white[i] = residual[i]
     solve_factor(L, m, white)
@@ -102,24 +112,30 @@ def joseph_update(
     for i in range(m):
         nis += white[i] * white[i]
     for r in range(n):
-        x = 0.0
-        for i in range(m):
-            x += gain[r, i] * residual[i]
-        correction[r] = x
-    spread = np.empty((n, m))  # K S - P H'
+        correction[r] = 0.0
+    for i in range(m):
+        x = residual[i]
+        for r in range(n):
+            correction[r] += gain[i, r] * x
+        for r in range(n):
+            spread[i, r] = -projected[i, r]  # K S - P H'
+        for k in range(m):
+            x = innovation_covariance[k, i]
+            for r in range(n):
+                spread[i, r] += gain[k, r] * x
     for r in range(n):
-        for i in range(m):
-            x = -cross[r, i]
-            for k in range(m):
-                x += gain[r, k] * innovation_covariance[k, i]
-            spread[r, i] = x
-    for r in range(n):
-        for c in range(r + 1):
-            x = covariance[r, c]
+        if m == 2:  # in one pass
+            s, t, u, v = spread[0, r], spread[1, r], gain[0, r], gain[1, r]
+            for c in range(r + 1):
+                first, second = s * gain[0, c] - u * projected[0, c], t * gain[1, c] - v * projected[1, c]
+                covariance[r, c] = covariance[r, c] + first + second
+        else:
             for i in range(m):
-                x += spread[r, i] * gain[c, i] - gain[r, i] * cross[c, i]
-            covariance[r, c] = x
-            covariance[c, r] = x
+                x, y = spread[i, r], gain[i, r]
+                for c in range(r + 1):
+                    covariance[r, c] += x * gain[i, c] - y * projected[i, c]
+        for c in range(r):
+            covariance[c, r] = covariance[r, c]
     return nis
 
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from simnav.environment.navigation import most_samples
+from simnav.environment.sample_counts import most_samples
 from simnav.estimator import UnsuitableScenario
 from simnav.scenario import Scenario
 from simnav.types import Array, InitialState, Instruments

@@ -24,15 +24,17 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from math import radians
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
-from gymnasium import spaces
 
 from simnav.types import Array
 
 from .bank import set_scales
 from .features import LARGEST_SCALE
+
+if TYPE_CHECKING:
+    from gymnasium import spaces
 
 __all__ = ["CORRECTIONS", "TASKS", "Correction", "Decision", "Detection", "Task", "Tuning"]
 
@@ -87,6 +89,13 @@ class Task(ABC):
         """Fill in the decisions of b agents; actions beyond their bounds are clipped to them."""
 
 
+def _box(size: int) -> spaces.Box:
+    """The numbers in [-1, 1]. Only an environment asks; an estimator with a trained policy imports no Gymnasium."""
+    from gymnasium import spaces
+
+    return spaces.Box(-1.0, 1.0, (size,), dtype=np.float32)
+
+
 class Tuning(Task):
     """How noisy each instrument is, and the motion of the vessel."""
 
@@ -95,7 +104,7 @@ class Tuning(Task):
 
     def action_space(self) -> spaces.Box:
         """``Box(-1, 1, (k + 1,), float32)``."""
-        return spaces.Box(-1.0, 1.0, (len(self.instruments) + 1,), dtype=np.float32)
+        return _box(len(self.instruments) + 1)
 
     def decide(self, actions: Array, decision: Decision) -> None:
         """See the module."""
@@ -110,6 +119,8 @@ class Detection(Task):
 
     def action_space(self) -> spaces.MultiBinary:
         """``MultiBinary(k K)``."""
+        from gymnasium import spaces
+
         return spaces.MultiBinary(len(self.instruments) * self.most)
 
     def decide(self, actions: Array, decision: Decision) -> None:
@@ -125,7 +136,7 @@ class Correction(Task):
 
     def action_space(self) -> spaces.Box:
         """``Box(-1, 1, (7,), float32)``."""
-        return spaces.Box(-1.0, 1.0, (len(CORRECTIONS),), dtype=np.float32)
+        return _box(len(CORRECTIONS))
 
     def decide(self, actions: Array, decision: Decision) -> None:
         """See the module."""

@@ -5,10 +5,11 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
-from typing import ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple, Protocol
 
 import numpy as np
 
+from simnav.compiled import Kernel
 from simnav.estimator.needs import Needs
 from simnav.estimators.algebra.joseph import joseph_update, project
 from simnav.geometry.rotation import left_jacobian
@@ -26,11 +27,40 @@ from simnav.types import (
 from .many_readings import ManyReadings
 from .own_observation import OwnObservation
 
-__all__ = ["ErrorModel", "Linearised", "Observation"]
+__all__ = ["ErrorModel", "Linearised", "Observation", "StepRule", "StepRules"]
 
 #: A measurement of m components with the covariance P of n states: innovation (m,), P H' (n, m), H P H' (m, m) and
 #: noise (m, m).
 Observation = tuple[Array, Array, Array, Array]
+
+
+#: Places in a row of results of a step, see `StepRule`.
+NIS, INNOVATION, SIGMA, REPORT, RESULTS = 0, 1, 4, 7, 8
+
+
+class StepRule(NamedTuple):
+    """How a kernel uses all measurements of a step and chooses the noise of each.
+
+    For each measurement it overwrites a row of results: from `NIS` on the normalised innovation squared, -1 if nothing
+    was changed; from `INNOVATION` on the innovation (3,); from `SIGMA` on the square roots of the variances that were
+    used (3,), NaN if none was chosen; and at `REPORT` a further number to be reported, or 0.
+
+    Attributes
+    ----------
+    kernel : Kernel
+        It takes the arguments of `simnav.estimators.models.inertial_step.filter_inertial` and ``arrays``.
+    arrays : tuple of arrays
+        What the rule knows.
+    """
+
+    kernel: Kernel[..., int]
+    arrays: tuple[Any, ...]
+
+
+class StepRules(Protocol):
+    """What has such a rule for instruments in the order of their names, or None."""
+
+    def step_rule(self, names: Sequence[str]) -> StepRule | None: ...
 
 
 class Linearised(NamedTuple):
@@ -168,6 +198,21 @@ class ErrorModel(ABC):
         linearised = self.measure(measurement)
         return None if linearised is None else linearised.noise
 
+    def nominal_noises(self, measurements: Sequence[Measurement]) -> Array | None:
+        """`nominal_noise` of k readings of one time of the channels of one instrument, by one call.
+
+        Parameters
+        ----------
+        measurements : sequence of Measurement
+            Readings of channels of one instrument (`many`).
+
+        Returns
+        -------
+        (k, m, m) array or None
+            The noises. None where each reading has to be asked for by itself.
+        """
+        return None
+
     @abstractmethod
     def correct(self, dx: Array) -> None:
         """Add a correction to the state."""
@@ -217,6 +262,31 @@ class ErrorModel(ABC):
         (float, float) or None
             Normalised innovation squared (-1 if nothing was changed), and the norm of the innovation. None if the
             model has no faster implementation than `innovate` and `absorb`.
+        """
+        return None
+
+    def assimilate_step(
+        self, measurements: Sequence[Measurement], until: float, covariance: Array, correction: Array,
+        rules: StepRules | None = None,
+    ) -> list[list[float]] | None:  # fmt: skip
+        """Use the measurements of a step, each at its time, and propagate to the step's end.
+
+        Parameters
+        ----------
+        measurements : sequence of Measurement
+            In order of their times; one that is later than ``until`` is used then.
+        until : float
+            End of the step [s].
+        covariance, correction
+            As of `assimilate`; the correction is that by the last measurement.
+        rules : StepRules, optional
+            Chooses the noise of each measurement; None: the nominal noise.
+
+        Returns
+        -------
+        list of list of float, or None
+            For each measurement, what `assimilate` returns; with rules, a row of results (`StepRule`). None if the
+            model has no faster implementation than `propagate` and `assimilate`; with rules this is so for a whole run.
         """
         return None
 

@@ -20,13 +20,14 @@ A subclass has the loops over a window: `linearise_motion`, `observe`, `move_fol
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from functools import singledispatch
 from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from simnav.compiled import kernel
+from simnav.compiled import kernel, ready
 from simnav.estimator.needs import Needs
 from simnav.estimators.algebra.whitening import whitening
 from simnav.types import (
@@ -34,6 +35,7 @@ from simnav.types import (
     Array,
     Datasheet,
     Estimate,
+    Flags,
     ImuSamples,
     InitialState,
     Instruments,
@@ -42,8 +44,10 @@ from simnav.types import (
 )
 
 from .base import ErrorModel, Linearised
+from .columns import Columns
+from .many_readings import ManyReadings
 
-__all__ = ["Chain", "Columns", "chain_of"]
+__all__ = ["Chain", "chain_of"]
 
 
 @kernel("void(f8[:, ::1], f8[::1], f8[:, ::1], f8[:, ::1], f8[::1])")
@@ -54,6 +58,13 @@ def _attach(noise: Array, value: Array, full: Array, whitener: Array, values: Ar
         for j in range(3):
             full[i, j] = noise[i, j] if max(i, j) < noise.shape[0] else 1.0 if i == j else 0.0
     whitening(full, whitener)
+
+
+@kernel("void(f8[:, :, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, :, ::1], f8[:, ::1])")
+def _attach_all(noise: Array, value: Array, full: Array, whitener: Array, values: Array) -> None:
+    """Apply `_attach` to k measurements."""
+    for k in range(noise.shape[0]):
+        _attach(noise[k], value[k], full[k], whitener[k], values[k])
 
 
 @kernel("void(f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1])")
@@ -154,84 +165,6 @@ def add_motion_noise(
         whitening(noise[i], whitener[i])
 
 
-class Columns:
-    """Named columns of equal length; rows are appended at the end and dropped at the front.
-
-    Parameters
-    ----------
-    **columns : tuple of int, or dtype
-        Shape of a row's float64 entry, or the type of a scalar.
-
-    Examples
-    --------
-    >>> c = Columns(time=(), value=(2,))
-    >>> for t in range(3):
-    ...     c.append(time=t, value=(t, -t))
-    >>> c.drop(1)
-    >>> c["time"].tolist(), c["value"][0].tolist()
-    ([1.0, 2.0], [1.0, -1.0])
-    """
-
-    def __init__(self, **columns: Any):
-        self._capacity = 64
-        self._columns: dict[str, Any] = {}
-        self._views: dict[str, Any] = {}
-        self._first = self._last = 0
-        self.add(**columns)
-
-    def add(self, **columns: Any) -> None:
-        """More columns; the rows that there are have zeros in them."""
-        for name, what in columns.items():
-            shape, dtype = ((self._capacity, *what), float) if isinstance(what, tuple) else ((self._capacity,), what)
-            self._columns[name] = np.zeros(shape, dtype)
-
-    def __len__(self) -> int:
-        return self._last - self._first
-
-    def __getitem__(self, name: str) -> Any:
-        """A view of a column, (rows, ...)."""
-        view = self._views.get(name)
-        if view is None:
-            view = self._views[name] = self._columns[name][self._first : self._last]
-        return view
-
-    def newest(self, name: str) -> Any:
-        """A view of the last row's entry in a column."""
-        return self._columns[name][self._last - 1]
-
-    def append(self, **values: Any) -> None:
-        """Add a row; what is not given keeps any value."""
-        if self._last == self._capacity:
-            self._make_room()
-        for name, value in values.items():
-            self._columns[name][self._last] = value
-        self._last += 1
-        self._views.clear()
-
-    def drop(self, count: int) -> None:
-        """Take ``count`` rows off the front."""
-        self._first += count
-        self._views.clear()
-
-    def pop(self, count: int) -> None:
-        """Take ``count`` rows off the end."""
-        self._last -= count
-        self._views.clear()
-
-    def _make_room(self) -> None:
-        """Move the rows to the front; twice the space where they fill more than half of it."""
-        rows = len(self)
-        grown = 2 * self._capacity if 2 * rows > self._capacity else self._capacity
-        for name, column in self._columns.items():
-            if grown > self._capacity:
-                new = np.zeros((grown, *column.shape[1:]), column.dtype)
-                new[:rows] = column[self._first : self._last]
-                self._columns[name] = new
-            else:
-                column[:rows] = column[self._first : self._last].copy()
-        self._capacity, self._first, self._last = grown, 0, rows
-
-
 class Chain(ABC):
     """The nodes and factors of a window over a model.
 
@@ -307,6 +240,9 @@ class Chain(ABC):
         if self._sides:
             self.aids.add(side=(self._sides,))
         self._many = [(many, many.channels(self.names)) for many in front.many]
+        together = {name for many in front.many for name in many.sources}
+        #: Of each instrument: whether it has an equation of its own, and one reading is predicted at a time.
+        self._one_by_one = np.array([name in front.own and name not in together for name in self.names], dtype=bool)
         self.folds = Columns(node=np.int64, time=(), transition=(n, n), noise=(n, n), shift=(n,), jacobian=(n, n))
         self.folds.add(**{name: getattr(front, name).shape for name in self._kept})
         self.folds.add(**{f"now_{name}": getattr(front, name).shape for name in front.state})
@@ -322,7 +258,7 @@ class Chain(ABC):
 
     def set_prior(self, covariance: Array, shift: Array) -> None:
         """Set the prior of the first node: its covariance, and its mean minus the node."""
-        self.prior, self.prior_shift = covariance.copy(), shift.copy()
+        self.prior, self.prior_shift = ready(covariance.copy()), ready(shift.copy())
         self.prior_whitener = np.empty_like(self.prior)
         whitening(self.prior, self.prior_whitener)
 
@@ -366,7 +302,7 @@ class Chain(ABC):
         """Make the front a node, with the motion since the newest one as its factor."""
         motions = self.motions
         motions.append(begin_shift=0.0, end_shift=0.0, time=self.front.time, weight=1.0)
-        _begin_motion(
+        _begin_motion.unchecked(
             self._transition, self._noise, motions.newest("transition"), motions.newest("jacobian"),
             motions.newest("noise"), motions.newest("whitener"),
         )  # fmt: skip
@@ -389,6 +325,10 @@ class Chain(ABC):
         """The (m, m) noise of a measurement at the front; None if it cannot be used."""
         return self.front.nominal_noise(measurement)
 
+    def nominal_noises(self, measurements: Sequence[Measurement]) -> Array | None:
+        """As `ErrorModel.nominal_noises`, at the front."""
+        return self.front.nominal_noises(measurements)
+
     def attach(self, measurement: Measurement, noise: Array) -> None:
         """Add a measurement at the front, with the (m, m) noise, as a factor on the newest node.
 
@@ -405,6 +345,21 @@ class Chain(ABC):
         )  # fmt: skip
         if self._sides:
             aids.newest("side")[: len(measurement.side)] = measurement.side
+
+    def attach_together(self, measurements: Sequence[Measurement], noise: Array) -> None:
+        """`attach` for k measurements of one time and m components, with their (k, m, m) noise."""
+        aids, ahead, k = self.aids, self.ahead > 0.0, len(measurements)
+        aids.append_rows(
+            k, node=self.base + len(self.nodes) - 1, fold=self._fold() if ahead else -1, bare=ahead, weight=1.0,
+            instrument=[self._index[m.instrument] for m in measurements], components=noise.shape[1],
+            time=[m.time for m in measurements],
+        )  # fmt: skip
+        _attach_all.unchecked(
+            np.ascontiguousarray(noise, dtype=np.float64), np.array([m.value for m in measurements], dtype=np.float64),
+            aids["noise"][-k:], aids["whitener"][-k:], aids["value"][-k:],
+        )  # fmt: skip
+        if self._sides and len(measurements[0].side):
+            aids["side"][-k:, : len(measurements[0].side)] = [m.side for m in measurements]
 
     def _fold(self) -> int:
         """The number of the fold at the front's time; a new one, if there is none yet."""
@@ -426,7 +381,7 @@ class Chain(ABC):
 
     def detach(self, count: int) -> None:
         """Remove the newest aiding factors."""
-        self.aids.pop(count)
+        self.aids.drop_newest(count)
 
     def drop(self, count: int) -> None:
         """Remove the oldest nodes and their factors from the window."""
@@ -479,10 +434,10 @@ class Chain(ABC):
         self.move_folds(int(folds["node"].searchsorted(aids["node"][first])))
         row = np.where(at_node, -1, aids["fold"] - self.fold_base)
         self.observe(first, row, folds, "now_", jacobian)
-        add_motion_noise(
+        add_motion_noise.unchecked(
             first, row, aids["components"], jacobian, folds["noise"], aids["noise"], aids["whitener"], aids["bare"]
         )
-        through_motion(first, row, min(self.coupled, self.size), folds["jacobian"], jacobian)
+        through_motion.unchecked(first, row, min(self.coupled, self.size), folds["jacobian"], jacobian)
 
     @abstractmethod
     def observe(self, first: int, row: NDArray[np.int64], states: Columns, prefix: str, jacobian: Array) -> None:
@@ -513,20 +468,14 @@ class Chain(ABC):
             The states, as `simnav.estimators.models.base.ErrorModel.observe_own` takes one of them.
         """
         aids, own = self.aids, self.front.own
-        of_its_own = np.array([name in own for name in self.names])
+        one_by_one = self._one_by_one
         here, among = row[first:] >= 0, aids["instrument"][first:]
         for many, channel in self._many:
-            if not len(rows := first + np.flatnonzero(here & (channel[among] >= 0))):
-                continue
-            of_its_own &= channel < 0
-            d, s = len(many.kind.components), len(many.kind.side)
-            aids["residual"][rows], jacobian[rows], aids["components"][rows] = 0.0, 0.0, d
-            aids["residual"][rows, :d], jacobian[rows, :d] = many.linearise(
-                aids["time"][rows], aids["value"][rows, :d], channel[aids["instrument"][rows]],
-                [column[row[rows]] for column in state], aids["side"][rows, :s],
-                jacobian.shape[2] - state[-1].shape[1],
-            )  # fmt: skip
-        for i in first + np.flatnonzero(of_its_own[aids["instrument"][first:]] & (row[first:] >= 0)):
+            if (found := here & (channel[among] >= 0)).any():
+                self._observe_many(many, channel, first, found, row, jacobian, state)
+        if not one_by_one.any():
+            return
+        for i in first + np.flatnonzero(one_by_one[among] & here):
             name = self.names[aids["instrument"][i]]
             d = len(own[name].kind.components)
             aids["residual"][i], jacobian[i], aids["components"][i] = 0.0, 0.0, 0
@@ -535,6 +484,28 @@ class Chain(ABC):
             found = self.front.observe_own(name, aids["time"][i], aids["value"][i, :d], at, side)
             if found is not None:
                 aids["residual"][i, :d], jacobian[i, :d], aids["components"][i] = *found, d
+
+    def _observe_many(
+        self, many: ManyReadings, channel: NDArray[np.intp], first: int, found: Flags, row: NDArray[np.int64],
+        jacobian: Array, states: tuple[Array, ...],
+    ) -> None:  # fmt: skip
+        """`observe_own` for the readings of an instrument with channels: those ``found`` among the aids from one on."""
+        aids, d = self.aids, len(many.kind.components)
+        rows: Any = slice(first, len(row)) if found.all() else first + np.flatnonzero(found)
+        at = row[rows]
+        low, high = int(at.min()), int(at.max()) + 1
+        # Rows in a slice are written where they are, without a copy.
+        out = jacobian[rows, :d] if isinstance(rows, slice) else None
+        innovation, of_these = many.linearise(
+            aids["time"][rows], aids["value"][rows, :d], channel[aids["instrument"][rows]],
+            [column[low:high] for column in states], at - low, aids["side"][rows, : len(many.kind.side)],
+            jacobian.shape[2] - states[-1].shape[1], out,
+        )  # fmt: skip
+        aids["residual"][rows], aids["components"][rows] = 0.0, d
+        aids["residual"][rows, :d] = innovation
+        if out is None:
+            jacobian[rows, :d] = of_these
+        jacobian[rows, d:] = 0.0
 
     def side_of(self, i: int) -> Array:
         """The (s,) side information of an aiding factor, whose instrument has an equation of its own."""

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
-from math import isnan
 
 from simnav.recording import AidStream
 from simnav.types import Array, Datasheet, Instruments, Measurement
@@ -67,7 +66,8 @@ def _apart(sheet: Datasheet) -> list[Datasheet]:
 
 def reading_of(measurement: Measurement) -> Measurement:
     """The measurement of a channel as one of an instrument of its own; its side information stays with it."""
-    return Measurement(measurement.time, measurement.source, measurement.kind, measurement.value, side=measurement.side)
+    time, instrument, kind, value, channel, side = measurement
+    return Measurement(time, f"{instrument}:{channel}" if channel else instrument, kind, value, "", side)
 
 
 def of_channels(stream: AidStream) -> list[AidStream]:
@@ -103,7 +103,9 @@ def owners(instruments: Instruments) -> dict[str, str]:
     return {s.name: s.instrument for s in by_channel(instruments).values() if isinstance(s, ChannelDatasheet)}
 
 
-def summary(diagnostics: Mapping[str, float | Array], owner: Mapping[str, str]) -> dict[str, float | Array]:
+def summary(
+    diagnostics: Mapping[str, float | Array], owner: Mapping[str, str], labels: dict[str, str] | None = None
+) -> dict[str, float | Array]:
     """The diagnostics of channels, ``QUANTITY.INSTRUMENT:CHANNEL``, as one of their instrument: the mean over them.
 
     Channels that say nothing (NaN) do not count. The result holds no other diagnostics.
@@ -114,12 +116,21 @@ def summary(diagnostics: Mapping[str, float | Array], owner: Mapping[str, str]) 
         All diagnostics of a step.
     owner : mapping of str to str
         The result of `owners`.
+    labels : dict of str to str, optional
+        The label of the mean for each label so far, empty for those that are not of a channel; a caller that keeps it
+        from step to step saves time.
     """
     found: dict[str, list[float]] = {}
+    labels = {} if labels is None else labels
     for label, value in diagnostics.items():
-        quantity, _, source = label.partition(".")
-        if source in owner and isinstance(value, (int, float)):
-            known = found.setdefault(f"{quantity}.{owner[source]}", [])
-            if not isnan(value):
+        mean = labels.get(label)
+        if mean is None:
+            quantity, _, source = label.partition(".")
+            mean = labels[label] = f"{quantity}.{owner[source]}" if source in owner else ""
+        if mean and isinstance(value, (int, float)):
+            known = found.get(mean)
+            if known is None:
+                known = found[mean] = []
+            if value == value:  # it is not NaN
                 known.append(float(value))
     return {label: sum(known) / len(known) if known else float("nan") for label, known in found.items()}

@@ -35,7 +35,8 @@ from simnav.types import KINDS, NO_SIDE, Array, Datasheet, Estimate, InitialStat
 
 from .ambiguity import innovation_of
 from .base import Linearised
-from .chain import Chain, Columns, chain_of
+from .chain import Chain, chain_of
+from .columns import Columns
 from .declared_errors import bias_of
 from .equations import EQUATIONS, equation_of
 from .levered import is_own, with_lever_arms

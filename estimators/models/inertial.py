@@ -39,7 +39,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from simnav.compiled import kernel
+from simnav.compiled import kernel, ready
 from simnav.estimator import UnsuitableScenario
 from simnav.estimator.needs import AID, IMU, Needs
 from simnav.estimators.algebra.joseph import joseph_sequence
@@ -57,10 +57,11 @@ from simnav.types import (
     Measurement,
 )
 
-from .base import ErrorModel, Linearised, Observation
+from .base import ErrorModel, Linearised, Observation, StepRules
 from .declared_errors import CURRENT, bias_of, bias_of_triad
 from .delayed import is_delayed
 from .equations import EQUATIONS, equation_of
+from .inertial_step import PLAIN, AidTable, Packet
 from .inertial_update import absorb_inertial, assimilate_inertial, innovate_inertial
 from .levered import is_own, with_lever_arms
 from .many_readings import of_instruments
@@ -87,7 +88,6 @@ __all__ = ["InertialModel", "roll_pitch_yaw"]
 _NAV, _MOTION = 15, 9
 _NO_TIMES, _NO_VECTORS = np.empty(0), np.empty((0, 3))
 _GRAVITY = 9.81
-_FLOAT = np.dtype(np.float64)
 
 
 @kernel("void(f8[:, ::1], f8[::1], f8, f8[:, ::1])")
@@ -202,6 +202,7 @@ class InertialModel(ErrorModel):
         self._bind()
         self.transition, self.process_noise = np.empty((_NAV, _NAV)), np.empty((_NAV, _NAV))
         self.load(None)
+        self._packet: Packet | None = None
         self.blocks = StateBlocks(_MOTION)
         self._imu(imu)
         self._aids()
@@ -274,6 +275,13 @@ class InertialModel(ErrorModel):
             self.own[sheet.name] = OwnObservation(sheet, self.blocks.places(sheet.name, _NAV), self.time)
         self.delayed = any(is_delayed(sheet) for sheet in own)
         self.many = of_instruments(self.own, self.bias_at)
+        self._many_of = {name: many for many in self.many for name in many.sources}
+        #: Of these: the noise without that of the datasheet, and a unit matrix.
+        self._beyond: dict[str, tuple[Array, Array]] = {}
+        for name in self._many_of:
+            sigma = self.instruments[name].sigma
+            unit = np.eye(len(sigma))
+            self._beyond[name] = self.noise[name] - sigma**2 * unit, unit
         self._fused = set(self.noise) - self.uncalibrated - set(self.own) if self.fused else set()
 
     def _more_blocks(self) -> None:
@@ -305,20 +313,28 @@ class InertialModel(ErrorModel):
         """
         if self._fused != set(self.noise) or not self.noise.keys() <= set(names):
             return None
-        codes, arms = np.zeros((len(names), 4), np.int64), np.zeros((len(names), 3))
-        noises, limits = np.zeros((len(names), 9)), np.zeros((len(names), 3))
+        codes, arms, noises = self._table(names)
+        limits = np.zeros((len(names), 3))
         for i, name in enumerate(names):
             if name in self.noise:
-                code, arms[i], bias_at, scale_at = self.aid_parameters[name]
-                d = len(self.noise[name])
-                codes[i], noises[i, : d * d] = (code, d, bias_at, scale_at), self.noise[name].ravel()
-                limits[i, :d] = KINDS[self.instruments[name].kind].limits
+                limits[i, : len(self.noise[name])] = KINDS[self.instruments[name].kind].limits
         return {
             "position": self.position, "velocity": self.velocity, "dcm": self.dcm, "memory": self._memory,
             "bias": self.bias, "turn": self._turn, "clock": self._clock, "sensors": self._noise,
             "calibration": self.calibration, "decay": self._decay, "density": self._density,
             "codes": codes, "arms": arms, "noises": noises, "limits": limits,
         }  # fmt: skip
+
+    def _table(self, names: Sequence[str]) -> AidTable:
+        """The instruments in the order of their names; zeros for one that is not observed."""
+        codes, arms = np.zeros((len(names), 4), np.int64), np.zeros((len(names), 3))
+        noises = np.zeros((len(names), 9))
+        for i, name in enumerate(names):
+            if name in self.noise:
+                code, arms[i], bias_at, scale_at = self.aid_parameters[name]
+                d = len(self.noise[name])
+                codes[i], noises[i, : d * d] = (code, d, bias_at, scale_at), self.noise[name].ravel()
+        return codes, arms, noises
 
     def load(self, imu: ImuSamples | None) -> None:
         """Take the IMU samples of the step that follows."""
@@ -327,10 +343,7 @@ class InertialModel(ErrorModel):
         if imu is None or len(imu) == 0:
             self._samples = (_NO_TIMES, _NO_TIMES, _NO_VECTORS, _NO_VECTORS)
         else:
-            self._samples = (imu.time, imu.interval, imu.angular_rate, imu.specific_force)
-            if not all(a.dtype is _FLOAT and a.flags.carray for a in self._samples):
-                time, interval, rate, force = (np.array(a, dtype=np.float64) for a in self._samples)
-                self._samples = (time, interval, rate, force)
+            self._samples = ready(imu.time), ready(imu.interval), ready(imu.angular_rate), ready(imu.specific_force)
 
     def propagate(self, covariance: Array, until: float) -> None:
         """Advance the state and its covariance through the samples loaded."""
@@ -417,6 +430,13 @@ class InertialModel(ErrorModel):
             return self.noise[name] + more
         return super().nominal_noise(measurement)
 
+    def nominal_noises(self, measurements: Sequence[Measurement]) -> Array | None:
+        """As `ErrorModel.nominal_noises`, for a kind that predicts many readings at one time."""
+        name = measurements[0].instrument
+        many = self._many_of.get(name)
+        more = None if many is None else many.more_noise([m.side for m in measurements])
+        return None if more is None else self.noise[name] + more
+
     def innovate(self, measurement: Measurement, covariance: Array) -> Observation | None:
         """Linearise a measurement and project the covariance (`simnav.estimators.models.inertial_update`)."""
         name = measurement.instrument
@@ -453,23 +473,41 @@ class InertialModel(ErrorModel):
         )  # fmt: skip
         return nis, size
 
+    def assimilate_step(
+        self, measurements: Sequence[Measurement], until: float, covariance: Array, correction: Array,
+        rules: StepRules | None = None,
+    ) -> list[list[float]] | None:  # fmt: skip
+        """As `ErrorModel.assimilate_step`, in one kernel, if no instrument has an equation or a clock of its own."""
+        if self._packet is None:
+            names = list(self.noise)
+            rule = PLAIN if rules is None else rules.step_rule(names)
+            if self._fused != set(names) or self.blocks.clocks or rule is None:
+                return None
+            self._packet = Packet(names, self._table(names), rule)
+        measured, rule = self._packet.fill(measurements), self._packet.rule
+        self._first = rule.kernel.unchecked(
+            (self.position, self.velocity, self.dcm, self._memory, self.bias, self._turn, self._clock), self._samples,
+            self._first, until, self._noise, (self.transition, self.process_noise, covariance),
+            (self.calibration, self._decay, self._density, correction), (self._packet.aids, measured),
+            *rule.arrays,
+        )  # fmt: skip
+        self.time = float(self._clock[0])
+        used: list[list[float]] = measured[3][: len(measurements)].tolist()
+        return used
+
     def assimilate_together(
         self, measurements: Sequence[Measurement], covariance: Array, correction: Array
     ) -> tuple[Array, Array] | None:
         """As `ErrorModel.assimilate_together`, where a kind predicts many readings at one time."""
-        names = [m.instrument for m in measurements]
-        many = next((many for many in self.many if names[0] in many.sources), None)
-        if many is None or many.biased or not self.fused:
+        times, names, _, values, _, sides = zip(*measurements)
+        many = self._many_of.get(names[0])
+        if many is None or many.biased or many.has_noise or not self.fused:
             return None
-        if self.own[names[0]].has_noise:
-            return None
-        k, sides, sheet = len(names), np.array([m.side for m in measurements]), self.instruments[names[0]]
-        unit = np.eye(len(sheet.sigma))
-        noise = self.noise[names[0]] - sheet.sigma**2 * unit + many.noise(sides)[:, :, None] * unit
-        state = [np.broadcast_to(array, (k, *array.shape)) for array in self._state()]
+        k, side, (beyond, unit) = len(names), np.array(sides), self._beyond[names[0]]
+        noise = beyond + many.noise(side)[:, :, None] * unit
         residual, jacobian = many.linearise(
-            np.array([m.time for m in measurements]), np.array([m.value for m in measurements]), many.channels(names),
-            state, sides, _NAV,
+            np.array(times), np.array(values), many.channels(names), [array[None] for array in self._state()],
+            np.zeros(k, dtype=np.intp), side, _NAV,
         )  # fmt: skip
         nis, size = np.empty(k), np.empty(k)
         joseph_sequence(covariance, residual, jacobian, noise, correction, nis, size)
@@ -492,5 +530,5 @@ class InertialModel(ErrorModel):
 
 def roll_pitch_yaw(dcm: Array) -> Array:
     """(3,) array: `simnav.geometry.rotation.rpy_from_dcm` of one matrix, without the overhead of stacks."""
-    c20, c21, c22 = float(dcm[2, 0]), float(dcm[2, 1]), float(dcm[2, 2])
-    return np.array([atan2(c21, c22), atan2(-c20, hypot(c21, c22)), atan2(float(dcm[1, 0]), float(dcm[0, 0]))])
+    (c00, _, _), (c10, _, _), (c20, c21, c22) = dcm.tolist()
+    return np.array([atan2(c21, c22), atan2(-c20, hypot(c21, c22)), atan2(c10, c00)])

@@ -27,9 +27,10 @@ from simnav.estimators.algebra.block_tridiagonal import error_after_step
 from simnav.geometry.rotation import cross, rotated, rotation_coefficients
 from simnav.types import Array, InitialState, Instruments, Integers
 
-from .chain import Chain, Columns, chain_of
+from .chain import Chain, chain_of
+from .columns import Columns
 from .inertial import InertialModel
-from .measurements import OWN, State, observe_inertial
+from .measurements import State, observe_inertial
 from .propagation import correct_inertial
 
 __all__ = ["InertialChain"]
@@ -362,10 +363,9 @@ class InertialChain(Chain):
         covariance = super().begin(start, instruments)
         front = self.front
         nothing = (0, np.zeros(3), -1, -1)
-        known = [front.aid_parameters.get(name, nothing) for name in self.names]
-        for i, name in enumerate(self.names):
-            if name in front.own:  # the compiled loop has no use for its states
-                known[i] = (OWN, np.zeros(3), -1, -1)
+        # The compiled loop leaves out what has an equation of its own.
+        self._own = np.array([name in front.own for name in self.names], dtype=bool)
+        known = [nothing if name in front.own else front.aid_parameters.get(name, nothing) for name in self.names]
         self._known = (
             np.array([code for code, *_ in known], dtype=np.int64),
             np.array([arm for _, arm, _, _ in known], dtype=np.float64).reshape(-1, 3),
@@ -377,20 +377,24 @@ class InertialChain(Chain):
     def linearise_motion(self, first: int = 0) -> None:
         """As `Chain.linearise_motion` (equations in the module)."""
         m = self.motions
-        _linearise_motion(first, m["transition"], m["begin_shift"], m["end_shift"], m["residual"], m["jacobian"])
+        _linearise_motion.unchecked(
+            first, m["transition"], m["begin_shift"], m["end_shift"], m["residual"], m["jacobian"]
+        )
 
     def observe(self, first: int, row: NDArray[np.int64], states: Columns, prefix: str, jacobian: Array) -> None:
         """As `Chain.observe`."""
         aids = self.aids
         wide = jacobian if self.size >= 15 else np.zeros((len(aids), 3, 15))
         position, velocity, dcm, bias, calibration = (states[prefix + name] for name in self.front.state)
-        _linearise_aids(
-            first, (row, aids["instrument"], aids["value"]), self._known,
+        compiled = np.where(self._own[aids["instrument"]], -1, row) if self.front.own else row
+        _linearise_aids.unchecked(
+            first, (compiled, aids["instrument"], aids["value"]), self._known,
             (position, velocity, dcm, states["raw_rate"], bias, calibration), aids["residual"], wide,
             aids["components"],
         )  # fmt: skip
         if self.front.own:
-            inertial = np.hstack([states[name] for name in self.node_arrays])
+            arrays = [states[name] for name in self.node_arrays]
+            inertial = arrays[0] if len(arrays) == 1 else np.hstack(arrays)
             self.observe_own(first, row, wide, position, velocity, dcm, inertial, bias, calibration)
         if wide is not jacobian:
             here = np.flatnonzero(row[first:] >= 0) + first
@@ -403,23 +407,23 @@ class InertialChain(Chain):
             folds[f"now_{name}"][first:] = folds[name][first:]
         position, velocity, dcm, bias, calibration = (folds[f"now_{name}"] for name in names)
         states = position, velocity, dcm, bias, calibration
-        _move_folds(first, folds["transition"], folds["shift"], states, folds["jacobian"])
+        _move_folds.unchecked(first, folds["transition"], folds["shift"], states, folds["jacobian"])
 
     def retract(self, step: Array) -> None:
         """As `Chain.retract`."""
         nodes, m = self.nodes, self.motions
-        _retract(
+        _retract.unchecked(
             step, nodes["position"], nodes["velocity"], nodes["dcm"], nodes["bias"], nodes["calibration"],
             m["begin_shift"], m["end_shift"],
         )  # fmt: skip
         if len(self.folds):
-            _retract_folds(step, self.folds["node"], self.base, self.folds["shift"])
+            _retract_folds.unchecked(step, self.folds["node"], self.base, self.folds["shift"])
         self.prior_shift = self.relative_shift(self.prior_shift, step[0])
 
     def along_motion(self, step: Array) -> Array:
         """As `Chain.along_motion`."""
         m, along = self.motions, np.empty_like(step)
-        _along_motion(
+        _along_motion.unchecked(
             m["transition"], m["jacobian"], m["residual"], m["begin_shift"], m["end_shift"], step, along
         )  # fmt: skip
         return along
@@ -427,13 +431,13 @@ class InertialChain(Chain):
     def turned(self, covariance: Array, shift: Array) -> Array:
         """``J P J'`` with the left Jacobian of the rotation (`simnav.geometry.rotation.left_jacobian`)."""
         turned = np.empty_like(covariance)
-        _turn_covariance(covariance, shift, turned)
+        _turn_covariance.unchecked(covariance, shift, turned)
         return turned
 
     def relative_shift(self, shift: Array, step: Array) -> Array:
         """Rotations compose."""
         rest = np.empty_like(shift)
-        _relative_shift(shift, step, rest)
+        _relative_shift.unchecked(shift, step, rest)
         return rest
 
 

@@ -8,6 +8,7 @@ a Python function. A kind that has `simnav.kinds.Kind.observations` is called on
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from math import isfinite
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +25,9 @@ from .own_observation import OwnObservation
 __all__ = ["ManyReadings", "of_instruments"]
 
 
-def of_instruments(own: Mapping[str, OwnObservation], bias_at: Mapping[str, int]) -> list[ManyReadings]:
+def of_instruments(
+    own: Mapping[str, OwnObservation], bias_at: Mapping[str, int], form: type[ManyReadings] | None = None
+) -> list[ManyReadings]:
     """One `ManyReadings` for each instrument with channels whose kind can predict many readings at one time.
 
     Parameters
@@ -33,13 +36,15 @@ def of_instruments(own: Mapping[str, OwnObservation], bias_at: Mapping[str, int]
         The equation of each source of readings, by its name.
     bias_at : mapping of str to int
         Index in the error state of the first bias of a source; sources without one are not in it.
+    form : type, optional
+        The class for the states of the model. Default: `ManyReadings`, for those of an inertial model.
     """
     groups: dict[str, list[str]] = {}
     for name, observation in own.items():
         sheet = observation.sheet
         if isinstance(sheet, ChannelDatasheet) and observation.observations is not None:
             groups.setdefault(sheet.instrument, []).append(name)
-    return [ManyReadings({name: own[name] for name in names}, bias_at) for names in groups.values()]
+    return [(form or ManyReadings)({name: own[name] for name in names}, bias_at) for names in groups.values()]
 
 
 class ManyReadings:
@@ -56,6 +61,8 @@ class ManyReadings:
     ----------
     biased : bool
         Whether a channel has biases. Filters take such channels one by one; a change needs new versions of their rows.
+    has_noise : bool
+        Whether the noise of a reading depends on the state (`OwnObservation.has_noise`).
     """
 
     def __init__(self, own: Mapping[str, OwnObservation], bias_at: Mapping[str, int]):
@@ -68,9 +75,11 @@ class ManyReadings:
         #: Of each channel: the index in the error state of its first bias; -1 without biases.
         self._bias_at = np.full(len(first.sheet.siblings), -1)
         self._bias_at[list(self._channel.values())] = [bias_at.get(name, -1) for name in own]
-        self.biased = bool(np.any(self._bias_at >= 0))
-        self._places = first.places
-        self._zeros = {b.name: np.zeros((1, b.size)) for b in first.sheet.blocks if b.name not in self._places}
+        self.biased, self.has_noise = bool(np.any(self._bias_at >= 0)), first.has_noise
+        places = first.places
+        stated = [block for block in first.sheet.blocks if block.name in places]
+        self._at = [(b.name, slice(places[b.name], places[b.name] + b.size)) for b in stated]
+        self._zeros = {b.name: np.zeros((1, b.size)) for b in first.sheet.blocks if b.name not in places}
 
     def __deepcopy__(self, memo: object) -> ManyReadings:
         """Itself: it never changes, and an estimator that takes late readings is copied in each step."""
@@ -81,7 +90,8 @@ class ManyReadings:
         return np.array([self._channel.get(name, -1) for name in names], dtype=np.intp)
 
     def linearise(
-        self, time: Array, value: Array, channel: NDArray[np.intp], state: Sequence[Array], side: Array, offset: int,
+        self, time: Array, value: Array, channel: NDArray[np.intp], states: Sequence[Array], row: NDArray[np.intp],
+        side: Array, offset: int, out: Array | None = None,
     ) -> tuple[Array, Array]:  # fmt: skip
         """Innovations and Jacobians of n readings.
 
@@ -93,12 +103,16 @@ class ManyReadings:
             Measured values.
         channel : (n,) int array
             Their channels, as of `channels`.
-        state : sequence of array
-            For each reading: position, velocity, DCM, output of the gyroscopes, their bias first, calibration (n, m).
+        states : sequence of array
+            K states: positions, velocities, DCMs, outputs of the gyroscopes, their biases first, calibrations (K, m).
+        row : (n,) int array
+            Which of the states each reading is predicted at.
         side : (n, s) array
             Their side information.
         offset : int
             Index in the error state of the first calibration state.
+        out : (n, d, offset + m) array, optional
+            Overwritten with the Jacobians, and returned; None: they are in a new array.
 
         Returns
         -------
@@ -107,26 +121,63 @@ class ManyReadings:
         jacobian : (n, d, offset + m) array
             Derivative of the prediction by the error state.
         """
-        position, velocity, dcm, rate, bias, calibration = state
-        turning = rate[:, :3] - bias[:, :3] - np.einsum("nji,nj->ni", dcm, earth_rate(position[:, 0]))
-        at = {name: slice(k, k + self._size(name)) for name, k in self._places.items()}
-        n = len(time)
-        blocks = {name: np.broadcast_to(zero, (n, zero.shape[1])) for name, zero in self._zeros.items()}
-        blocks |= {name: calibration[:, where] for name, where in at.items()}
+        own = states[-1].take(row, axis=0)
+        blocks = {name: np.broadcast_to(zero, (len(time), zero.shape[1])) for name, zero in self._zeros.items()}
+        for name, at in self._at:
+            blocks[name] = own[:, at]
+        position, velocity, dcm, turning = self._navigation(states, row, own)
         points = NavigationPoints(time, position, velocity, dcm, turning, blocks, channel, side)
         reading, given = self._observations(points, self._sheet)
-        jacobian = np.zeros((n, value.shape[1], offset + calibration.shape[1]))
-        jacobian[:, :, :9] = given[NAVIGATION]
-        for name, where in at.items():
-            jacobian[:, :, where.start + offset : where.stop + offset] = given[name]
-        biased = np.flatnonzero(self._bias_at[channel] >= 0)
-        if len(biased):
+        jacobian = np.empty((len(time), value.shape[1], offset + own.shape[1])) if out is None else out
+        jacobian[...] = 0.0
+        self._by_navigation(given[NAVIGATION], own, jacobian)
+        for name, at in self._at:
+            jacobian[:, :, at.start + offset : at.stop + offset] = given[name]
+        if self.biased and len(biased := np.flatnonzero(self._bias_at[channel] >= 0)):
             component = np.arange(value.shape[1])
             columns = self._bias_at[channel[biased], None] + component
             jacobian[biased[:, None], component, columns] = 1.0
             reading = np.array(reading)
-            reading[biased] = self.kind.add_error(reading[biased], calibration[biased[:, None], columns - offset])
+            reading[biased] = self.kind.add_error(reading[biased], own[biased[:, None], columns - offset])
         return innovation_of(self.kind, self._sheet, value, reading), jacobian
+
+    def _navigation(self, states: Sequence[Array], row: NDArray[np.intp], own: Array) -> tuple[Array, ...]:
+        """Position, velocity, DCM and angular rate at each of n readings; ``own`` is the (n, m) calibration there."""
+        position, velocity, dcm, rate, bias, _ = states
+        turning = rate[:, :3] - bias[:, :3] - np.einsum("nji,nj->ni", dcm, earth_rate(position[:, 0]))
+        return tuple(column.take(row, axis=0) for column in (position, velocity, dcm, turning))
+
+    def _by_navigation(self, given: Array, own: Array, jacobian: Array) -> None:
+        """Write the (n, d, 9) derivative by the navigation state into that by the error state."""
+        jacobian[:, :, :9] = given
+
+    def more_noise(self, sides: Sequence[Array]) -> Array | None:
+        """`OwnObservation.noise_without_state` of n readings.
+
+        Each sigma is computed by itself: functions of NumPy may differ in the last digit between one number and many.
+
+        Parameters
+        ----------
+        sides : sequence of (s,) array
+            Their side information.
+
+        Returns
+        -------
+        (n, d, d) array or None
+            Covariances. None where each reading has to be asked for by itself, also for the sake of a message.
+        """
+        function, n, d = self.kind.reading_sigma, len(sides), len(self.kind.components)
+        if function is None or self.has_noise:
+            return None
+        try:
+            sigma = np.array([function(side, self._sheet) for side in sides], dtype=np.float64)
+        except Exception:  # the reading that it is about says which
+            return None
+        if sigma.shape != (n, d) or not (isfinite(sigma.sum()) and sigma.min() >= 0.0):
+            return None
+        more = np.zeros((n, d, d))
+        more[:, range(d), range(d)] = sigma**2 - self._sheet.sigma**2
+        return more
 
     def noise(self, side: Array) -> Array:
         """The (n, d) variances of the white noise of n readings, from their (n, s) side information.
@@ -140,12 +191,9 @@ class ManyReadings:
         if function is None:
             return np.broadcast_to(self._sheet.sigma**2, shape)
         sigma = np.asarray(function(side, self._sheet), dtype=np.float64)
-        if sigma.shape != shape or not (np.isfinite(sigma).all() and np.all(sigma >= 0.0)):
+        if sigma.shape != shape or not (isfinite(sigma.sum()) and sigma.min() >= 0.0):
             raise ValueError(
                 f"reading_sigma of kind {self._sheet.kind!r}, for the instrument {self._sheet.name!r}, should return "
                 f"an array of shape {shape} for so many readings, finite and not negative, not {sigma.tolist()!r:.200}"
             )
         return np.asarray(sigma**2)
-
-    def _size(self, name: str) -> int:
-        return next(block.size for block in self._sheet.blocks if block.name == name)

@@ -14,17 +14,26 @@ from typing import TypeAlias
 import numpy as np
 
 from simnav.compiled import kernel
-from simnav.estimators.algebra.sparse_product import add_eight, eight_sums
+from simnav.estimators.algebra.products import (
+    Places,
+    add_eight,
+    eight_of,
+    eight_sums,
+    list_elements,
+    padded,
+    sparse_product,
+)
 from simnav.geometry.earth import EQUATORIAL_GRAVITY, ROTATION_RATE, SEMI_MAJOR_AXIS, gravity_scalar, radii_scalar
 from simnav.geometry.rotation import rotate_left, rotation_coefficients
 from simnav.strapdown import mechanize_step
-from simnav.types import Array, Integers
+from simnav.types import Array
 
 __all__ = [
     "BLOCK",
     "BLOCK_COLUMNS",
     "HELD_ATTITUDE",
     "HELD_VELOCITY",
+    "MOVING",
     "SAMPLES",
     "TURN_TIME",
     "Moving",
@@ -125,30 +134,21 @@ def _dynamics(F: Array, block: Array, gyro_decay: float, accelerometer_decay: fl
 
 
 @kernel()
-def _list_elements(F: Array, dt: float, value: Array, half: Array, column: Integers, count: Integers) -> None:
+def _list_elements(F: Array, dt: float, value: Array, half: Array, column: Places, count: Places) -> None:
     """List the elements of ``F dt`` and of ``F dt / 2`` that are not zero, row by row."""
-    for i in range(15):
-        q = 0
-        for k in range(15):
-            if F[i, k] != 0.0:
-                value[i, q], half[i, q], column[i, q] = F[i, k] * dt, 0.5 * F[i, k] * dt, k
-                q += 1
-        count[i] = q
+    list_elements(F, half, column, count)
+    for i in range(np.uint64(15)):
+        for q in range(count[i]):
+            value[i, q], half[i, q] = half[i, q] * dt, 0.5 * half[i, q] * dt
 
 
 @kernel()
-def _advance_rows(value: Array, half: Array, column: Integers, count: Integers, M: Array, A: Array) -> None:
+def _advance_rows(value: Array, half: Array, column: Places, count: Places, M: Array, A: Array) -> None:
     """Compute ``M = (I + F dt + F F dt^2 / 2) M`` with the lists of `_list_elements`; A is work space."""
-    for i in range(15):
-        for j in range(0, WIDTH, 8):
-            start = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-            s = eight_sums(value, column, i, count[i], M, j, start)
-            A[i, j], A[i, j + 1], A[i, j + 2], A[i, j + 3] = s[0], s[1], s[2], s[3]
-            A[i, j + 4], A[i, j + 5], A[i, j + 6], A[i, j + 7] = s[4], s[5], s[6], s[7]
-    for i in range(15):
-        for j in range(0, WIDTH, 8):
-            start = A[i, j], A[i, j + 1], A[i, j + 2], A[i, j + 3], A[i, j + 4], A[i, j + 5], A[i, j + 6], A[i, j + 7]
-            add_eight(M, i, j, eight_sums(half, column, i, count[i], A, j, start))
+    sparse_product(value, column, count, M, A)
+    for i in range(np.uint64(15)):
+        for j in range(np.uint64(0), np.uint64(WIDTH), np.uint64(8)):
+            add_eight(M[i], j, eight_sums(half, column, i, count[i], A, j, eight_of(A[i], j)))
 
 
 @kernel()
@@ -191,8 +191,8 @@ def accumulate_error(blocks: Array, count: int, noise: Array, transition: Array,
     value, half, column, elements = (
         np.empty((15, 15)),
         np.empty((15, 15)),
-        np.empty((15, 15), np.int64),
-        np.empty(15, np.int64),
+        np.empty((15, 15), np.uint64),
+        np.empty(15, np.uint64),
     )
     for i in range(15):
         Phi[i, i] = 1.0
@@ -398,7 +398,6 @@ def propagate_covariance(
         length.
     """
     n, m = covariance.shape[0], transition.shape[0]
-    X = np.zeros((m, n))
     decay, noise = np.empty(n - m), np.empty(n - m)
     for i in range(n - m):
         decay[i] = exp(-rate[i] * elapsed)
@@ -406,22 +405,21 @@ def propagate_covariance(
         noise[i] = density[i] * elapsed
         if rate[i] > 0.0:
             noise[i] = density[i] * (1.0 - decay[i] * decay[i]) / (2.0 * rate[i])
+    value, column, count = np.empty((m, m)), np.empty((m, m), np.uint64), np.empty(m, np.uint64)
+    list_elements(transition, value, column, count)
+    P, X = np.zeros((m, padded(n))), np.empty((m, padded(n)))
+    T, Y = np.zeros((m, padded(m))), np.empty((m, padded(m)))
     for i in range(m):
-        for k in range(m):
-            x = transition[i, k]
-            if x != 0.0:
-                for j in range(n):
-                    X[i, j] += x * covariance[k, j]
-    T = np.empty((m, m))
-    for i in range(m):
+        for j in range(n):
+            P[i, j] = covariance[i, j]
         for j in range(m):
-            T[i, j] = transition[j, i]
-    Y = np.zeros((m, m))
-    for i in range(m):
-        for k in range(m):
-            x = X[i, k]
-            for j in range(m):
-                Y[i, j] += x * T[k, j]
+            T[j, i] = transition[i, j]
+    sparse_product(value, column, count, P, X)
+    for i in range(m):  # X is full
+        count[i] = m
+        for j in range(m):
+            column[i, j] = j
+    sparse_product(X, column, count, T, Y)
     for i in range(m):
         for j in range(i + 1):
             x = 0.5 * (Y[i, j] + Y[j, i]) + process_noise[i, j]

@@ -35,6 +35,7 @@ from .base import ErrorModel, Linearised
 from .declared_errors import bias_of
 from .equations import equation_of
 from .levered import is_own, with_lever_arms
+from .many_readings import of_instruments
 from .measurements import wrap
 from .moving_chain import MovingModel
 from .ship_kernels import (
@@ -55,7 +56,7 @@ from .ship_kernels import (
     observe_ship,
     sail_ships,
 )
-from .ship_observation import HEEL, VERTICAL_SPEED, ShipObservation
+from .ship_observation import HEEL, VERTICAL_SPEED, ShipObservation, ShipReadings
 from .state_blocks import StateBlocks
 from .sum_of_processes import merged_states, with_variance
 
@@ -219,6 +220,7 @@ class ShipModel(MovingModel):
                 kind, numbers = _aid(sheet, self.sway)
                 code = np.array([kind, self.bias_at.get(name, -1), self.scale_at.get(name, -1)], dtype=np.int64)
                 self.aids[name] = code, np.array(numbers), 1 if kind in (HEADING, LOG) else 2
+        self.many = of_instruments(self.own, self.bias_at, ShipReadings)
 
     def propagate(self, covariance: Array, until: float) -> None:
         """Advance the state and its covariance."""

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from simnav.compiled import kernel
 from simnav.types import Array, InitialState, Instruments, Integers
 
-from .chain import Chain, Columns, chain_of
+from .chain import Chain, chain_of
+from .columns import Columns
 from .moving_chain import MovingChain
 from .ship import ShipModel
 from .ship_kernels import VELOCITY, fill_jacobian, residual_of

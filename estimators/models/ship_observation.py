@@ -7,10 +7,11 @@ What a reading depends on beyond that is noise: height, vertical speed, roll and
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from math import cos, sin
 
 import numpy as np
+from numpy.typing import NDArray
 
 from simnav.geometry.earth import displace
 from simnav.kinds import NavigationPoint
@@ -18,10 +19,11 @@ from simnav.types import NO_SIDE, Array, Datasheet
 
 from .ambiguity import innovation_of
 from .base import Linearised
+from .many_readings import ManyReadings
 from .own_observation import OwnObservation
 from .ship_kernels import CE, CN, PSI, E, N, R, U
 
-__all__ = ["HEEL", "VERTICAL_SPEED", "ShipObservation"]
+__all__ = ["HEEL", "VERTICAL_SPEED", "ShipObservation", "ShipReadings"]
 
 #: Roll and pitch, which the model takes for zero, one sigma [rad].
 HEEL = 0.03
@@ -151,6 +153,20 @@ class ShipObservation(OwnObservation):
     def _point(self, time: float, position: Array, x: Array, side: Array) -> NavigationPoint:
         """The navigation state of a ship."""
         return NavigationPoint(time, position, *_kinematics(x), self.blocks(x), self.channel, side)
+
+
+class ShipReadings(ManyReadings):
+    """The readings of all channels of an instrument, at the states ``position, x`` of a ship."""
+
+    def _navigation(self, states: Sequence[Array], row: NDArray[np.intp], own: Array) -> tuple[Array, ...]:
+        return states[0].take(row, axis=0), *_kinematics(own)
+
+    def _by_navigation(self, given: Array, own: Array, jacobian: Array) -> None:
+        c, s, u = np.cos(own[:, PSI, None]), np.sin(own[:, PSI, None]), own[:, U, None]
+        jacobian[:, :, N], jacobian[:, :, E] = given[:, :, 0], given[:, :, 1]
+        jacobian[:, :, CN], jacobian[:, :, CE] = given[:, :, 3], given[:, :, 4]
+        jacobian[:, :, U] = given[:, :, 3] * c + given[:, :, 4] * s
+        jacobian[:, :, PSI] = given[:, :, 8] + (given[:, :, 4] * c - given[:, :, 3] * s) * u
 
 
 def _kinematics(x: Array) -> tuple[Array, Array, Array]:

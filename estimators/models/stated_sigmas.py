@@ -15,7 +15,7 @@ import numpy as np
 
 from simnav.types import Array, Instruments, Measurement
 
-from .base import ErrorModel, Linearised, Observation
+from .base import ErrorModel, Linearised, Observation, StepRules
 from .chain import Chain
 
 __all__ = ["with_stated_sigmas"]
@@ -49,6 +49,9 @@ class _Stated(ErrorModel):
             return super().nominal_noise(measurement)
         return ErrorModel.nominal_noise(self, measurement)
 
+    def nominal_noises(self, measurements: Sequence[Measurement]) -> Array | None:
+        return None if any(map(self._states, measurements)) else super().nominal_noises(measurements)
+
     def innovate(self, measurement: Measurement, covariance: Array) -> Observation | None:
         if not self._states(measurement):
             return super().innovate(measurement, covariance)
@@ -56,6 +59,14 @@ class _Stated(ErrorModel):
 
     def assimilate(self, measurement: Measurement, covariance: Array, correction: Array) -> tuple[float, float] | None:
         return None if self._states(measurement) else super().assimilate(measurement, covariance, correction)
+
+    def assimilate_step(
+        self, measurements: Sequence[Measurement], until: float, covariance: Array, correction: Array,
+        rules: StepRules | None = None,
+    ) -> list[list[float]] | None:  # fmt: skip
+        if rules is not None or any(map(self._states, measurements)):
+            return None
+        return super().assimilate_step(measurements, until, covariance, correction)
 
     def assimilate_together(
         self, measurements: Sequence[Measurement], covariance: Array, correction: Array

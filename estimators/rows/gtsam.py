@@ -1,8 +1,13 @@
-"""GTSAM as an independent reference, over an IMU and whatever aids there are.
+"""GTSAM as an independent reference, over an IMU and whatever aids have a compiled measurement equation.
 
 These rows share our mechanization of the datasheets and our measurement models, and nothing else with the windows of
 `simnav.estimators.solvers.window`: preintegration, linearisation, elimination and marginalisation are GTSAM's. A node
 has 15 states: biases, scale factor and misalignment of the aids count as white noise, the IMU's biases walk at random.
+
+They use the instruments with a compiled measurement equation (`simnav.kinds.EQUATIONS`). Those that a Python function
+observes, with their blocks of states, are left out without a message: raw observations of satellites, beams, ranges to
+beacons, instruments of plug-ins. Without another aid these rows are inertial navigation. In the tests
+``tests/cases/gtsam_channels.py`` has GTSAM's smoother over satellites.
 """
 
 from simnav.estimator import register
@@ -14,7 +19,9 @@ __all__ = ["GtsamBatch", "GtsamFixedLag", "GtsamGnc", "GtsamIsam2"]
 
 @register("gtsam-fixed-lag")
 class GtsamFixedLag(Row, solver=FixedLagEstimator):
-    """GTSAM's incremental fixed-lag smoother over an IMU and whatever aids there are.
+    """GTSAM's incremental fixed-lag smoother over an IMU and whatever aids have a compiled measurement equation.
+
+    Raw observations of satellites and other readings that a Python function predicts are left out.
 
     Source: F. Dellaert and others, GTSAM 4.3.
     """

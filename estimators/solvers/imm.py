@@ -166,6 +166,7 @@ class ImmEstimator(KalmanEstimator):
 
     pieces = ("model", "smoother")
     sets_aside: ClassVar[bool] = True
+    takes_steps = False
     refuses: ClassVar[Mapping[str, str]] = {
         **KalmanEstimator.refuses,
         "adaptation": "the noise of each measurement is a mixture over its levels",

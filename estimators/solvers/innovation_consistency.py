@@ -32,7 +32,8 @@ class InnovationTest(ConsistencyTest):
     def __init__(self) -> None:
         super().__init__()
         self._sum, self._freedom = 0.0, 0
-        self._epochs: deque[tuple[float, int]] = deque(maxlen=EPOCHS)
+        self._sums: deque[float] = deque(maxlen=EPOCHS)
+        self._freedoms: deque[int] = deque(maxlen=EPOCHS)
 
     def add(self, nis: float, freedom: int) -> None:
         """Add a normalised innovation squared, and its degrees of freedom."""
@@ -43,6 +44,7 @@ class InnovationTest(ConsistencyTest):
         """Test the sum at the end of an epoch. An epoch without measurements is ignored."""
         if not self._freedom:
             return
-        self._epochs.append((self._sum, self._freedom))
+        self._sums.append(self._sum)
+        self._freedoms.append(self._freedom)
         self._sum, self._freedom = 0.0, 0
-        self.judge(*map(sum, zip(*self._epochs)))
+        self.judge(sum(self._sums), sum(self._freedoms))

@@ -18,23 +18,24 @@ Source: P. D. Groves 2013, sections 3.2 and 3.4.3.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from itertools import groupby
 from math import hypot
 from typing import ClassVar
 
 import numpy as np
 
+from simnav.estimators.adaptations.adaptive_step import CompiledRules
 from simnav.estimators.adaptations.base import Adaptation, Innovation
 from simnav.estimators.adaptations.intersection import weaken_position
+from simnav.estimators.adaptations.noise import NoiseAdaptation
 from simnav.estimators.composition import Solver
-from simnav.estimators.models.base import ErrorModel, Linearised, Observation
+from simnav.estimators.models.base import INNOVATION, NIS, ErrorModel, Linearised, Observation
 from simnav.estimators.models.channels import owners, summary
 from simnav.estimators.models.coupling import by_source
 from simnav.estimators.models.stated_sigmas import with_stated_sigmas
 from simnav.estimators.models.suitable import ModelChoice
 from simnav.types import Array, Estimate, InitialState, Instruments, Measurement, Measurements, NavigationStates
 
-from .admission import Admission
+from .admission import Admission, together
 from .innovation_consistency import InnovationTest
 from .iterated import Iteration, absorb_iterated
 from .smoother import Smoother
@@ -73,6 +74,8 @@ class KalmanEstimator(Solver):
     #: True if `ErrorModel.assimilate` may replace `_observe` and `_absorb` when the noise is the nominal one. A solver
     #: with another form of one of these methods sets it to False.
     assimilates: ClassVar[bool] = True
+    #: True if `ErrorModel.assimilate_step` may replace `_take` and `_propagate`, too, for all measurements of a step.
+    takes_steps: ClassVar[bool] = True
 
     model: ErrorModel
 
@@ -106,10 +109,14 @@ class KalmanEstimator(Solver):
         self._admission = Admission(instruments, self._names)
         self._innovation_test = InnovationTest()
         self._correction = np.empty(self.model.size)
-        self._owners = owners(instruments)
+        self._owners, self._mean_labels = owners(instruments), dict[str, str]()
         self._keys = {name: (f"innovation.{name}", f"nis.{name}") for name in self._names}
         self._blank = dict.fromkeys((label for pair in self._keys.values() for label in pair), np.nan)
         self._plain = self.assimilates and self.adaptation is None and not self._stepwise
+        self._rules = CompiledRules(self.adaptation) if isinstance(self.adaptation, NoiseAdaptation) else None
+        known = self.adaptation is None or self._rules is not None
+        single = self.iteration is not None or self.smoother is not None
+        self._whole = self.assimilates and self.takes_steps and known and not single
         self._linearised: Linearised | None = None
         if self.smoother is not None:
             self.smoother.begin(self.model, [instruments[name] for name in self._names])
@@ -124,13 +131,15 @@ class KalmanEstimator(Solver):
         model.load(measurements.imu)
         diagnostics: dict[str, float | Array] = dict(self._blank)
         flagged: list[tuple[str, float]] = []
-        advance = self._propagate if self.smoother is None else self._advance
-        for group in self._together(self._admission.admit(measurements, model.time)):
-            advance(min(group[0].time, measurements.time))
-            if len(group) == 1 or not self._take_together(group, diagnostics):
-                for m in group:
-                    self._take(m, diagnostics, flagged)
-        advance(measurements.time)
+        admitted = self._admission.admit(measurements, model.time)
+        if not (self._whole and self._take_step(admitted, measurements.time, diagnostics)):
+            advance = self._propagate if self.smoother is None else self._advance
+            for group in self._together(admitted):
+                advance(min(group[0].time, measurements.time))
+                if len(group) == 1 or not self._take_together(group, diagnostics):
+                    for m in group:
+                        self._take(m, diagnostics, flagged)
+            advance(measurements.time)
         diagnostics["skipped"] = float(self._admission.skipped)
         self._innovation_test.end_epoch()
         diagnostics["variance_factor"] = self._innovation_test.variance_factor
@@ -138,7 +147,7 @@ class KalmanEstimator(Solver):
         if self.adaptation is not None:
             diagnostics.update(self.adaptation.diagnostics())
         if self._owners:
-            diagnostics.update(summary(diagnostics, self._owners))
+            diagnostics.update(summary(diagnostics, self._owners, self._mean_labels))
         estimate = self._estimate()
         estimate.diagnostics, estimate.flagged = diagnostics, flagged
         if self.smoother is not None:
@@ -235,8 +244,25 @@ class KalmanEstimator(Solver):
         """The measurements, those of the channels of one instrument at one time in one group if that is quicker."""
         if not (self._plain and self.model.many) or self.iteration is not None or self.smoother is not None:
             return ((m,) for m in measurements)
-        groups = groupby(measurements, lambda m: (m.time, self._owners.get(m.instrument, m.instrument)))
-        return (tuple(group) for _, group in groups)
+        return together(measurements, self._owners)
+
+    def _take_step(
+        self, measurements: Sequence[Measurement], until: float, diagnostics: dict[str, float | Array]
+    ) -> bool:
+        """Use the measurements of a step, and propagate to its end; False if they have to be taken one by one."""
+        rules = self._rules
+        used = self.model.assimilate_step(measurements, until, self.covariance, self._correction, rules)
+        if used is None:
+            self._whole = self._whole and rules is None  # otherwise it is so for the run
+            return False
+        if rules is None:
+            for m, row in zip(measurements, used, strict=True):
+                self._note(m, row[0], row[1], diagnostics)
+            return True
+        for m, row in zip(measurements, used, strict=True):
+            rules.adaptation.noted(m.instrument, row)
+            self._note(m, row[NIS], hypot(*row[INNOVATION : INNOVATION + len(m.value)]), diagnostics)
+        return True
 
     def _take_together(self, group: Sequence[Measurement], diagnostics: dict[str, float | Array]) -> bool:
         """Use the measurements of a group; False if they have to be taken one by one."""

@@ -43,7 +43,7 @@ from __future__ import annotations
 
 import contextlib
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import hypot, inf, isfinite
 from typing import ClassVar
@@ -62,7 +62,7 @@ from simnav.estimators.models.suitable import ModelChoice
 from simnav.estimators.weightings.base import Factors, Isolation, Weighting
 from simnav.types import Array, Estimate, InitialState, Instruments, Measurement, Measurements
 
-from .admission import Admission
+from .admission import Admission, together
 from .cost_consistency import CostTest
 from .looking_back import LooksBack
 
@@ -179,7 +179,8 @@ class WindowEstimator(LooksBack, Solver):
         self.chain.front.reports_all |= self.reports_all
         self.covariance = self.chain.begin(start, instruments)
         observed = [name for name, sheet in instruments.items() if self.chain.observes(sheet)]
-        self._admission, self._owners = Admission(instruments, observed), owners(instruments)
+        self._admission = Admission(instruments, observed)
+        self._owners, self._mean_labels = owners(instruments), dict[str, str]()
         for what in (self.adaptation, self.weighting, self.isolation):
             if what is not None:
                 what.reset(instruments)
@@ -205,9 +206,15 @@ class WindowEstimator(LooksBack, Solver):
         attached = 0
         samples = measurements.imu.time if self.every_sample and measurements.imu is not None else np.empty(0)
         admitted = self._admission.admit(measurements, chain.time)
-        for m in admitted:
-            self._advance(min(m.time, measurements.time), samples)
-            attached += self._take(m, m.time == admitted[-1].time, diagnostics, flagged)
+        plain = self.adaptation is None and bool(self._owners)
+        for group in together(admitted, self._owners) if plain else [[m] for m in admitted]:
+            self._advance(min(group[0].time, measurements.time), samples)
+            last = group[0].time == admitted[-1].time
+            if len(group) > 1 and self._take_together(group, last):
+                attached += len(group)
+                continue
+            for m in group:
+                attached += self._take(m, last, diagnostics, flagged)
         if attached:
             self._optimise(attached, diagnostics, flagged)
             self._marginalise()
@@ -217,7 +224,7 @@ class WindowEstimator(LooksBack, Solver):
             if what is not None:
                 diagnostics.update(what.diagnostics())
         if self._owners:
-            diagnostics.update(summary(diagnostics, self._owners))
+            diagnostics.update(summary(diagnostics, self._owners, self._mean_labels))
         estimate = chain.estimate(chain.predicted_covariance(self.covariance))
         diagnostics["inconsistent"] = float(self._cost_test.inconsistent)
         if self._cost_test.inconsistent and estimate.covariance is not None:
@@ -253,10 +260,24 @@ class WindowEstimator(LooksBack, Solver):
             self._admission.skipped += 1
         if noise is None:
             return False
-        if chain.ahead > 0.0 and (last or self.every_sample or chain.ahead >= self.spacing):
-            self._extend()
+        self._make_node(last)
         chain.attach(m, noise)
         return True
+
+    def _take_together(self, group: Sequence[Measurement], last: bool) -> bool:
+        """`_take` for readings of one instrument at one time; False if they have to be taken one by one."""
+        noise = self.chain.nominal_noises(group)
+        if noise is None:
+            return False
+        self._make_node(last)
+        self.chain.attach_together(group, noise)
+        return True
+
+    def _make_node(self, last: bool) -> None:
+        """Make the front a node for a measurement, unless that can be folded onto the newest one."""
+        chain = self.chain
+        if chain.ahead > 0.0 and (last or self.every_sample or chain.ahead >= self.spacing):
+            self._extend()
 
     def _adapted_noise(
         self,
@@ -418,7 +439,7 @@ class WindowEstimator(LooksBack, Solver):
     def _keep(self) -> None:
         """Refer what the elimination left, and the residuals, to the nodes as they are after the step."""
         chain, nodes, motions, aids = self.chain, self.chain.nodes, self.chain.motions, self.chain.aids
-        after_step(
+        after_step.unchecked(
             nodes["step"], (nodes["predicted_shift"], nodes["filtered_shift"]),
             (motions["jacobian"], motions["residual"], motions["whitener"], motions["whitened"], motions["norm"]),
             (
@@ -433,8 +454,8 @@ class WindowEstimator(LooksBack, Solver):
         motion, aid = self.chain.factors_from(node)
         self.chain.linearise_motion(motion)
         self.chain.linearise_aids(aid)
-        whiten(motion, motions["residual"], motions["whitener"], motions["whitened"], motions["norm"])
-        whiten(aid, aids["residual"], aids["whitener"], aids["whitened"], aids["norm"])
+        whiten.unchecked(motion, motions["residual"], motions["whitener"], motions["whitened"], motions["norm"])
+        whiten.unchecked(aid, aids["residual"], aids["whitener"], aids["whitened"], aids["norm"])
 
     def _weigh(self, iteration: int) -> tuple[bool, int]:
         """Ask the weighting; whether it has settled, and the first node that has to do with a weight that is new."""
@@ -445,7 +466,7 @@ class WindowEstimator(LooksBack, Solver):
         settled = self.weighting.weigh(factors)
         if self.isolation is not None:
             settled = self.isolation.judge(factors) and settled
-        first = keep_weights(
+        first = keep_weights.unchecked(
             (before[0], motions["norm"], motions["weight"]), aids["node"], self.chain.base,
             (before[1], aids["norm"], aids["weight"]), self.tolerance,
         )  # fmt: skip
@@ -454,7 +475,7 @@ class WindowEstimator(LooksBack, Solver):
     def _cost(self) -> float:
         """Half the sum of squares of all factors, with the weights that they have."""
         chain, motions, aids = self.chain, self.chain.motions, self.chain.aids
-        cost: float = half_squares(
+        cost: float = half_squares.unchecked(
             chain.prior_whitener, chain.prior_shift, motions["weight"], motions["norm"], aids["weight"], aids["norm"]
         )
         return cost
@@ -463,7 +484,7 @@ class WindowEstimator(LooksBack, Solver):
         """One step of all nodes; its largest component in sigmas, of all nodes and of those before ``first``."""
         chain, nodes = self.chain, self.chain.nodes
         motions, aids = chain.motions, chain.aids
-        sizes: tuple[float, float] = solve_chain(
+        sizes: tuple[float, float] = solve_chain.unchecked(
             (chain.prior if first else chain.turned(chain.prior, -chain.prior_shift), chain.prior_shift),
             (motions["jacobian"], motions["noise"], motions["residual"], motions["weight"]),
             (

@@ -32,7 +32,9 @@ def show(out: Output, request: InspectCommand) -> None:
     out.print(tables.table("what the files hold", ["stream", "format", "times", "columns, guessed"], rows))
     for sentence in failed:
         out.remark(sentence)
-    if request.output is not None and streams:
+    if request.output is not None and streams and not any(g.quantity == "position" for of in found for g in of):
+        out.remark(f"{request.output}: no scenario yet, since no columns with latitude and longitude were found")
+    elif request.output is not None and streams:
         out.print(f"scenario: {absolute(request.output)}",
                   f"next:     look at what is marked 'check', then simnav check {request.output}")  # fmt: skip
     if request.plot is not None and streams:

@@ -64,19 +64,20 @@ def write_csv(recording: Recording, path: Path) -> list[Path]:
     A recording without truth has no ``truth.csv``, and its instruments no column of faults.
     """
     written = [_write_csv(path / f"{name}.csv", columns) for name, columns in tables_of(recording, path)]
-    return [*written, *_beside(recording, path)]
+    return [*written, *_beside(recording, path, "csv")]
 
 
 @writes("recording", "parquet")
 def write_parquet(recording: Recording, path: Path) -> list[Path]:
     """A folder as of ``csv``, with Parquet files whose fields hold their unit as metadata (``unit``)."""
     written = [_write_parquet(path / f"{name}.parquet", columns) for name, columns in tables_of(recording, path)]
-    return [*written, *_beside(recording, path)]
+    return [*written, *_beside(recording, path, "parquet")]
 
 
-def _beside(recording: Recording, path: Path) -> list[Path]:
+def _beside(recording: Recording, path: Path, ending: str) -> list[Path]:
     """What an estimator is told at the start, for people and for programs."""
-    return [write_whole(path / "README.md", readme(recording)), write_whole(path / "start.json", start_text(recording))]
+    text = readme(recording, ending)
+    return [write_whole(path / "README.md", text), write_whole(path / "start.json", start_text(recording))]
 
 
 class Column(NamedTuple):

@@ -80,8 +80,8 @@ def _plain(value: Any) -> Any:
     return value if isinstance(value, (str, int, bool, type(None))) else str(value)
 
 
-def readme(recording: Recording) -> str:
-    """The text of ``README.md``."""
+def readme(recording: Recording, ending: str = "csv") -> str:
+    """The text of ``README.md``, beside files with this ending."""
     start, instruments = recording.start, recording.instruments
     seed = "not told" if recording.seed == NO_SEED else str(recording.seed)
     sigma = np.sqrt(np.diag(start.covariance))
@@ -98,17 +98,17 @@ def readme(recording: Recording) -> str:
     ]
     if recording.data.imu is not None:
         lines.append(
-            f"| `imu.csv` | {len(recording.data.imu)} | mean angular rate and specific force over the interval that "
-            "ends at the time; axes forward, starboard, down |"
+            f"| `imu.{ending}` | {len(recording.data.imu)} | mean angular rate and specific force over the interval "
+            "that ends at the time; axes forward, starboard, down |"
         )
     for name, s in recording.data.aids.items():
         kind = KINDS[s.kind]
         columns = ", ".join(f"{c.name} [{c.unit}]" for c in kind.components)
         if s.has_clock:
             columns += "; the time is the stamp, and the reading arrives at `arrival_s`"
-        lines.append(f"| `{name}.csv` | {len(s)} | {kind.quantity}: {columns} |")
+        lines.append(f"| `{name}.{ending}` | {len(s)} | {kind.quantity}: {columns} |")
     if has_truth(recording):
-        lines.append(f"| `truth.csv` | {len(recording.data.truth)} | the true states at the ends of the steps |")
+        lines.append(f"| `truth.{ending}` | {len(recording.data.truth)} | the true states at the ends of the steps |")
     lines += [
         "| `start.json` | | start, covariance and datasheets for programs, in SI units and radians |",
         "",

@@ -64,7 +64,8 @@ class SweepFile:
         """What the page shows of it: charts of one dial, with a slider, or a map of two; and the breaking points."""
         dials, score = self.content["dials"], self.content["score"]
         titles = [_title(d) for d in dials]
-        breaking = list(self.content["breaking_points"])
+        breaking, values = list(self.content["breaking_points"]), dials[0]["values"]
+        last = values[0 if len(values) > 1 and dials[0].get("clean") == values[-1] else -1]
         error = score["title"] + ("" if score["unit"] == "-" else f" [{score['unit']}]")
         if len(dials) == 1:
             caption = "Point and line: median with its 95 % interval. The slider above chooses the value."
@@ -89,7 +90,7 @@ class SweepFile:
                     "value": short(b["value"]["value"]),
                     "low": short(b["value"]["low"]),
                     "high": short(b["value"]["high"]),
-                    "beyond": dials[0]["values"][-1],
+                    "beyond": last,
                 }
                 for b in breaking
             ],

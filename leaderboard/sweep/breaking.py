@@ -32,8 +32,8 @@ class BreakingPoint:
     threshold : float
         In the unit of the score.
     value : Interval
-        Of the dial, with its 95 % interval over the seeds. Infinite where the error stays below the threshold up to the
-        highest value of the sweep: it breaks beyond, or not at all.
+        Of the dial, with its 95 % interval over the seeds, from the end that is nearer to the clean value. Infinite
+        where the error stays below the threshold up to the last value of the sweep: it breaks beyond, or not at all.
     at : float or None
         Value of the second dial of a map.
     """
@@ -92,16 +92,21 @@ def breaking_point(
     limit : float, optional
         Limit of the error. Default: twice the median error at the clean value.
     clean : int
-        Number of the clean value; the search goes up from it.
+        Number of the clean value; the search goes up from it, or down where it is the highest.
     at : float, optional
         Value of the second dial.
     """
-    x, y = np.asarray(dial, dtype=np.float64)[clean:], np.asarray(errors, dtype=np.float64)[:, clean:]
+    x, y = np.asarray(dial, dtype=np.float64), np.asarray(errors, dtype=np.float64)
+    down = len(x) > 1 and clean == len(x) - 1
+    x, y = (-x[::-1], y[:, ::-1]) if down else (x[clean:], y[:, clean:])
 
     def found(rows: Array) -> tuple[float, float]:
         middle = np.median(rows, axis=0)
         threshold = 2.0 * float(middle[0]) if limit is None else limit
         return crossing(x, middle, threshold), threshold
+
+    def of_dial(value: float) -> float:
+        return -value if down and math.isfinite(value) else value
 
     criterion = "twice-clean" if limit is None else "limit"
     if not len(y):
@@ -112,4 +117,5 @@ def breaking_point(
         draws = np.random.default_rng(0).integers(0, n, (_RESAMPLES, n))
         values = [found(y[rows])[0] for rows in draws]
         low, high = np.quantile(values, (0.025, 0.975), method="nearest").tolist()  # some may be infinite
-    return BreakingPoint(estimator, criterion, threshold, Interval(value, low, high, n), at)
+    interval = Interval(of_dial(value), of_dial(low), of_dial(high), n)
+    return BreakingPoint(estimator, criterion, threshold, interval, at)

@@ -125,7 +125,9 @@ class Sweep(Shown):
 
     def _breaking_table(self) -> tables.Fitted:
         """Where each estimator breaks."""
-        beyond = f"beyond {self.values[0][-1]:g}"
+        values = self.values[0]
+        down = len(values) > 1 and clean_value(self.dials[0]) == values[-1]
+        beyond = f"beyond {values[0 if down else -1]:g}"
 
         def figure(x: float) -> str:
             return "–" if math.isnan(x) else beyond if math.isinf(x) else f"{x:.3g}"
@@ -192,7 +194,8 @@ class Sweep(Shown):
             "score": {"name": self.score, "title": score.title, "unit": score.unit},
             "limit": self.limit,
             "dials": [
-                {"name": d.name, "key": d.key, "unit": d.unit, "title": d.title, "values": list(v)}
+                {"name": d.name, "key": d.key, "unit": d.unit, "title": d.title, "values": list(v),
+                 "clean": clean_value(d)}
                 for d, v in zip(self.dials, self.values, strict=True)
             ],
             "points": [

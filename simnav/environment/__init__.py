@@ -7,12 +7,14 @@ of an estimator. ``wrappers.py`` holds relative actions and observations of orde
 `simnav.estimators.learning`.
 """
 
-from __future__ import annotations
+from importlib import import_module
+from typing import TYPE_CHECKING
 
-from simnav.environment.agent import EstimatorAgent, unpack
-from simnav.environment.navigation import REWARDS, NavigationEnv, Observation, checked_action
-from simnav.environment.vector import NavigationVectorEnv, spawn_seeds
-from simnav.environment.wrappers import NormaliseObservation, RelativeAction
+if TYPE_CHECKING:
+    from simnav.environment.agent import EstimatorAgent, unpack
+    from simnav.environment.navigation import REWARDS, NavigationEnv, Observation, checked_action
+    from simnav.environment.vector import NavigationVectorEnv, spawn_seeds
+    from simnav.environment.wrappers import NormaliseObservation, RelativeAction
 
 __all__ = [
     "REWARDS",
@@ -26,3 +28,18 @@ __all__ = [
     "spawn_seeds",
     "unpack",
 ]
+
+# An estimator that decides as an agent was trained to needs no environment, and none of Gymnasium.
+_HOMES = {
+    "agent": ("EstimatorAgent", "unpack"),
+    "navigation": ("REWARDS", "NavigationEnv", "Observation", "checked_action"),
+    "vector": ("NavigationVectorEnv", "spawn_seeds"),
+    "wrappers": ("NormaliseObservation", "RelativeAction"),
+}
+
+
+def __getattr__(name: str) -> object:
+    for module, found in _HOMES.items():
+        if name in found:
+            return getattr(import_module(f"{__name__}.{module}"), name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -29,6 +29,7 @@ from numpy.typing import NDArray
 
 from simnav.arrivals import Arrivals
 from simnav.environment.charted import ChartedEnv
+from simnav.environment.sample_counts import most_samples
 from simnav.environment.stretch import LiveStretch, Stretch, horizontal, pack, rows_of
 from simnav.geometry.rotation import dcm_from_rpy, rotation_vector_from_dcm
 from simnav.types import KINDS, Array, InitialState
@@ -38,7 +39,7 @@ if TYPE_CHECKING:
     from simnav.scenario import Scenario
     from simnav.simulation.steps import SteppedRuns
 
-__all__ = ["REWARDS", "NavigationEnv", "Observation", "checked_action", "most_samples"]
+__all__ = ["REWARDS", "NavigationEnv", "Observation", "checked_action"]
 
 Observation = dict[str, Any]
 
@@ -381,26 +382,6 @@ def _open(scenario: Scenario, seed: int) -> tuple[Any, str]:
 
 
 # ------------------------------------------------------------------------------------------------- spaces
-
-
-def most_samples(scenario: Scenario) -> dict[str, int]:
-    """The largest number of samples in one step, for each instrument and for ``imu``; each channel counts."""
-    instruments, step = scenario.instruments_sheet(), scenario.step
-    rates = {name: sheet.rate for name, sheet in instruments.items()}
-    if clash := {"imu", "interval"} & set(rates):
-        raise ValueError(f"scenario {scenario.id}: {clash.pop()!r} is no name for an aiding instrument")
-    if instruments.imu is not None:
-        rates = {"imu": instruments.imu.rate, **rates}
-    most = {name: max(1, math.ceil(rate * step - 1e-6)) for name, rate in rates.items()}
-    if scenario.recorded:  # real instruments are late, and then deliver several at once; the IMU is on a grid
-        most = {name: k if name == "imu" else 2 * k + 1 for name, k in most.items()}
-    for name, spec in scenario.aids.items():
-        spread = spec.latency_spread()
-        if spread is not None:  # what was delayed by up to the spread, and what was not, may come in one step
-            most[name] = max(most[name], math.ceil(spec.rate * (step + spread)) + 1)
-    for name, sheet in instruments.items():
-        most[name] *= max(1, len(sheet.channels))
-    return most
 
 
 def _sides(scenario: str, possible: Sequence[Scenario]) -> dict[str, int]:

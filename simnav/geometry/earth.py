@@ -137,8 +137,9 @@ def earth_rate(latitude: Array | float) -> Array:
         Earth rate, north, east, down [rad/s] (Groves eq. 2.123).
     """
     latitude = np.asarray(latitude)
-    zero = np.zeros_like(latitude, dtype=np.float64)
-    return ROTATION_RATE * np.stack([np.cos(latitude), zero, -np.sin(latitude)], axis=-1)
+    rate = np.zeros((*latitude.shape, 3))
+    rate[..., 0], rate[..., 2] = ROTATION_RATE * np.cos(latitude), -ROTATION_RATE * np.sin(latitude)
+    return rate
 
 
 def displace(position: Array, offset: Array) -> Array:

@@ -54,6 +54,8 @@ _REFERENCE = {
     ),
 }
 _GTSAM = "gtsam:"
+#: No angle in degrees is as large as this, taken as one in radians.
+_DEGREES = 1e3
 
 
 @dataclass(frozen=True, eq=False)
@@ -254,14 +256,16 @@ def read_channel(spec: RecordedSpec, channel: ChannelSpec, what: str, recording:
     names = kind.values
     table, time, rows = open_file(spec, channel.file, recording, channel.sentence, channel.talker, channel.where)
     time = time + channel.offset
-    rows = rows[channel.first :: channel.every] if channel.hold_out is None else rows[:: channel.every]
-    if channel.hold_out is not None:
-        rows = np.delete(rows, np.s_[channel.first :: channel.hold_out])
     columns = _columns(channel, kind, table)
     if len(columns) != len(names):
         raise LogError(
             f"{table.source}: {what} needs {len(names)} columns ({', '.join(names)}), but {len(columns)} are given"
         )
+    if channel.drop_repeated:  # before rows are chosen: else the reference has the fix of the estimator once more
+        rows = _fresh(table, columns, rows)
+    rows = rows[channel.first :: channel.every] if channel.hold_out is None else rows[:: channel.every]
+    if channel.hold_out is not None:
+        rows = np.delete(rows, np.s_[channel.first :: channel.hold_out])
     units = (
         (channel.units,) * len(columns) if isinstance(channel.units, str) else channel.units or ("1",) * len(columns)
     )
@@ -291,9 +295,6 @@ def read_channel(spec: RecordedSpec, channel: ChannelSpec, what: str, recording:
             raise LogError(f"{table.source}: frame = {channel.frame!r} is for positions, and {what} is none")
         value = geodetic_from_local(value, spec.origin, channel.frame)[:, : len(names)]
     _check_range(value, kind, columns, table, rows)
-    if channel.drop_repeated:
-        fresh = np.concatenate([[True], np.any(np.diff(value, axis=0) != 0.0, axis=1)])
-        rows, value = rows[fresh], value[fresh]
     if channel.variation is not None or channel.variation_model is not None:
         if kind.role != "heading":
             raise LogError(f"{table.source}: variation_deg and variation_model are for headings, and {what} is none")
@@ -305,6 +306,15 @@ def read_channel(spec: RecordedSpec, channel: ChannelSpec, what: str, recording:
             value[:, i] = wrap_angle(value[:, i])
     sigma = _sigma(channel, kind, table, rows, what) if channel.sigma else None
     return Series(table.source, time[rows], value, table.line[rows], sigma)
+
+
+def _fresh(table: Table, columns: Sequence[Column], rows: NDArray[np.int64]) -> NDArray[np.int64]:
+    """The rows whose values are not all those of the row before; rows without a value stay."""
+    raw = np.stack([table.column(c)[1][rows] for c in columns], axis=-1)
+    constant = [isinstance(c, str) and c.startswith("=") for c in columns]
+    given = np.flatnonzero((np.isfinite(raw) | constant).all(axis=1))
+    same = np.all(np.diff(raw[given], axis=0) == 0.0, axis=1, where=~np.array(constant))
+    return np.delete(rows, given[1:][same])
 
 
 def _sigma(channel: ChannelSpec, kind: Kind, table: Table, rows: NDArray[np.int64], what: str) -> Array:
@@ -402,9 +412,10 @@ def _check_range(
         limit = 2.0 * math.pi if component.cyclic else component.limit
         bad = np.flatnonzero(np.abs(value[:, i]) > limit + 1e-9)
         if bad.size:
+            huge = abs(value[bad[0], i]) > _DEGREES
             raise LogError(
                 f"{table.source}, line {table.line[rows[bad[0]]]}, column {columns[i]!r}: {component.name} would be "
-                f"{value[bad[0], i]:.6g} rad; is its unit 'deg'?"
+                f"{value[bad[0], i]:.6g} rad; is its unit 'deg'" + (", or '1e-7 deg'?" if huge else "?")
             )
 
 

@@ -19,6 +19,7 @@ from simnav.log.files import FileSpec
 from simnav.log.kept import kept
 from simnav.log.reader import Rows, register_reader
 from simnav.log.table import LogError, LogWarning, Table, utc_seconds
+from simnav.log.text_forms import form_of_text
 from simnav.log.units import factor
 from simnav.types import Array
 
@@ -27,6 +28,10 @@ __all__ = ["date_and_time", "read_csv", "rows_of"]
 _DELIMITERS = (",", ";", "\t", " ")
 _MISSING = ["", "nan", "NaN", "NAN", "NA", "null"]
 _SOMETHING = re.compile(rb"\S")
+_DECIMAL_COMMA = re.compile(rb'\s*"?[+-]?\d+,\d+(?:[eE][+-]?\d+)?"?\s*')
+_DECIMAL_POINT = re.compile(rb'\s*"?[+-]?\d+\.\d+(?:[eE][+-]?\d+)?"?\s*')
+#: So many bytes tell whether numbers have decimal commas.
+_HEAD = 4096
 #: Arrow's words for a cell that does not fit the type of its column: the number of the column, and the type.
 _NOT_OF_TYPE = re.compile(r"In CSV column #(\d+): .*?conversion error to (\w+)", re.DOTALL)
 
@@ -116,7 +121,8 @@ def _time(table: Table, file: FileSpec, column: str) -> Array:
 def read_csv(path: Path, comment: str = "") -> Table:
     """Read a table of numbers with or without a header, separated by comma, semicolon, tab or blank.
 
-    The result is kept for the life of the process, as long as the file does not change.
+    With semicolons or tabs between them, numbers may have a decimal comma. The result is kept for the life of the
+    process, as long as the file does not change.
 
     Parameters
     ----------
@@ -144,9 +150,11 @@ def read_csv(path: Path, comment: str = "") -> Table:
     if not first.strip():
         raise LogError(f"{path}: the file is empty")
     delimiter = next((d for d in _DELIMITERS if d in first), ",")
+    if delimiter == "," and ";" in first and all(_is_number(c.replace(",", ".", 1)) for c in first.split(";")):
+        delimiter = ";"  # numbers with decimal commas
     blanks = delimiter == " "
     cells = [c.strip().strip('"') for c in (first.split() if blanks else first.split(delimiter))]
-    header = not any(_is_number(c) for c in cells)
+    header = not any(_is_number(c.replace(",", ".", 1)) for c in cells)
     names = cells if header else [str(i) for i in range(1, len(cells) + 1)]
     if len(set(names)) != len(names):
         raise LogError(f"{path}, line {blank + 1}: two columns share a name: {', '.join(names)}")
@@ -158,6 +166,7 @@ def read_csv(path: Path, comment: str = "") -> Table:
     if not _SOMETHING.search(content, start, end):
         raise LogError(f"{path}: there are no rows of data")
     numbers: NDArray[np.int64] | None = None
+    commas = _decimal_commas(content[start : min(end, start + _HEAD)], delimiter)
     rows = pa.py_buffer(content).slice(start, end - start)
     if blanks or comment:  # columns may be lined up with any number of blanks
         lines = enumerate(content[start:end].split(b"\n"), begin + 1)
@@ -165,7 +174,7 @@ def read_csv(path: Path, comment: str = "") -> Table:
         rows = pa.py_buffer(b"\n".join(b" ".join(line.split()) if blanks else line for _, line in kept))
         numbers = np.array([n for n, _ in kept], dtype=np.int64)
     try:
-        data = _parsed(rows, names, delimiter)
+        data = _parsed(rows, names, delimiter, "," if commas else ".")
     except (pa.ArrowInvalid, pa.ArrowKeyError) as error:
         lines = enumerate(content.split(b"\n")[begin:], begin + 1)
         kept = [(n, line) for n, line in lines if not _marked(line, mark)]
@@ -183,7 +192,7 @@ def read_csv(path: Path, comment: str = "") -> Table:
         column = data.column(name)
         data = data.drop_columns([name])  # so that no more than one is there twice
         if pa.types.is_integer(column.type) or pa.types.is_floating(column.type) or pa.types.is_null(column.type):
-            columns[name] = np.asarray(column.cast(pa.float64()).to_numpy(), dtype=np.float64)
+            columns[name] = np.asarray(column.cast(pa.float64(), safe=False).to_numpy(), dtype=np.float64)
         else:
             columns[name] = np.array([None if c is None else str(c) for c in column.to_pylist()], dtype=object)
     if count == 0:
@@ -193,7 +202,15 @@ def read_csv(path: Path, comment: str = "") -> Table:
     return Table(str(path), columns, numbers[:count])
 
 
-def _parsed(rows: Any, names: Sequence[str], delimiter: str) -> Any:
+def _decimal_commas(head: bytes, delimiter: str) -> bool:
+    """Whether the numbers of the first rows have a comma before their fraction, and none a point."""
+    if delimiter not in (";", "\t"):
+        return False
+    cells = [cell for line in head.split(b"\n")[:6] for cell in line.strip().split(delimiter.encode())]
+    return any(map(_DECIMAL_COMMA.fullmatch, cells)) and not any(map(_DECIMAL_POINT.fullmatch, cells))
+
+
+def _parsed(rows: Any, names: Sequence[str], delimiter: str, decimal: str) -> Any:
     """The columns of a buffer of rows, as a table of pyarrow.
 
     Arrow takes the type of a column from its first megabyte. Where a later cell does not fit, the column is read again
@@ -210,7 +227,10 @@ def _parsed(rows: Any, names: Sequence[str], delimiter: str) -> Any:
                 read_options=csv.ReadOptions(column_names=list(names), use_threads=False),
                 parse_options=csv.ParseOptions(delimiter=delimiter, ignore_empty_lines=False),
                 convert_options=csv.ConvertOptions(
-                    null_values=_MISSING, strings_can_be_null=True, column_types=types or None
+                    null_values=_MISSING,
+                    strings_can_be_null=True,
+                    column_types=types or None,
+                    decimal_point=decimal,
                 ),
             )
         except pa.ArrowInvalid as error:
@@ -253,8 +273,12 @@ def _marked(line: bytes, mark: bytes) -> bool:
 
 
 def _utf8(path: Path) -> bytes:
-    """The content of a text file in UTF-8, which may have been in UTF-16 or in Latin-1."""
-    content = path.read_bytes()
+    """The content of a text file in UTF-8, which may have been in UTF-16 or in Latin-1; lines end in a line feed."""
+    content = _decoded(path.read_bytes())
+    return content if b"\n" in content else content.replace(b"\r", b"\n")  # the ends of lines of old systems
+
+
+def _decoded(content: bytes) -> bytes:
     if content.isascii():
         return content
     if content.startswith((b"\xff\xfe", b"\xfe\xff")):
@@ -272,8 +296,11 @@ def _ragged(path: Path, lines: Iterable[tuple[int, bytes]], delimiter: str, widt
         line = raw.decode().rstrip("\r")
         count = len(line.split()) if delimiter == " " else line.count(delimiter) + 1
         if line.strip() and count != width:
-            return (
-                f"{path}, line {number}: {count} cells where the first line has {width}; lines that are no data are "
-                "left out by 'comment', the mark that they begin with"
+            form = form_of_text(path)
+            right = (
+                "lines that are no data are left out by 'comment', the mark that they begin with"
+                if form is None
+                else f"it looks like a file of format = {form!r}"
             )
+            return f"{path}, line {number}: {count} cells where the first line has {width}; {right}"
     return ""

@@ -6,29 +6,38 @@ import json
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
+from pathlib import Path
 
 import numpy as np
 
 from simnav.log.inspection import Stream
+from simnav.log.units import dimension
+from simnav.log.variation import dated
 from simnav.types import Array
 
 __all__ = ["Guess", "draft", "guesses"]
 
 _AXES = r"(?:_|\.|\[|\s|-)?"
 _LABEL = {
-    "angular_rate": r"gyr?o?|g|w|ang(ular)?[_.]?(vel(ocity)?|rate)|omega|imu[_.]g",
-    "specific_force": r"acc?(el)?(eration)?|a|f|linear[_.]acc(eleration)?|imu[_.]a",
+    "angular_rate": r"gyr?o?|g|w|ang(ular)?[_.]?(vel(ocity)?|rate)|omega|imu[_.]g|w_rs_s",
+    "specific_force": r"acc?(el)?(eration)?|a|f|linear[_.]acc(eleration)?|imu[_.]a|a_rs_s",
 }
+#: Names of files and topics that say what their columns x, y, z are.
+_OWN_NAME = {"angular_rate": r"gyr", "specific_force": r"acc(?!urac)"}
 _DVL = (("x", "forward"), ("y", "starboard"), ("z", "down"))
 #: Quantity -> regular expressions of the names of its columns, in order.
 _NAMES: dict[str, tuple[str, ...]] = {
     "position": (
-        r"^(gps|gnss|nav)?[_.]?lat(itude)?\b|^lat",
-        r"^(gps|gnss|nav)?[_.]?(lon|lng)",
-        r"^(height|hgt|h$|ellh)|^(alt|ele)",
+        r"^(gps|gnss|nav|location)?[_.]?lat(itude)?\b|^lat",
+        r"^(gps|gnss|nav|location)?[_.]?(lon|lng)",
+        r"^(height|hgt|h$|ellh)|^(gps|gnss|nav|location)?[_.]?(alt|ele)",
     ),
-    **{quantity: tuple(rf"^({label}){_AXES}{axis}\b" for axis in "xyz") for quantity, label in _LABEL.items()},
+    **{
+        q: tuple(
+            rf"^({label}){_AXES}{axis}(?![a-z0-9])|^(?![agwf][_.])({label})_{i}$" for i, axis in enumerate("xyz", 1)
+        )
+        for q, label in _LABEL.items()
+    },
     "heading": (r"^(true[_.]?)?(heading|hdg|yaw)\b|^(heading|yaw)_",),
     "level": (r"^roll\b|^roll_", r"^pitch\b|^pitch_"),
     "velocity": (r"^(vel(ocity)?[_.]?n(orth)?|vn)\b", r"^(vel(ocity)?[_.]?e(ast)?|ve)\b"),
@@ -46,7 +55,30 @@ _INSTRUMENTS = {
 }
 #: Sentences that say nothing of the vessel's own motion, though their columns have such names.
 _NOT = {"depth": ("DPT", "DBT", "PSIMSSB"), "speed": ("RMC", "VTG", "GGA")}
+#: A solution of Applanix has such columns, but no measurements of these.
+_NOT_OF_SBET = ("angular_rate", "specific_force", "dvl", "speed")
+#: Sentences of compasses; the true heading goes first.
+_COMPASSES = {"HDT": 2, "THS": 2, "HDG": 1, "HDM": 1}
 _EVERY = 10
+#: From this share of repeated values on they are left out.
+_MANY = 0.3
+#: Units as headers write them, in brackets or after an underscore at the end, where they are not those of `LOG_UNITS`.
+_SPELT = {
+    "dps": "deg_s", "deg/s": "deg_s", "deg/sec": "deg_s", "degs": "deg_s", "\N{DEGREE SIGN}/s": "deg_s",
+    "rad/s": "rad_s", "rad/sec": "rad_s", "rads": "rad_s", "rps": "rad_s",
+    "rad s^-1": "rad_s", "m s^-2": "m_s2", "m s^-1": "m_s",
+    "m/s2": "m_s2", "m/s^2": "m_s2", "m/s/s": "m_s2", "m/s\N{SUPERSCRIPT TWO}": "m_s2", "mps2": "m_s2", "ms2": "m_s2",
+    "m/s": "m_s", "mps": "m_s", "km/h": "km_h", "kmh": "km_h", "kt": "kn", "kts": "kn", "knots": "kn",
+    "degrees": "deg", "\N{DEGREE SIGN}": "deg", "e7": "1e-7 deg", "dege7": "1e-7 deg",
+}  # fmt: skip
+_UNIT = re.compile(r"(?:\[([^\]]+)\]|\(([^)]+)\)|_((?:deg|rad|m|cm|mm)_s2?|[^_\W]+))\s*$")
+_LENGTH, _SPEED = "length", "speed"
+#: What each quantity is measured in; of a position the angle stands for the first two columns.
+_DIMENSIONS = {
+    "position": ("angle", "angle", _LENGTH), "angular_rate": ("angular rate",) * 3,
+    "specific_force": ("acceleration",) * 3, "heading": ("angle",), "level": ("angle",) * 2, "velocity": (_SPEED,) * 2,
+    "dvl": (_SPEED,) * 3, "speed": (_SPEED,), "depth": (_LENGTH,),
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -78,7 +110,7 @@ def guesses(stream: Stream) -> Iterator[Guess]:
     """What the columns of a stream probably are; everything is to be checked by its user."""
     names = [n for n in stream.table.names if stream.table.columns[n].dtype != object]
     for quantity, patterns in _NAMES.items():
-        if stream.sentence in _NOT.get(quantity, ()):
+        if stream.sentence in _NOT.get(quantity, ()) or (stream.form == "sbet" and quantity in _NOT_OF_SBET):
             continue
         found = []
         for pattern in patterns:
@@ -90,16 +122,56 @@ def guesses(stream: Stream) -> Iterator[Guess]:
         if not len(values):
             continue
         columns, units = _signed(quantity, found, values), _units(stream, quantity, values)
+        if stream.form != "nmea":
+            told = [_named(name, what) for name, what in zip(found, _DIMENSIONS[quantity], strict=False)]
+            units = *(a or b for a, b in zip(told, units, strict=False)), *units[len(found) :]
         yield Guess(stream, quantity, columns, units)
+    bare = _bare(stream, names)
+    if bare is not None:
+        yield bare
+    magnetic, true = (
+        n in names and bool(np.isfinite(stream.table.column(n)[1]).any()) for n in ("heading_magnetic", "heading")
+    )
+    if magnetic and not true:
+        yield Guess(stream, "heading", ("heading_magnetic",), ("1",))
+
+
+def _bare(stream: Stream, names: Sequence[str]) -> Guess | None:
+    """Columns x, y, z of a file or topic whose name says what they are, as those of phones."""
+    label = stream.path.stem if stream.sentence is None else stream.sentence
+    quantity = next((q for q, pattern in _OWN_NAME.items() if re.search(pattern, label, re.I)), None)
+    found = [next((n for n in names if re.split(r"[./]", n.lower())[-1] == axis), None) for axis in "xyz"]
+    if quantity is None or None in found:
+        return None
+    columns = [n for n in found if n is not None]
+    values = np.stack([stream.table.column(n)[1] for n in columns], axis=-1)
+    values = values[np.isfinite(values).all(axis=1)]
+    if not len(values) or (quantity == "specific_force" and np.linalg.norm(values.mean(axis=0)) < 0.5):
+        return None  # gravity was taken out
+    return Guess(stream, quantity, _signed(quantity, columns, values), _units(stream, quantity, values))
+
+
+def _named(name: str, what: str) -> str | None:
+    """The unit that the name of a column says, if it is one of what is measured."""
+    match = _UNIT.search(name.strip())
+    if match is None:
+        return None
+    text = next(g for g in match.groups() if g is not None).strip()
+    unit = _SPELT.get(text.lower(), "" if " " in text else text)
+    return unit if dimension(unit) == what else None
 
 
 def _first(names: Sequence[str], pattern: str) -> list[str]:
     """The first name that fits the first alternative that any name fits; empty for none."""
     for alternative in pattern.split("|^"):
         text = alternative if alternative.startswith("^") else f"^{alternative}"
-        found = [n for n in names if re.search(text, n.strip().lstrip("#").strip(), re.I)]
-        if found:
-            return found[:1]
+        for whole in (True, False):  # of nested names also the last part
+            shown = {n: n.strip().lstrip("#").strip() for n in names}
+            if not whole:
+                shown = {n: re.split(r"[./]", s)[-1] for n, s in shown.items()}
+            found = [n for n, s in shown.items() if re.search(text, s, re.I)]
+            if found:
+                return found[:1]
     return []
 
 
@@ -131,7 +203,7 @@ def _units(stream: Stream, quantity: str, values: Array) -> tuple[str, ...]:
     return ("m" if quantity == "depth" else "m_s",) * width
 
 
-def draft(streams: Sequence[Stream], name: str = "my-log") -> str:
+def draft(streams: Sequence[Stream], name: str = "my-log", file: str | None = None) -> str:
     """The text of a scenario file over the streams, with all that has to be checked as comments.
 
     Parameters
@@ -140,6 +212,8 @@ def draft(streams: Sequence[Stream], name: str = "my-log") -> str:
         From `simnav.log.inspection.inspect_log`, of one folder.
     name : str
         Name of the scenario.
+    file : str or None
+        Name of the file that the text goes to; None: that of the scenario and ``.toml``.
 
     Returns
     -------
@@ -148,8 +222,8 @@ def draft(streams: Sequence[Stream], name: str = "my-log") -> str:
     """
     found = [g for s in streams for g in guesses(s)]
     best: dict[str, Guess] = {}
-    for guess in found:  # of several the longest
-        if guess.quantity not in best or len(guess.stream.time) > len(best[guess.quantity].stream.time):
+    for guess in found:
+        if guess.quantity not in best or _worth(guess) > _worth(best[guess.quantity]):
             best[guess.quantity] = guess
     position = best.get("position")
     if position is None:
@@ -158,15 +232,18 @@ def draft(streams: Sequence[Stream], name: str = "my-log") -> str:
             "# positions as a reference: see docs/how-to/use-your-own-log.md.\n"
         )
     rate, force = best.get("angular_rate"), best.get("specific_force")
-    inertial = rate is not None and force is not None and rate.stream is force.stream
+    if rate is not None and force is not None and rate.stream is not force.stream:  # rather both of one stream
+        both = [(r, f) for r in found for f in found if r.stream is f.stream
+                and (r.quantity, f.quantity) == ("angular_rate", "specific_force")]  # fmt: skip
+        rate, force = both[0] if both else (rate, force)
     used = [position, *(g for q, g in best.items() if q in _INSTRUMENTS and q != "position")]
-    if inertial and rate is not None:
-        used.append(rate)
+    if rate is not None and force is not None:
+        used += [rate, force]
     keys = _file_keys(used)
     span = float(position.stream.time[-1] - position.stream.time[0])
     lines = [
         "# A scenario to begin with. Check everything that is marked: simnav cannot know it.",
-        f"# Then: simnav check {name}.toml; simnav run {name}.toml",
+        f"# Then: simnav check {file or f'{name}.toml'}; simnav run {file or f'{name}.toml'}",
         f'name = "{name}"',
         "version = 1",
         f'title = "{name}"',
@@ -183,18 +260,23 @@ def draft(streams: Sequence[Stream], name: str = "my-log") -> str:
     ]
     if "heading" in best or span < 20.0:
         lines[-1] = f"# {lines[-1]}"
-    for stream, key in keys.items():
-        lines += ["", *_file(stream, key)]
-    if inertial and rate is not None and force is not None:
+    for (_, topic), (stream, key) in keys.items():
+        lines += ["", *_file(stream, key, topic)]
+    if rate is not None and force is not None:
         lines += ["", *_imu(rate, force, keys)]
     for quantity, guess in best.items():
         if quantity in _INSTRUMENTS:
             lines += ["", *_channel(f"log.instruments.{_INSTRUMENTS[quantity][0]}", guess, keys)]
             if quantity == "position":
+                if _graded(guess):
+                    lines.append('sigma = ["sdn", "sde", "sdu"]')
                 lines.append(f"every = {_EVERY}                     # every tenth fix to the estimators ...")
+    if _graded(position):
+        lines += ["", "[log.reference]",
+                  'quality = "Q"                  # only fixed and float solutions are scored']  # fmt: skip
     lines += ["", *_channel("log.reference.position", position, keys)]
     lines.append(f"hold_out = {_EVERY}                  # ... and the others to compare with")
-    if inertial and rate is not None:
+    if rate is not None and force is not None:
         hertz = 1.0 / float(np.median(np.diff(rate.stream.time)))
         lines += ["", "[instruments.imu]", f"rate_hz = {_round(hertz)}",
                   'grade = "mems"                   # check: or the figures of its datasheet']  # fmt: skip
@@ -202,6 +284,7 @@ def draft(streams: Sequence[Stream], name: str = "my-log") -> str:
         if quantity in _INSTRUMENTS:
             label, kind, sigma = _INSTRUMENTS[quantity]
             hertz = 1.0 / max(1e-3, float(np.median(np.diff(guess.stream.time)))) if len(guess.stream.time) > 1 else 1.0
+            hertz *= 1.0 - (_repeated(guess) if _stale(guess) else 0.0)
             hertz = hertz / _EVERY if quantity == "position" else hertz
             lines += ["", f"[instruments.{label}]", kind, f"rate_hz = {_round(hertz)}", f"{sigma}   # check"]
     return "\n".join(lines) + "\n"
@@ -211,55 +294,110 @@ def _round(value: float) -> str:
     return f"{float(f'{value:.4g}')!r}"
 
 
-def _file_keys(used: Sequence[Guess]) -> dict[Any, str]:
-    """A name for each file, by path and keys."""
-    keys: dict[Any, str] = {}
+#: Streams and the keys of their files, by path and, of the IMU in a bag, topic.
+_Keys = dict[tuple[Path, str | None], tuple[Stream, str]]
+
+
+def _place(guess: Guess) -> tuple[Path, str | None]:
+    if guess.stream.form in ("mat", "hdf5"):
+        return guess.stream.path, str(guess.stream.keys["time"])
+    own = guess.quantity in _LABEL and guess.stream.form in ("mcap", "rosbag")
+    return guess.stream.path, guess.stream.sentence if own else None
+
+
+def _file_keys(used: Sequence[Guess]) -> _Keys:
+    """A name for each file, topic of an IMU, and time of arrays."""
+    keys: _Keys = {}
+    taken: set[str] = set()
     for guess in used:
-        stem = re.sub(r"\W+", "_", guess.stream.path.stem.lower()).strip("_") or "file"
-        place = guess.stream.path
+        place = _place(guess)
         if place not in keys:
-            keys[place] = stem if stem not in keys.values() else f"{stem}_{len(keys)}"
-    by_stream: dict[Any, Any] = {}
-    for guess in used:
-        by_stream.setdefault(guess.stream.path, (guess.stream, keys[guess.stream.path]))
-    return dict(by_stream.values())
+            text = guess.stream.path.stem if place[1] is None else place[1]
+            stem = re.sub(r"\W+", "_", text.lower()).strip("_") or "file"
+            key = stem if stem not in taken else f"{stem}_{len(keys)}"
+            taken.add(key)
+            keys[place] = guess.stream, key
+    return keys
 
 
-def _key_of(keys: dict[Any, str], stream: Stream) -> str:
-    return next(key for known, key in keys.items() if known.path == stream.path)
+def _key_of(keys: _Keys, guess: Guess) -> str:
+    return keys[_place(guess)][1]
 
 
-def _file(stream: Stream, key: str) -> list[str]:
+def _file(stream: Stream, key: str, topic: str | None) -> list[str]:
     lines = [f"[log.files.{key}]", f"path = {json.dumps(stream.path.name)}"]
     if stream.form != "csv":
         lines.append(f'format = "{stream.form}"')
+    if topic is not None and stream.sentence is not None:
+        lines.append(f"options = {{ topic = {json.dumps(topic)} }}")
     for name, value in stream.keys.items():
         lines.append(f"{name} = {json.dumps(list(value) if isinstance(value, tuple) else value)}")
+        if name == "time_unit" and value != "iso":
+            lines[-1] += "   # check"
     if stream.form == "csv" and len(stream.time) > 1 and (np.diff(stream.time) == 0.0).any():
         lines.append('same_time = "spread"             # check: some rows have the same time')
     return lines
 
 
-def _channel(table: str, guess: Guess, keys: dict[Any, str]) -> list[str]:
+def _channel(table: str, guess: Guess, keys: _Keys) -> list[str]:
     stream = guess.stream
-    lines = [f"[{table}]", f'file = "{_key_of(keys, stream)}"']
+    lines = [f"[{table}]", f'file = "{_key_of(keys, guess)}"']
     if stream.sentence is not None:
         lines.append(f"sentence = {json.dumps(stream.sentence)}")
     if stream.talker is not None:
         lines.append(f'talker = "{stream.talker}"')
     columns = list(guess.columns)
     lines.append(f"columns = {json.dumps(columns)}")
+    if _stale(guess):
+        lines.append("drop_repeated = true            # check: many values are those of the row before")
+    if columns == ["heading_magnetic"]:
+        lines.append(
+            'variation_model = "wmm"        # check: the file has no variation'
+            if dated(stream.time)
+            else "variation_deg = 0.0            # check: the variation of the place, positive east"
+        )
     if set(guess.units) != {"1"}:
         lines.append(f"units = {json.dumps(list(guess.units))}   # check")
     return lines
 
 
-def _imu(rate: Guess, force: Guess, keys: dict[Any, str]) -> list[str]:
+def _worth(guess: Guess) -> tuple[int, int]:
+    """Of several streams a position with height and the sentence of a compass go first, then the longest."""
+    if guess.quantity == "position":
+        return int(guess.columns[2] != "=0"), len(guess.stream.time)
+    if guess.quantity == "heading":
+        return _COMPASSES.get(guess.stream.sentence or "", 0), len(guess.stream.time)
+    return 0, len(guess.stream.time)
+
+
+def _repeated(guess: Guess) -> float:
+    """The share of rows whose values are those of the row before."""
+    values = np.stack([guess.stream.table.column(c)[1] for c in guess.columns], axis=-1)
+    return float(np.mean(np.all(np.diff(values, axis=0) == 0.0, axis=1))) if len(values) > 1 else 0.0
+
+
+def _stale(guess: Guess) -> bool:
+    """Whether a logger seems to repeat old values: of several numbers, with their noise, few are the same by chance."""
+    return len(guess.columns) > 1 and _MANY < _repeated(guess) < 1.0
+
+
+def _graded(position: Guess) -> bool:
+    """Whether most positions say that they are fixed or float solutions of RTKLIB, and with which sigma."""
+    table = position.stream.table
+    if position.stream.form != "rtklib" or not {"Q", "sdn", "sde", "sdu"} <= set(table.names):
+        return False
+    return bool(np.mean(np.isin(table.column("Q")[1], (1.0, 2.0))) > 0.5)
+
+
+def _imu(rate: Guess, force: Guess, keys: _Keys) -> list[str]:
     flipped = force.columns[2].startswith("-")
+    one = _key_of(keys, rate) == _key_of(keys, force)
+    two = [] if one else [f'specific_force_file = "{_key_of(keys, force)}"   # check: offset_s of its clock']
     rates = [rate.columns[0], *(f"-{c}" if flipped else c for c in rate.columns[1:])]
     return [
         "[log.imu]",
-        f'file = "{_key_of(keys, rate.stream)}"',
+        f'file = "{_key_of(keys, rate)}"',
+        *two,
         'samples = "instantaneous"        # check: or "means", "increments"',
         f"angular_rate = {json.dumps(rates)}   # check: forward, starboard, down; or say mounting_deg",
         f'angular_rate_unit = "{rate.units[0]}"   # check',

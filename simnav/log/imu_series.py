@@ -87,8 +87,20 @@ def _means(
         sign, values = table.column(column)
         raw[:, i] = sign * values[rows] * factor(unit)
         bad = np.flatnonzero(~np.isfinite(raw[:, i]))
-        if bad.size:
-            raise LogError(f"{table.source}, line {table.line[rows[bad[0]]]}, column {column!r}: the value is missing")
+        if bad.size and (imu.samples == "increments" or bad.size == len(rows)):
+            raise LogError(
+                f"{table.source}, line {table.line[rows[bad[0]]]}, column {column!r}: the value is missing"
+                + ("; an increment that is missing cannot be replaced" if bad.size < len(rows) else " in every row")
+            )
+    given = np.isfinite(raw).all(axis=1)
+    if not given.all():
+        warnings.warn(
+            f"{table.source}: {np.sum(~given)} of {len(rows)} rows without a value of the IMU are left out, the first "
+            f"is line {table.line[rows[~given][0]]}",
+            LogWarning,
+            4,
+        )
+        rows, raw = rows[given], raw[given]
     time = time[rows]
     if len(time) < 2:
         raise LogError(f"{table.source}: {len(time)} row is too short for an IMU")

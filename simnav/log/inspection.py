@@ -22,7 +22,9 @@ from simnav.log.formats.rinex import read_rinex
 from simnav.log.formats.ubx import read_ubx
 from simnav.log.nmea import read_nmea
 from simnav.log.reader import READERS
-from simnav.log.table import LogError, Table, utc_seconds
+from simnav.log.table import LogError, LogWarning, Table, utc_seconds
+from simnav.log.text_forms import form_of_text
+from simnav.log.units import factor
 from simnav.types import Array
 
 __all__ = ["Stream", "inspect_log", "streams_of", "track_of"]
@@ -38,13 +40,9 @@ _DATE = re.compile(r"^\s*(date|day|%?\s*ymd)\b", re.I)
 #: Times of this size are in this unit.
 _LARGE = ((1e17, "ns"), (1e14, "us"), (1e11, "ms"))
 #: Columns of an IMU.
-_INERTIAL = re.compile(r"^(a|g|w|acc|gyr|gyro|accel|omega)[_ .]?[xyz]\b", re.I)
-_LINES = 40
-#: What the lines of a text format look like.
-_LINES_OF = {
-    "n2k": re.compile(r"\d{4}-\d\d-\d\d[T-][\d:.]+Z?,\d+,\d{5,6},\d+,\d+,\d+,[0-9a-f]{2}", re.I),
-    "pd6": re.compile(r"\s*:(SA|TS|W[ISED]|B[ISED]),"),
-}
+_INERTIAL = re.compile(r"(?:^|[./])(a|g|w|acc|gyr|gyro|accel|omega)[_ .]?[xyz123](?![a-z0-9])", re.I)
+#: Formats whose files hold arrays or columns by name, with a time or several.
+_OF_ARRAYS = ("mat", "hdf5", "parquet")
 #: Formats whose files have several tables, besides NMEA and bags.
 _OF_SENTENCES = {"n2k": read_n2k, "rinex": read_rinex, "ubx": read_ubx}
 
@@ -84,6 +82,8 @@ class Stream:
     def name(self) -> str:
         """File, and sentence or topic."""
         inside = "" if self.sentence is None else f" {self.talker or ''}{self.sentence}"
+        if self.form in _OF_ARRAYS:
+            inside = f" {self.keys['time']}"
         return f"{self.path.name}{inside}"
 
     def to_dict(self) -> dict[str, Any]:
@@ -122,12 +122,19 @@ def inspect_log(paths: Sequence[Path]) -> tuple[list[Stream], list[str]]:
     Raises
     ------
     LogError
-        If a path does not exist.
+        If a path does not exist, or a folder has no file.
     """
     files: list[Path] = []
     for path in paths:
         if path.is_dir():
-            files += sorted(p for p in path.iterdir() if p.is_file() and not p.name.startswith("."))
+            inside = sorted(p for p in path.iterdir() if not p.name.startswith("."))
+            here = [p for p in inside if p.is_file()]
+            if not here:
+                folders = ", ".join(p.name for p in inside)
+                raise LogError(
+                    f"{path}: there is no file in it" + (f"; name one of its folders: {folders}" if folders else "")
+                )
+            files += here
         elif path.exists():
             files.append(path)
         else:
@@ -155,6 +162,8 @@ def streams_of(path: Path) -> list[Stream]:
         warnings.simplefilter("always")
         found = list(_streams(path, form))
     notes = tuple(dict.fromkeys(" ".join(str(w.message).split()).removeprefix(f"{path}: ") for w in said))
+    if not found:
+        raise LogError(f"{path}: " + ("; ".join(notes) or "there is nothing in it"))
     return [Stream(s.path, s.form, s.sentence, s.talker, s.table, s.time, s.keys, notes) for s in found]
 
 
@@ -170,17 +179,9 @@ def _format(path: Path) -> str:
             if b"\xb5\x62\x01" in stream.read(1 << 16):  # a message of UBX after sentences of NMEA
                 return "ubx"
         raise LogError(f"{path}: it is {found[0]}; say its format in a scenario: {', '.join(sorted(READERS.items()))}")
-    with open(path, encoding="latin-1") as text:
-        head = [line for _, line in zip(range(_LINES), text, strict=False)]
-    if sum(bool(re.search(r"[$!][A-Z]{4,6},", line)) for line in head) > 0.3 * len(head):
-        return "nmea"
-    if any(re.match(r"%\s+(GPST|UTC|JST)\s", line) for line in head):
-        return "rtklib"
-    if head and head[0][60:].startswith("RINEX VERSION / TYPE") and head[0][20:21] == "O":
-        return "rinex"
-    for form, pattern in _LINES_OF.items():
-        if sum(bool(pattern.match(line)) for line in head) > 0.3 * len(head):
-            return form
+    by_content = form_of_text(path)
+    if by_content is not None:
+        return by_content
     return by_ending if by_ending in ("tum", "rtklib", "nmea") else "csv"
 
 
@@ -199,17 +200,29 @@ def _streams(path: Path, form: str) -> Iterator[Stream]:
             yield Stream(path, form, sentence, talker or None, table, _known(time))
         return
     if form in ("mcap", "rosbag"):
+        reader = READERS.get(form)
+        assert reader is not None
         for topic in topics_of(path, form):
-            reader = READERS.get(form)
-            assert reader is not None
-            rows = reader.read(path, FileSpec(path=path.name, format=form), topic)
+            try:
+                rows = reader.read(path, FileSpec(path=path.name, format=form), topic)
+            except LogError as error:  # such as images in an encoding of their own; the other topics are of use
+                warnings.warn(str(error), LogWarning, 2)
+                continue
             yield Stream(path, form, topic, None, rows.table, _known(rows.time))
         return
-    keys = _time_keys(path) if form == "csv" else _array_keys(path, form)
     reader = READERS.get(form)
     assert reader is not None
-    rows = reader.read(path, FileSpec(path=path.name, format=form, **keys))
-    yield Stream(path, form, None, None, rows.table, _known(rows.time), keys)
+    if form not in _OF_ARRAYS:
+        keys = _time_keys(path) if form == "csv" else {}
+        rows = reader.read(path, FileSpec(path=path.name, format=form, **keys))
+        yield Stream(path, form, None, None, rows.table, _known(rows.time), keys)
+        return
+    for name in _array_times(path, form):
+        rows = reader.read(path, FileSpec(path=path.name, format=form, time=name))
+        keys = {"time": name}
+        if (unit := _time_unit(rows.table, name, rows.time)) != "s":
+            keys |= {"time_unit": unit}
+        yield Stream(path, form, None, None, _beside(rows.table, name), _known(rows.time) * factor(unit), keys)
 
 
 def track_of(stream: Stream) -> Array | None:
@@ -252,12 +265,22 @@ def _time_keys(path: Path) -> dict[str, Any]:
         try:
             utc_seconds(first)
         except ValueError:
+            if _is_number(first):
+                table.column(named)  # raises: it names the cell that is no number
             second = names[names.index(named) + 1] if names.index(named) + 1 < len(names) else None
             if second is None or not re.match(r"\d{4}[-/]", first):
                 raise LogError(f"{path}: no column holds the times; there are: {', '.join(names)}") from None
             return keys | {"time": (named, second)}
         return keys | {"time": named, "time_unit": "iso"}
     return keys | {"time": named, "time_unit": _time_unit(table, named, np.asarray(values, dtype=np.float64))}
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
 
 
 def _header_in_comment(path: Path) -> bool:
@@ -271,9 +294,10 @@ def _time_unit(table: Table, name: str, values: Array) -> str:
     if ending:
         return ending[1]
     size = float(np.nanmedian(np.abs(values)))
-    inertial = sum(bool(_INERTIAL.match(n)) for n in table.names) >= 3
+    inertial = sum(bool(_INERTIAL.search(n)) for n in table.names) >= 3
     spacing = float(np.nanmedian(np.abs(np.diff(values)))) if len(values) > 1 else 0.0
-    if inertial and size < _LARGE[-1][0] and spacing >= 1.0:  # no IMU has samples as rare as that
+    since_1970 = 1e9 < size < 1e10 and spacing < 10.0
+    if inertial and size < _LARGE[-1][0] and spacing >= 1.0 and not since_1970:  # hardly an IMU has samples so rare
         return "ms" if spacing < 1e3 else "us" if spacing < 1e6 else "ns"
     return next((unit for least, unit in _LARGE if size > least), "s")
 
@@ -286,19 +310,24 @@ def _ascends(table: Table, name: str) -> bool:
         return bool(np.all(np.diff(values.astype(np.float64)) > 0.0))
 
 
-def _array_keys(path: Path, form: str) -> dict[str, Any]:
-    """The array or column of the times, by its name."""
-    if form not in ("mat", "hdf5", "parquet"):
-        return {}
+def _array_times(path: Path, form: str) -> list[str]:
+    """The arrays or columns of times, by their names."""
     reader = READERS.get(form)
     assert reader is not None
     try:
         names = list(reader.read(path, FileSpec(path=path.name, format=form, time=1)).table.names)
     except LogError as error:
-        names = re.findall(r"([^\s,]+) \d+(?:x\d+)*", str(error).rpartition("there are:")[2])
+        names = re.findall(r"([^\s,]+) \d+(?:x\d+)*", str(error).partition("there are:")[2])
         if not names:
             raise
-    chosen = next((n for n in names if _TIME.match(re.split(r"[./]", n)[-1])), None)
-    if chosen is None:
+    chosen = [n for n in names if _TIME.match(re.split(r"[./]", n)[-1])]
+    if not chosen:
         raise LogError(f"{path}: no name tells the times; say time = NAME in a scenario; there are: {', '.join(names)}")
-    return {"time": chosen}
+    return chosen[:1] if form == "parquet" else chosen
+
+
+def _beside(table: Table, name: str) -> Table:
+    """The columns in the structure or group of a time, where it has one and others are in it."""
+    group = re.match(r".*[./]", name)
+    inside = {} if group is None else {n: c for n, c in table.columns.items() if n.startswith(group[0])}
+    return Table(table.source, inside, table.line, table.numbered) if len(inside) > 1 else table

@@ -105,6 +105,11 @@ def _near(tod: float, about: float) -> float:
     return about + (tod - about + 43200.0) % 86400.0 - 43200.0
 
 
+def _in_circle(heading: float) -> float:
+    """A heading that the variation has taken out of the circle, inside it [rad]."""
+    return heading - math.copysign(2.0 * math.pi, heading) if abs(heading) > 2.0 * math.pi else heading
+
+
 def take_variation(row: Row, last: float) -> float:
     """Complete a magnetic heading by the variation, in place; return the last known variation."""
     own = row.get("variation")
@@ -113,8 +118,9 @@ def take_variation(row: Row, last: float) -> float:
     magnetic = row.get("heading_magnetic")
     if isinstance(magnetic, float):
         row["variation"] = last
+        row["heading_magnetic"] = magnetic = _in_circle(magnetic)  # with the deviation of its compass
         true = row.get("heading", math.nan)
-        row["heading"] = magnetic + last if isinstance(true, float) and math.isnan(true) else true
+        row["heading"] = _in_circle(magnetic + last) if isinstance(true, float) and math.isnan(true) else true
     return last
 
 

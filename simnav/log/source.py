@@ -178,6 +178,13 @@ class LogSource:
         if heading is None and scenario.initial_error.attitude[2] >= _UNKNOWN_HEADING:
             heading = 0.0, "unknown"
         true_start, made = _start(reference, self.initial_truth, imu, begin, heading)
+        if "heading (unknown)" in made:
+            warnings.warn(
+                f"{self._called()}: the heading at the start is unknown; only estimators that search it can use such a "
+                "start, as their lines in 'simnav list estimators' say; the others take it as nearly known",
+                LogWarning,
+                2,
+            )
         if made:
             notes.append(f"start {' and '.join(made)} not from the reference")
         simulated = [n for n, i in log.instruments.items() if i.source == "reference"]
@@ -195,16 +202,17 @@ class LogSource:
             if self._imu is not None:
                 self._imu, self._imu_labels = layer.apply_imu(self._imu, self._imu_labels)
 
+    def _called(self) -> str:
+        return f"recording {self.recording!r}" if self.recording else "the recording"
+
     def _length(self, wanted: float, available: float) -> float:
         if wanted <= available + TIME_TOLERANCE:
             return float(wanted)
         steps = math.floor(available / self.step + 1e-9)
         if steps < 1:
-            raise LogError(f"recording {self.recording!r}: IMU and reference have only {available:.3f} s in common")
+            raise LogError(f"{self._called()}: IMU and reference have only {available:.3f} s in common")
         length = steps * self.step
-        message = (
-            f"recording {self.recording!r}: the run ends at {length:g} s, where the log does ({wanted:g} s are wanted)"
-        )
+        message = f"{self._called()}: the run ends at {length:g} s, where the log does ({wanted:g} s are wanted)"
         warnings.warn(message, LogWarning, 3)
         return length
 

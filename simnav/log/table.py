@@ -115,7 +115,8 @@ def check_ascending(time: Array, table: Table, column: str) -> None:
         k = int(bad[0]) + 1
         if not np.isfinite(time[k]) or not np.isfinite(time[k - 1]):
             k = k if not np.isfinite(time[k]) else k - 1
-            raise LogError(f"{table.source}, line {table.line[k]}, column {column!r}: the time is missing")
+            raise LogError(f"{table.source}, line {table.line[k]}, column {column!r}: the time is missing; 'where' "
+                           f"leaves such rows out, like where = '`{column}` > 0'")  # fmt: skip
         same = time[k] == time[k - 1]
         what = "is the same as" if same else "is before"
         right = (
@@ -125,8 +126,12 @@ def check_ascending(time: Array, table: Table, column: str) -> None:
         )
         raise LogError(
             f"{table.source}, line {table.line[k]}, column {column!r}: the time {what} that of line "
-            f"{table.line[k - 1]} ({time[k]:.6f} s after {time[k - 1]:.6f} s); {right}"
+            f"{table.line[k - 1]} ({_seconds(time[k])} after {_seconds(time[k - 1])}); {right}"
         )
+
+
+def _seconds(time: float) -> str:
+    return f"{time:.6f} s" if abs(time) < 1e12 else f"{time:.6g} s"
 
 
 def utc_seconds(text: str) -> float:

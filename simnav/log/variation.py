@@ -9,12 +9,17 @@ import numpy as np
 from simnav.log.table import LogError
 from simnav.types import Array
 
-__all__ = ["variation_along"]
+__all__ = ["dated", "variation_along"]
 
 #: Clocks that count from 1970 have larger numbers [s]; others say nothing about the date.
 _UTC = 1e8
 #: Number of places along a track at which the model is evaluated.
 _PLACES = 25
+
+
+def dated(time: Array) -> bool:
+    """Whether times count from 1970, so that they tell the date."""
+    return len(time) > 0 and bool(time[0] >= _UTC)
 
 
 def variation_along(track_time: Array, track: Array, time: Array) -> Array:
@@ -45,7 +50,7 @@ def variation_along(track_time: Array, track: Array, time: Array) -> Array:
         raise LogError(
             "variation_model = 'wmm' needs the library pygeomag: pip install 'simnav[logs]'; or give variation_deg"
         ) from None
-    if track_time[0] < _UTC:
+    if not dated(track_time):
         raise LogError(
             f"variation_model = 'wmm' needs the date, but the clock of the reference starts at {track_time[0]:.0f} s, "
             "not in seconds since 1970; add the date by offset_s, or give variation_deg"

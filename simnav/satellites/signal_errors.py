@@ -38,7 +38,7 @@ def density_ratio(elevation: Array) -> Array:
 
 def noise_factor(ratio: Array | float) -> Array:
     """The white noise in units of that of the datasheet, from C/N0 [dB-Hz] of any shape."""
-    return np.asarray(10.0 ** ((NOMINAL_DENSITY_RATIO - np.asarray(ratio)) / 20.0))
+    return np.asarray(10.0 ** ((NOMINAL_DENSITY_RATIO - ratio) / 20.0))
 
 
 def amplification(frequencies: int) -> float:

@@ -55,7 +55,7 @@ def parse(text: str, *, source: str = "<toml>", folder: Path | None = None, trie
         table["vessel"] = _with_whole_paths(table["vessel"], VESSELS, folder or Path.cwd())
     if isinstance(table.get("surroundings"), dict):
         table["surroundings"] = {
-            name: _with_whole_paths(part, SURROUNDINGS, folder or Path.cwd()) if isinstance(part, dict) else part
+            name: _with_whole_paths(part, SURROUNDINGS, folder or Path.cwd(), name) if isinstance(part, dict) else part
             for name, part in table["surroundings"].items()
         }
     try:
@@ -86,9 +86,14 @@ def _load_plugins(names: Any, source: str, folder: Path) -> list[str]:
     return paths
 
 
-def _with_whole_paths(table: dict[str, Any], kinds: Registry[Any], folder: Path) -> dict[str, Any]:
-    """The table of a vessel or of a part of the surroundings, with the whole paths of the files that it names."""
-    kind = table.get("kind")
+def _with_whole_paths(
+    table: dict[str, Any], kinds: Registry[Any], folder: Path, kind: str | None = None
+) -> dict[str, Any]:
+    """The table of a vessel or of a part of the surroundings, with the whole paths of the files that it names.
+
+    A part of the surroundings without a ``kind`` has that of its name.
+    """
+    kind = table.get("kind", kind)
     cls = kinds.get(kind) if isinstance(kind, str) else None
     given = {k: table[k] for k in (() if cls is None else cls.files) if isinstance(table.get(k), str) and table[k]}
     return {**table, **{key: str((folder / Path(name).expanduser()).resolve()) for key, name in given.items()}}

@@ -162,7 +162,9 @@ class Scenario(Description):
             content["vessel"][name] = _digest(getattr(self.craft, name))
         for part, spec in self.surroundings.items():
             for name in spec.files:
-                content["surroundings"][part][name] = getattr(spec, name) and _digest(getattr(spec, name))
+                file = getattr(spec, name)
+                if file or name not in spec.later:
+                    content["surroundings"][part][name] = file and _digest(file)
         if self._template is not None:
             content["distributions"] = _canonical(self._template.table, words)
         # Not sorted: the order of the instruments is the order in which simultaneous measurements are handed over.

@@ -9,13 +9,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from simnav.compiled import kernel
+from simnav.compiled import kernel, ready
 from simnav.geometry.earth import displace_scalar
 from simnav.geometry.ecef import ecef_from_geodetic_scalar
 from simnav.kinds import Component, Datasheet, NavigationPoint, NavigationPoints
 from simnav.satellites.signal_errors import amplification, noise_factor, range_error
 from simnav.sensors.one_of_many import one_of_many
-from simnav.types import Array
+from simnav.types import Array, Integers
 
 __all__ = ["DENSITY_RATIO", "SIDE", "observe", "observe_all", "reading_sigma"]
 
@@ -41,23 +41,33 @@ _CLOCK = np.eye(2)
 
 
 @kernel()
-def _predict(
-    position: Array, velocity: Array, dcm: Array, rate: Array, arm: Array, side: Array, reading: Array, jacobian: Array
-) -> None:
-    """Overwrite range, rate of the range, and their (2, 9) Jacobian; arguments as of `NavigationPoint`."""
-    a, swing = np.empty(3), np.empty(3)
+def _antenna(position: Array, dcm: Array, rate: Array, arm: Array, antenna: Array) -> None:
+    """Overwrite what all satellites have in common at a state; arguments as of `NavigationPoint`.
+
+    ``antenna`` (13,) becomes the lever arm and its swing in north, east and down, the place in the Earth-fixed frame,
+    and sine and cosine of latitude and longitude.
+    """
     w0 = rate[1] * arm[2] - rate[2] * arm[1]
     w1 = rate[2] * arm[0] - rate[0] * arm[2]
     w2 = rate[0] * arm[1] - rate[1] * arm[0]
     for k in range(3):
-        a[k] = dcm[k, 0] * arm[0] + dcm[k, 1] * arm[1] + dcm[k, 2] * arm[2]
-        swing[k] = dcm[k, 0] * w0 + dcm[k, 1] * w1 + dcm[k, 2] * w2
-    latitude, longitude, height = displace_scalar(position[0], position[1], position[2], a[0], a[1], a[2])
-    x, y, z = ecef_from_geodetic_scalar(latitude, longitude, height)
-    sa, ca, so, co = np.sin(latitude), np.cos(latitude), np.sin(longitude), np.cos(longitude)
-    x, y, z = side[0] - x, side[1] - y, side[2] - z
+        antenna[k] = dcm[k, 0] * arm[0] + dcm[k, 1] * arm[1] + dcm[k, 2] * arm[2]
+        antenna[3 + k] = dcm[k, 0] * w0 + dcm[k, 1] * w1 + dcm[k, 2] * w2
+    latitude, longitude, height = displace_scalar(
+        position[0], position[1], position[2], antenna[0], antenna[1], antenna[2]
+    )
+    antenna[6], antenna[7], antenna[8] = ecef_from_geodetic_scalar(latitude, longitude, height)
+    antenna[9], antenna[10] = np.sin(latitude), np.cos(latitude)
+    antenna[11], antenna[12] = np.sin(longitude), np.cos(longitude)
+
+
+@kernel()
+def _predict(antenna: Array, velocity: Array, side: Array, reading: Array, jacobian: Array) -> None:
+    """Overwrite range, rate of the range, and their (2, 9) Jacobian; the antenna is that of `_antenna`."""
+    a, swing, u, v = antenna[:3], antenna[3:6], np.empty(3), np.empty(3)
+    sa, ca, so, co = antenna[9], antenna[10], antenna[11], antenna[12]
+    x, y, z = side[0] - antenna[6], side[1] - antenna[7], side[2] - antenna[8]
     distance = np.sqrt(x * x + y * y + z * z)
-    u, v = np.empty(3), np.empty(3)
     u[0], u[1], u[2] = -sa * co * x - sa * so * y + ca * z, -so * x + co * y, -ca * co * x - ca * so * y - sa * z
     x, y, z = side[3], side[4], side[5]
     v[0], v[1], v[2] = -sa * co * x - sa * so * y + ca * z, -so * x + co * y, -ca * co * x - ca * so * y - sa * z
@@ -82,13 +92,68 @@ def _predict(
     jacobian[1, 8] += -(swing[0] * u[1] - swing[1] * u[0])
 
 
-@kernel("void(f8[:, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[::1], f8[:, ::1], f8[:, ::1], f8[:, :, ::1])")
+@kernel()
+def _equal(x: Array, y: Array) -> bool:
+    for k in range(x.size):  # noqa: SIM110 (compiled)
+        if x[k] != y[k]:
+            return False
+    return True
+
+
+@kernel(
+    "void(Tuple((f8[:, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1])), f8[::1], f8[:, ::1], i8[::1], f8[::1], "
+    "UniTuple(f8[:, ::1], 4), f8[:, ::1], UniTuple(f8[:, :, ::1], 4))"
+)
 def _predict_all(
-    position: Array, velocity: Array, dcm: Array, rate: Array, arm: Array, side: Array, reading: Array, jacobian: Array
-) -> None:
-    """Apply `_predict` to n readings."""
+    states: tuple[Array, Array, Array, Array], arm: Array, side: Array, channel: Integers, sigma: Array,
+    blocks: tuple[Array, Array, Array, Array], reading: Array, jacobians: tuple[Array, Array, Array, Array],
+) -> None:  # fmt: skip
+    """Predict n readings, and their Jacobians.
+
+    Parameters
+    ----------
+    states : tuple of (n, ...) array
+        Position, velocity, DCM and angular rate, as of `NavigationPoints`.
+    arm : (3,) array
+        Lever arm of the antenna [m].
+    side : (n, 12) array
+        Side information.
+    channel : (n,) int array
+        Channels.
+    sigma : (n,) array
+        One sigma of the lasting error of each range [m].
+    blocks : (n, 2), (n, 1), (n, channels) and (n, 1) or (n, 0) array
+        Clock, troposphere, signals and ionosphere; the last one without columns with two frequencies.
+    reading : (n, 2) array
+        Overwritten with range and its rate.
+    jacobians : (n, 2, 9) array, and (n, 2, ...) arrays of zeros
+        The first is overwritten with the derivative by navigation; into the others come those by troposphere, signals
+        and ionosphere.
+    """
+    position, velocity, dcm, rate = states
+    clock, troposphere, signals, ionosphere = blocks
+    navigation, by_troposphere, by_signals, by_ionosphere = jacobians
+    antenna = np.empty(13)
     for i in range(len(position)):
-        _predict(position[i], velocity[i], dcm[i], rate[i], arm, side[i], reading[i], jacobian[i])
+        # Satellites at one state follow each other.
+        if i == 0 or not (
+            _equal(position[i], position[i - 1])
+            and _equal(rate[i], rate[i - 1])
+            and _equal(dcm[i, 0], dcm[i - 1, 0])
+            and _equal(dcm[i, 1], dcm[i - 1, 1])
+            and _equal(dcm[i, 2], dcm[i - 1, 2])
+        ):
+            _antenna(position[i], dcm[i], rate[i], arm, antenna)
+        _predict(antenna, velocity[i], side[i], reading[i], navigation[i])
+        c, mapping = channel[i], side[i, MAPPING]
+        reading[i, 1] += clock[i, 1]
+        x = reading[i, 0] + clock[i, 0]
+        x += side[i, TROPOSPHERE] + mapping * troposphere[i, 0] + sigma[i] * signals[i, c]
+        by_troposphere[i, 0, 0], by_signals[i, 0, c] = mapping, sigma[i]
+        if ionosphere.shape[1] > 0:
+            x += side[i, IONOSPHERE] * (1.0 + ionosphere[i, 0])
+            by_ionosphere[i, 0, 0] = side[i, IONOSPHERE]
+        reading[i, 0] = x
 
 
 def observe(point: NavigationPoint, sheet: Datasheet) -> tuple[Array, dict[str, Array]]:
@@ -98,24 +163,22 @@ def observe(point: NavigationPoint, sheet: Datasheet) -> tuple[Array, dict[str, 
 
 def observe_all(points: NavigationPoints, sheet: Datasheet) -> tuple[Array, dict[str, Array]]:
     """The same for n readings (`simnav.kinds.Observations`)."""
-    side, blocks, at, n = np.ascontiguousarray(points.side), points.blocks, points.channel, len(points.position)
-    reading, jacobian = np.empty((n, 2)), np.empty((n, 2, 9))
-    position, velocity, dcm, rate = (np.ascontiguousarray(array) for array in points[1:5])
-    _predict_all(position, velocity, dcm, rate, sheet.lever_arm, side, reading, jacobian)
-    sigma, frequencies = _figures(sheet, side[:, ELEVATION])
-    ionosphere, mapping, row = side[:, IONOSPHERE], side[:, MAPPING], np.arange(n)
-    reading += blocks["clock"]
-    reading[:, 0] += side[:, TROPOSPHERE] + mapping * blocks["troposphere"][:, 0] + sigma * blocks["signals"][row, at]
-    signals, troposphere = np.zeros((n, 2, len(sheet.channels))), np.zeros((n, 2, 1))
-    signals[row, 0, at], troposphere[:, 0, 0] = sigma, mapping
+    _, position, velocity, dcm, rate, blocks, channel, side = points
+    n, (sigma, frequencies) = len(position), _figures(sheet, side[:, ELEVATION])
+    reading, navigation, signals = np.empty((n, 2)), np.empty((n, 2, 9)), np.zeros((n, 2, len(sheet.channels)))
+    troposphere, ionosphere = np.zeros((n, 2, 1)), np.zeros((n, 2, 1))
+    delay = blocks["ionosphere"] if frequencies == 1 else np.empty((n, 0))
+    _predict_all(
+        (ready(position), ready(velocity), ready(dcm), ready(rate)), sheet.lever_arm, ready(side), channel, sigma,
+        (ready(blocks["clock"]), ready(blocks["troposphere"]), ready(blocks["signals"]), ready(delay)), reading,
+        (navigation, troposphere, signals, ionosphere),
+    )  # fmt: skip
     given = {
-        "navigation": jacobian, "clock": np.broadcast_to(_CLOCK, (n, 2, 2)), "troposphere": troposphere,
+        "navigation": navigation, "clock": np.broadcast_to(_CLOCK, (n, 2, 2)), "troposphere": troposphere,
         "signals": signals,
     }  # fmt: skip
     if frequencies == 1:
-        reading[:, 0] += ionosphere * (1.0 + blocks["ionosphere"][:, 0])
-        given["ionosphere"] = np.zeros((n, 2, 1))
-        given["ionosphere"][:, 0, 0] = ionosphere
+        given["ionosphere"] = ionosphere
     return reading, given
 
 
@@ -129,6 +192,11 @@ def _figures(sheet: Datasheet, elevation: Array) -> tuple[Array, int]:
 
 def reading_sigma(side: Array, sheet: Datasheet) -> Array:
     """The white noise of readings, from their C/N0 (`simnav.kinds.ReadingSigma`)."""
+    amplified = amplification(int(sheet.details["frequencies"]))
+    if side.ndim == 1:  # the same in less time
+        factor = float(noise_factor(side[DENSITY_RATIO]))
+        pseudorange, rate = sheet.sigma.tolist()
+        return np.array([pseudorange * factor * amplified, rate * factor])
     sigma: Array = sheet.sigma * noise_factor(side[..., DENSITY_RATIO])[..., None]
-    sigma[..., 0] *= amplification(int(sheet.details["frequencies"]))
+    sigma[..., 0] *= amplified
     return sigma

@@ -54,9 +54,13 @@ class SurroundingSpec(Spec):
     ----------
     files : tuple of str
         Names of the fields that are paths of files, as of `simnav.world.vessel.VesselSpec`.
+    later : mapping of str to object
+        Defaults of fields that were added later and are left out of digests where they have them
+        (`simnav.spec.without_later`).
     """
 
     files: ClassVar[tuple[str, ...]] = ()
+    later: ClassVar[Mapping[str, Any]] = {}
 
     kind: str
 

@@ -4,7 +4,8 @@ Without this part of the surroundings the mean surface is the WGS-84 ellipsoid. 
 
     level = N + sum of A cos(2 pi t / T + phase)
 
-above the ellipsoid: the undulation N of the geoid, which may slope, and the constituents of the tide. The air pressure
+above the ellipsoid: the undulation N of the geoid, which may slope or be that of a grid (`simnav.world.geoid`), and the
+constituents of the tide. The air pressure
 changes by a part that a pressure sensor takes for water, 1 hPa for about 1 cm (``pressure_change`` over the density and
 gravity). The sea does not follow it here.
 
@@ -14,15 +15,24 @@ of a geoid model at the place, such as EGM2008.
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal, Self
+from collections.abc import Mapping
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
-from pydantic import BeforeValidator, model_validator
+from pydantic import (
+    BeforeValidator,
+    SerializerFunctionWrapHandler,
+    field_validator,
+    model_serializer,
+    model_validator,
+)
 
 from simnav.geometry.earth import relative_position
-from simnav.spec import Positive, quantity, register_unit
+from simnav.spec import Positive, quantity, register_unit, without_later
 from simnav.streams import stream
 from simnav.types import Array
+from simnav.world.geoid import read_geoid
+from simnav.world.start import Start
 from simnav.world.surroundings import SurroundingSpec, register_surrounding
 
 __all__ = ["Level", "WaterLevel"]
@@ -51,6 +61,8 @@ class WaterLevel(SurroundingSpec):
         Undulation of the geoid at the first place that is asked for [m].
     geoid_slope : (float, float)
         Its change to the north and to the east [m/m].
+    geoid_grid : str
+        Path or name of a grid of undulations in their place; empty for none.
     tide_amplitude, tide_period : tuple of float
         Amplitude [m] and period [s] of each constituent; 12.42 h is the principal lunar one.
     tide_phase : tuple of float, optional
@@ -61,9 +73,13 @@ class WaterLevel(SurroundingSpec):
         [s].
     """
 
+    files: ClassVar[tuple[str, ...]] = ("geoid_grid",)
+    later: ClassVar[Mapping[str, Any]] = {"geoid_grid": ""}
+
     kind: Literal["water_level"] = "water_level"
     geoid: float = quantity("m", 0.0)
     geoid_slope: tuple[float, float] = quantity("mm_km", (0.0, 0.0))
+    geoid_grid: str = ""
     tide_amplitude: Figures = quantity("m", ())
     tide_period: Figures = quantity("h", ())
     tide_phase: Figures | None = quantity("deg", None)
@@ -80,7 +96,27 @@ class WaterLevel(SurroundingSpec):
             )
         if any(not period > 0.0 for period in self.tide_period):
             raise ValueError(f"tide_period_h = {[p / 3600.0 for p in self.tide_period]}: periods are greater than 0")
+        if self.geoid_grid and {"geoid", "geoid_slope"} & self.model_fields_set:
+            raise ValueError(
+                f"geoid_grid = {self.geoid_grid!r} has the undulations; geoid_m and geoid_slope_mm_km go without"
+            )
         return self
+
+    @field_validator("geoid_grid")
+    @classmethod
+    def _found(cls, name: str) -> str:
+        """Where the grid is: an error of the file is one of the scenario."""
+        return str(read_geoid(name).path) if name else name
+
+    @model_serializer(mode="wrap")
+    def _without_later(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """See `simnav.spec.without_later`."""
+        return without_later(handler(self), self.later)
+
+    def check(self, name: str, start: Start | None) -> None:
+        """See `SurroundingSpec.check`."""
+        if self.geoid_grid and start is not None:
+            read_geoid(self.geoid_grid).undulation(np.array([[start.latitude, start.longitude, 0.0]]))
 
     def build(self, name: str, seed: int) -> Level:
         """See `SurroundingSpec.build`."""
@@ -108,6 +144,8 @@ class Level:
         if self._origin is None and len(position):
             self._origin = np.array(position[0])
         level = np.full(len(time), self.spec.geoid)
+        if self.spec.geoid_grid:
+            level = read_geoid(self.spec.geoid_grid).undulation(position)
         if any(self.spec.geoid_slope) and len(time):
             assert self._origin is not None
             level += relative_position(position, self._origin)[:, :2] @ np.asarray(self.spec.geoid_slope)

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-__all__ = ["POND", "ROV", "SHORT", "ship"]
+__all__ = ["POND", "ROV", "SHORT", "TWENTY_SATELLITES", "ship"]
 
 #: A short voyage with fixes only: the text of its file.
 POND = Path(__file__).with_name("pond.toml").read_text(encoding="utf-8")
@@ -10,6 +10,8 @@ POND = Path(__file__).with_name("pond.toml").read_text(encoding="utf-8")
 SHORT = Path(__file__).with_name("short.toml").read_text(encoding="utf-8")
 #: A slow ROV with a DVL at 23 Hz and a MEMS IMU: its file.
 ROV = Path(__file__).with_name("rov.toml")
+#: A minute with raw observations of 20 satellites and an IMU at 20 Hz: its file.
+TWENTY_SATELLITES = Path(__file__).with_name("twenty_satellites.toml")
 
 
 def ship(name: str, seconds: float, speed: float = 5.0, sigma: str = "[3.0, 3.0, 5.0]") -> str:

@@ -364,7 +364,8 @@ def test_a_model_of_a_third_party_takes_them(plugins):
     model = import_file(plugins / "steady_turn.py").SteadyTurn
     table = '[instruments.fix]\nkind = "gnss_position"\nsigma_m = 2.0\n'
     table += '[instruments.beams]\nkind = "janus"\nsigma_m_s = 0.5\nsound_speed = 0.02\n'
-    recording = record(parse(SHIP.format(file="janus.py") + table, folder=plugins), 1)
+    scenario = parse(SHIP.format(file="janus.py") + table, folder=plugins)
+    recording = record(scenario.model_copy(update={"duration": 30.0}), 1)
     solvers = {
         "ekf": KalmanEstimator(model()),
         "ukf": SigmaPointEstimator(model()),
@@ -376,8 +377,8 @@ def test_a_model_of_a_third_party_takes_them(plugins):
         trial = run_trial(solver, recording)
         assert trial.status == "ok", trial.reason
         found[name] = horizontal(trial, recording)
-    assert found["window"] == pytest.approx(found["ekf"], rel=0.05)
-    assert found["ukf"] == pytest.approx(found["ekf"], rel=0.05)
+    assert found["window"] == pytest.approx(found["ekf"], rel=0.02)
+    assert found["ukf"] == pytest.approx(found["ekf"], rel=0.02)
 
 
 # --- who cannot take them says so

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from simnav.log.files import FileSpec
+from simnav.log.formats.unfinished_mcap import messages_in_order, summary_of
 from simnav.log.growing import GrowingTable
 from simnav.log.kept import kept
 from simnav.log.reader import Rows, register_reader
@@ -91,20 +92,33 @@ def topics_of(path: Path, form: str) -> list[str]:
     """
     try:
         if form == "mcap":
-            from mcap.reader import make_reader
+            import mcap.reader  # noqa: F401  # that it is missing is told below
 
-            with open(path, "rb") as stream:
-                summary = make_reader(stream).get_summary()
-            return sorted({c.topic for c in summary.channels.values()}) if summary else []
+            return _topics(path, summary_of(path))
         from rosbags.highlevel import AnyReader
         from rosbags.typesys import Stores, get_typestore
 
         with AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader:
             return sorted({c.topic for c in reader.connections})
     except ImportError as error:
-        raise LogError(f"{path}: needs the library {error.name}: pip install 'simnav[logs]'") from None
+        raise LogError(
+            f"{path}: needs the library {(error.name or '').partition('.')[0]}: pip install 'simnav[logs]'"
+        ) from None
+    except LogError:
+        raise
     except Exception as error:
+        if "index looks damaged" in str(error):
+            raise LogError(
+                f"{path}: the bag has no whole index, since its recorder did not end well; repair it by 'rosbag "
+                "reindex' of ROS"
+            ) from None
         raise LogError(f"{path}: its topics cannot be read ({' '.join(str(error).split())[:100]})") from None
+
+
+def _topics(path: Path, summary: Any) -> list[str]:
+    if summary is None:
+        return sorted({channel.topic for _, channel, _ in messages_in_order(path)})
+    return sorted({c.topic for c in summary.channels.values()})
 
 
 def _choose(path: Path, topic: str | None, topics: list[str]) -> str:
@@ -137,16 +151,18 @@ def _mcap(path: Path, topic: str | None) -> Iterator[tuple[int, Any]]:
     except ImportError:
         raise LogError(f"{path}: format = 'mcap' needs the library mcap: pip install 'simnav[logs]'") from None
     decode: dict[int, Any] = {}
+    summary = summary_of(path)
+    chosen, total = _choose(path, topic, _topics(path, summary)), 0
+    messages: Iterator[tuple[Any, Any, Any]]
     with open(path, "rb") as stream:
-        reader = make_reader(stream)
-        summary = reader.get_summary()
-        topics = sorted({c.topic for c in summary.channels.values()}) if summary else []
-        chosen = _choose(path, topic, topics) if topics else topic
-        counts = summary.statistics.channel_message_counts if summary and summary.statistics else {}
-        total = sum(counts.get(c.id, 0) for c in summary.channels.values() if c.topic == chosen) if summary else 0
-        messages = reader.iter_messages(topics=None if chosen is None else [chosen])
+        if summary is None:
+            messages = (m for m in messages_in_order(path) if m[1].topic == chosen)
+        else:
+            counts = summary.statistics.channel_message_counts if summary.statistics else {}
+            total = sum(counts.get(c.id, 0) for c in summary.channels.values() if c.topic == chosen)
+            messages = make_reader(stream).iter_messages(topics=[chosen])
         for number, (schema, channel, message) in enumerate(messages, 1):
-            if number % _TOLD == 0:
+            if total and number % _TOLD == 0:
                 tell(path, number, total)
             if channel.id not in decode:
                 decode[channel.id] = _decoder(path, channel, schema)

@@ -9,6 +9,7 @@ time is converted with the leap seconds of its date.
 from __future__ import annotations
 
 import re
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -18,9 +19,11 @@ from simnav.log.delimited import date_and_time
 from simnav.log.files import FileSpec
 from simnav.log.formats.gps_time import GPS_EPOCH, leap_seconds
 from simnav.log.reader import Rows, register_reader
-from simnav.log.table import LogError, Table
+from simnav.log.table import LogError, LogWarning, Table
 
 _NAMES = {"latitude(deg)": "latitude", "longitude(deg)": "longitude", "height(m)": "height"}
+#: The mark of UTF-8 at the beginning of a file, read as Latin-1.
+_MARK = b"\xef\xbb\xbf".decode("latin-1")
 _RATHER = ("latitude", "longitude", "height", "Q", "ns", "sdn", "sde", "sdu", "sdne", "sdeu", "sdun", "age", "ratio")
 
 
@@ -34,6 +37,7 @@ def read(path: Path, file: FileSpec, sentence: str | None, talker: str | None) -
     lines: list[int] = []
     with open(path, encoding="latin-1") as text:
         for number, line in enumerate(text, 1):
+            line = line.removeprefix(_MARK) if number == 1 else line
             if line.startswith("%"):
                 found = re.search(r"^%\s+(GPST|UTC|JST)\s+(.*)$", line.rstrip())
                 if found:
@@ -42,10 +46,20 @@ def read(path: Path, file: FileSpec, sentence: str | None, talker: str | None) -
             parts = line.replace(",", " ").split()
             if not parts:
                 continue
-            if cells and len(parts) != len(cells[0]):
-                raise LogError(f"{path}, line {number}: {len(parts)} cells where the first line has {len(cells[0])}")
             cells.append(parts)
             lines.append(number)
+    other = [k for k, parts in enumerate(cells) if len(parts) != len(cells[0])]
+    if other and (other[0] < len(cells) - 1 or len(cells[-1]) > len(cells[0])):
+        k = other[0]
+        raise LogError(f"{path}, line {lines[k]}: {len(cells[k])} cells where the first line has {len(cells[0])}")
+    if other:
+        warnings.warn(
+            f"{path}: the last row has {len(cells[-1])} cells where the first line has {len(cells[0])}; it is "
+            "incomplete, and left out",
+            LogWarning,
+            5,
+        )
+        del cells[-1], lines[-1]
     if not cells:
         raise LogError(f"{path}: there are no rows of data")
     width = len(cells[0]) - 2

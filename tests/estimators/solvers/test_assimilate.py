@@ -1,11 +1,16 @@
-"""One kernel a measurement, where nothing adapts: the same as one step after the other, and never in a hook's way."""
+"""One kernel a measurement or a step, where nothing adapts: the same numbers, and never in a hook's way."""
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from simnav.estimator import make
+from simnav.estimators.adaptations.adaptive_step import CompiledRules
 from simnav.estimators.adaptations.base import Adaptation
+from simnav.estimators.adaptations.sage_husa import SageHusa
 from simnav.estimators.algebra.joseph import project
 from simnav.estimators.composition import Row
 from simnav.estimators.models.inertial import InertialModel
@@ -26,6 +31,10 @@ def test_projection():
     project(P, H, cross, predicted)
     np.testing.assert_allclose(cross, P @ H.T, rtol=1e-13, atol=1e-13)
     np.testing.assert_allclose(predicted, H @ P @ H.T, rtol=1e-13, atol=1e-13)
+    again = np.empty((7, 3)), np.empty((3, 3))
+    project.unchecked(P, H, *again)
+    np.testing.assert_array_equal(again[0], cross)
+    np.testing.assert_array_equal(again[1], predicted)
 
 
 @pytest.mark.parametrize("row", [Ekf, Ekf23])
@@ -35,15 +44,7 @@ def test_it_is_the_same_filter(recording_of, row: type[Row]):
     stepwise.solver.adaptation = StepByStep()
     for estimator in (plain, stepwise):
         estimator.reset(recording.start, recording.instruments)
-    taken = [0]
-    assimilate = plain.model.assimilate
-
-    def counting(*args):
-        used = assimilate(*args)
-        taken[0] += used is not None
-        return used
-
-    plain.model.assimilate = counting
+    taken = counted(plain.model, "assimilate"), counted(plain.model, "assimilate_step")
     for packet in recording.steps():
         a, b = plain.update(packet), stepwise.update(packet)
         assert a.diagnostics == pytest.approx(b.diagnostics, rel=1e-6, nan_ok=True)
@@ -51,7 +52,66 @@ def test_it_is_the_same_filter(recording_of, row: type[Row]):
         for state in ("velocity", "dcm", "bias", "calibration"):
             np.testing.assert_allclose(*(getattr(e.model, state) for e in (plain, stepwise)), rtol=1e-9, atol=1e-9)
         np.testing.assert_allclose(a.covariance, b.covariance, rtol=1e-8, atol=1e-14)
-    assert taken[0] > 100
+    assert taken[row is Ekf][0] > 50
+    assert taken[row is Ekf23][0] == 0
+
+
+def counted(model, name: str) -> list[int]:
+    """How often a method of a model had a result."""
+    method, times = getattr(model, name), [0]
+
+    def counting(*args):
+        used = method(*args)
+        times[0] += used is not None
+        return used
+
+    setattr(model, name, counting)
+    return times
+
+
+ADAPTIVE = ("iae", "rae", "sage-husa", "vb-akf", "huber-kf", "igg3", "mckf", "student-t")
+
+
+@pytest.mark.parametrize("row", ["ekf", *ADAPTIVE])
+def test_a_step_in_one_call_has_the_same_bits(recording_of, row: str):
+    """Readings between the samples of the IMU, two at one time, many of them, wrong ones, none, and no IMU."""
+    recording = recording_of(2, 40.0)
+    whole, single = make(row), make(row)
+    single.solver.takes_steps = False
+    for estimator in (whole, single):
+        estimator.reset(recording.start, recording.instruments)
+    times, rng, used = counted(whole.model, "assimilate_step"), np.random.default_rng(3), set()
+    for k, packet in enumerate(recording.steps()):
+        aids = [m for _ in range(4) for m in packet.aids] if k % 5 == 1 else packet.aids if k % 5 else []
+        late = sorted(min(m.time, packet.time - rng.uniform(0.0, 0.9)) for m in aids)
+        aids = [m._replace(time=time) for m, time in zip(aids, late, strict=True)]
+        if k % 4 == 2:
+            aids = [m._replace(value=m.value + 1e-5 * rng.standard_normal(len(m.value))) for m in aids]
+        packet = replace(packet, aids=aids, imu=None if k % 7 == 3 else packet.imu)
+        a, b = whole.update(packet), single.update(packet)
+        np.testing.assert_equal(a.diagnostics, b.diagnostics)
+        for state in (*whole.model.state, *whole.model.memory):
+            np.testing.assert_array_equal(getattr(whole.model, state), getattr(single.model, state))
+        np.testing.assert_array_equal(whole.covariance, single.covariance)
+        used.add(tuple(value for name, value in a.diagnostics.items() if name.startswith("sigma_")))
+    assert times[0] == 40
+    assert (len(used) > 5) == (row in ADAPTIVE)
+
+
+def test_an_adaptation_that_chooses_in_its_own_way_is_asked(recording_of, run_over):
+    asked = []
+
+    class Own(SageHusa):
+        def estimate(self, innovation):
+            asked.append(innovation)
+            return super().estimate(innovation)
+
+    run_over(KalmanEstimator(InertialModel(), Own()), recording_of(2, 5.0))
+    assert asked
+    assert Own.rule is None is not SageHusa.rule
+    rules = CompiledRules(SageHusa(full=True))
+    rules.adaptation.reset(recording_of(2, 5.0).instruments)
+    assert rules.step_rule(list(recording_of(2, 5.0).instruments)) is None  # NumPy bounds a full matrix
 
 
 @pytest.mark.parametrize("hook", ["_observe", "_absorb"])

@@ -157,6 +157,17 @@ def test_a_blind_export_needs_a_key(tmp_path, scenario):
         export(scenario, tmp_path, form="xls")
 
 
+def test_an_export_says_the_seed_it_was_asked_for_and_no_truth(tmp_path, scenario):
+    export(scenario, tmp_path / "open", seed=3)
+    text = (tmp_path / "open" / "README.md").read_text()
+    assert "seed 3" in text
+    assert "simnav score SCENARIO --seed 3 FILE" in text
+    assert not (tmp_path / "open" / "truth.csv").exists()
+    assert "faults" not in (tmp_path / "open" / "start.json").read_text()
+    export(scenario, tmp_path / "columns", seed=3, form="parquet")
+    assert "| `gnss.parquet` |" in (tmp_path / "columns" / "README.md").read_text()
+
+
 def test_external_rows_of_a_sealed_campaign(tmp_path, scenario):
     seal = make_key(tmp_path / "key")
     export(scenario, tmp_path / "lab", runs=2, blind=True, sealed=tmp_path / "key")

@@ -80,6 +80,10 @@ def test_breaking_point_of_a_known_line():
     # Up from the clean value only; not where the error stays small; where more than half of the runs fail.
     assert breaking_point("a", x, errors, None, clean=2).value.value == pytest.approx(3.0, abs=0.02)
     assert math.isinf(breaking_point("a", x, errors, 100.0).value.value)
+    down = breaking_point("a", x, errors[:, ::-1], 4.0, clean=10)  # error 6 - x: the clean value is the highest
+    assert down.value.value == pytest.approx(2.0, abs=0.15)
+    assert down.value.low > down.value.value > down.value.high
+    assert math.isinf(breaking_point("a", x, errors[:, ::-1], 100.0, clean=10).value.value)
     errors[:30, 6:] = np.inf
     assert breaking_point("a", x, errors, 100.0).value.value == x[6]
 

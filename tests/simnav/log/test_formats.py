@@ -129,8 +129,45 @@ def test_sbet(good):
     assert table.column("heading")[1][0] == pytest.approx(0.7)
     path = good.folder / "cut.out"
     path.write_bytes((good.folder / "good.out").read_bytes()[:-5])
-    with pytest.raises(LogError, match=r"1627 bytes are no whole number of records of 136 bytes.*offset 1496"):
+    with pytest.warns(LogWarning, match=r"the last record, at offset 1496, has 131 bytes where .* has 136"):
+        assert len(read("sbet", path).table) == 11
+    path.write_text("0,1,2,3\n" * 100)
+    with pytest.raises(LogError, match="it is text, and no binary file as format = 'sbet' wants"):
         read("sbet", path)
+
+
+def test_an_mcap_file_that_is_cut_off_is_read_as_far_as_it_goes(tmp_path):
+    """A recorder that was switched off has written no index."""
+    writer = pytest.importorskip("mcap.writer")
+    path = tmp_path / "a.mcap"
+    with open(path, "wb") as stream:
+        out = writer.Writer(stream, chunk_size=100, compression=writer.CompressionType.NONE)
+        out.start()
+        channel = out.register_channel("/fix", "json", 0)
+        for k in range(50):
+            out.add_message(channel, 10**9 * k, b'{"latitude": 54.0}', 10**9 * k)
+        out.finish()
+    whole = path.read_bytes()
+    path.write_bytes(whole[: whole.index((10**9 * 30).to_bytes(8, "little"))])
+    with pytest.warns(LogWarning, match="no index, since its recorder did not end well; it is cut off or damaged"):
+        rows = read("mcap", path, clock="logger")
+    assert 20 < len(rows.table) <= 30
+    assert rows.time[:20] == pytest.approx(np.arange(20.0))
+    (stream,) = streams_of(path)
+    assert stream.sentence == "/fix"
+    assert "has no index" in stream.notes[0]
+
+
+def test_a_last_row_of_rtklib_that_is_cut_off_is_left_out(good):
+    good("rtklib")
+    text = (good.folder / f"good{CASES['rtklib'].ending}").read_text().splitlines()
+    path = good.folder / "cut.pos"
+    path.write_text("\n".join(text)[:-9])
+    with pytest.warns(LogWarning, match="the last row has 5 cells where the first line has 8; it is incomplete"):
+        assert len(read("rtklib", path).table) == 11
+    path.write_text("\n".join([*text[:-3], text[-3][:-9], *text[-2:]]))
+    with pytest.raises(LogError, match="line 12: 5 cells where the first line has 8"):
+        read("rtklib", path)
 
 
 def test_pd0(good):

@@ -7,6 +7,7 @@ import pytest
 
 from simnav.log import LogError, LogSource
 from simnav.log.check import check_log, described
+from simnav.log.delimited import read_csv
 from simnav.log.draft import draft, guesses
 from simnav.log.inspection import inspect_log, streams_of
 from simnav.scenario import load
@@ -36,11 +37,12 @@ def test_a_draft_of_sentences_can_be_run(tmp_path):
     lines = []
     for k in range(40):
         stamp = f"2024-05-01T10:00:{k:02d}.000Z"
-        lines += [f"{stamp} $GPGGA,1000{k:02d}.00,54{27.0 + 0.004 * k:07.4f},N,01015.0000,E,1,09,0.9,3.0,M,44.0,M,,",
+        lines += [f"{stamp} $GPGLL,5427.0000,N,01015.0000,E,1000{k:02d}.00,A", f"{stamp} $PRDID,1.0,2.0,9.0",
+                  f"{stamp} $GPGGA,1000{k:02d}.00,54{27.0 + 0.004 * k:07.4f},N,01015.0000,E,1,09,0.9,3.0,M,44.0,M,,",
                   f"{stamp} $HEHDT,0.5,T", f"{stamp} $IIVHW,,T,,M,14.0,N,,K", f"{stamp} $SDDPT,20.5,1.2"]  # fmt: skip
     (tmp_path / "ship.log").write_text("\n".join(lines) + "\n")
     streams, failed = inspect_log([tmp_path / "ship.log"])
-    assert {s.sentence for s in streams} == {"GGA", "HDT", "VHW", "DPT"}
+    assert {s.sentence for s in streams} == {"GLL", "PRDID", "GGA", "HDT", "VHW", "DPT"}
     assert not failed
     path = tmp_path / "ship.toml"
     path.write_text(draft(streams, "ship"))
@@ -48,6 +50,9 @@ def test_a_draft_of_sentences_can_be_run(tmp_path):
     assert set(source.instruments) == {"gnss", "gyrocompass", "speed_log"}  # the depth of the water is not the vessel's
     speed = source.advance(source.duration).aids["speed_log"].value
     assert speed == pytest.approx(14.0 * 1852.0 / 3600.0)
+    assert source.initial_truth.position[0, 2] == pytest.approx(47.0)  # GGA has a height, GLL none
+    text = path.read_text()
+    assert 'sentence = "HDT"' in text
 
 
 @pytest.mark.parametrize("form", CASES)
@@ -60,6 +65,9 @@ def test_the_format_of_a_file_is_found(tmp_path, form):
     tables = {"euroc": "csv", "kf_gins": "csv"}  # a table of numbers says no more of itself
     assert {s.form for s in found} == {tables.get(form, form)}
     assert all(np.all(np.diff(s.time) >= 0.0) for s in found)
+    if form in ("nmea", "rtklib", "pd6", "n2k", "rinex"):
+        with pytest.raises(LogError, match=f"it looks like a file of format = '{form}'"):
+            read_csv(path)
     if form == "rtklib":
         assert any(g.quantity == "position" and g.units[0] == "deg" for s in found for g in guesses(s))
 
@@ -72,6 +80,8 @@ def test_the_format_of_a_file_is_found(tmp_path, form):
         ("#timestamp [ns],lat,lon\n1,1,2\n2,1,2\n", {"time": "#timestamp [ns]", "time_unit": "ns"}),
         ("x,utc\n1,2024-05-01T10:00:00Z\n2,2024-05-01T10:00:01Z\n", {"time": "utc", "time_unit": "iso"}),
         ("1714557600000,5\n1714557600100,6\n", {"time": "1", "time_unit": "ms"}),
+        ("time,gx,gy,gz\n0,0,0,0\n20,0,0,0\n40,0,0,0\n", {"time": "time", "time_unit": "ms"}),
+        ("time,gx,gy,gz\n1714557600,0,0,0\n1714557601,0,0,0\n", {"time": "time", "time_unit": "s"}),
     ],
 )
 def test_the_times_of_a_table_are_found(tmp_path, text, keys):
@@ -83,10 +93,12 @@ def test_the_times_of_a_table_are_found(tmp_path, text, keys):
 def test_what_cannot_be_read_is_said(tmp_path):
     (tmp_path / "a.bin").write_bytes(bytes(range(256)) * 8)
     (tmp_path / "b.csv").write_text("t,x\n1,2\n3\n5,6\n")
+    (tmp_path / "c.csv").write_text("time,x\n1,2\n3..,4\n5,6\n")
     streams, failed = inspect_log([tmp_path])
     assert not streams
     assert "it is a binary file; say its format" in failed[0]
     assert "b.csv, line 3: 1 cells where the first line has 2" in failed[1]
+    assert "c.csv, line 3, column 'time': '3..' is not a number" in failed[2]
     with pytest.raises(LogError, match="there is no such file or folder"):
         inspect_log([tmp_path / "no"])
     assert draft([], "x").startswith("# No columns with latitude")
@@ -97,3 +109,119 @@ def test_rows_that_are_not_later_than_the_one_before_have_no_rate():
         described(np.array([3.0, 3.0])) == "2 rows from 3.000 to 3.000 s, most rows are not later than the one before"
     )
     assert described(np.array([3.0, 4.0, 9.5])) == "3 rows from 3.000 to 9.500 s, 0.3077 Hz"
+
+
+def test_a_magnetic_heading_without_variation_is_in_the_draft(tmp_path):
+    stamps = [f"2024-05-01T10:00:{k:02d}.000Z" for k in range(40)]
+    lines = [f"{t} $GPGGA,1000{k:02d}.00,54{27.0 + 0.004 * k:07.4f},N,01015.0000,E,1,09,0.9,3.0,M,44.0,M,,\n"
+             f"{t} $HCHDM,356.5,M" for k, t in enumerate(stamps)]  # fmt: skip
+    (tmp_path / "boat.log").write_text("\n".join(lines) + "\n")
+    text = draft(streams_of(tmp_path / "boat.log"), "boat", "my boat.toml")
+    assert 'columns = ["heading_magnetic"]\nvariation_model = "wmm"' in text
+    assert "simnav check my boat.toml" in text
+    path = tmp_path / "boat.toml"
+    path.write_text(text.replace('variation_model = "wmm"', "variation_deg = 5.0"))
+    source = LogSource(load(path), 0)
+    heading = source.advance(source.duration).aids["gyrocompass"].value
+    assert np.degrees(heading) == pytest.approx(1.5)
+    undated = [line.partition(" ")[2] for pair in lines for line in pair.split("\n")]
+    (tmp_path / "boat.log").write_text("\n".join(undated) + "\n")
+    assert "variation_deg = 0.0 " in draft(streams_of(tmp_path / "boat.log"), "boat")
+
+
+def test_units_in_the_names_of_columns_count(tmp_path):
+    names = ["t_ms", "gyro_x [dps]", "gyro_y (rad/s)", "gyro_z_deg_s", "acc_x [mg]", "acc_y_m_s2", "acc_z",
+             "lat_e7", "lon [deg]", "alt_mm", "heading_deg", "speed (kts)"]  # fmt: skip
+    rows = [[20 * k, 0.1, 0.1, 0.1, 0.1, 0.1, -9.8, 540000000 + k, 10.0, 2000, 0.5, 2.0] for k in range(9)]
+    path = tmp_path / "a.csv"
+    path.write_text("\n".join([",".join(names), *(",".join(map(str, row)) for row in rows)]) + "\n")
+    found = {g.quantity: g.units for g in guesses(streams_of(path)[0])}
+    assert found == {
+        "position": ("1e-7 deg", "deg", "mm"),
+        "angular_rate": ("deg_s", "rad_s", "deg_s"),
+        "specific_force": ("mg", "m_s2", "m_s2"),
+        "heading": ("deg",),
+        "speed": ("kn",),
+    }
+
+
+def test_a_solution_of_rtklib_gives_its_own_accuracy(tmp_path):
+    path = tmp_path / "a.pos"
+    CASES["rtklib"].make(path)
+    text = path.read_text().splitlines()
+    head = next(k for k, line in enumerate(text) if not line.startswith("%"))
+    rows = [" ".join([*line.split()[:6], "12", "0.01", "0.01", "0.02"]) for line in text[head:]]
+    named = "%  UTC  latitude(deg) longitude(deg) height(m) Q ns sdn(m) sde(m) sdu(m)"
+    path.write_text("\n".join([named, *rows]) + "\n")
+    text = draft(streams_of(path), "a")
+    assert 'sigma = ["sdn", "sde", "sdu"]' in text
+    assert '[log.reference]\nquality = "Q"' in text
+
+
+def test_a_topic_that_cannot_be_read_does_not_hide_the_others(tmp_path):
+    writer = pytest.importorskip("mcap.writer")
+    path = tmp_path / "a.mcap"
+    with open(path, "wb") as stream:
+        out = writer.Writer(stream)
+        out.start()
+        channels = [out.register_channel(t, form, 0) for t, form in (("/image", "own"), ("/fix", "json"))]
+        for k in range(3):
+            for channel in channels:
+                out.add_message(channel, k, b'{"latitude": 54.0}', k)
+        out.finish()
+    (stream,) = streams_of(path)
+    assert (stream.sentence, len(stream.table)) == ("/fix", 3)
+    assert "messages of the topic '/image' are encoded as 'own'" in stream.notes[0]
+
+
+def test_a_folder_of_folders_and_a_damaged_file_are_said(tmp_path):
+    (tmp_path / "day1").mkdir()
+    with pytest.raises(LogError, match="there is no file in it; name one of its folders: day1"):
+        inspect_log([tmp_path])
+    path = tmp_path / "a.mat"
+    CASES["mat"].make(path)
+    path.write_bytes(path.read_bytes()[:-3])
+    with pytest.raises(LogError, match=r"a\.mat: .*damaged"):
+        streams_of(path)
+
+
+def test_a_draft_of_a_phone_can_be_run(tmp_path):
+    """Gyroscope and accelerometer in files of their own, and a position that is repeated."""
+    time = np.arange(0.0, 40.0, 0.02)
+    for name, shift, values in (("Gyroscope", 0.0, (0.0, 0.0, 0.01)), ("Accelerometer", 0.007, (0.1, 0.0, 9.81))):
+        own = ",".join(map(str, values))
+        rows = "".join(f"{1_714_557_600_000 + 1000 * (t + shift):.0f},{own}\n" for t in time)
+        (tmp_path / f"{name}.csv").write_text("time_ms,x,y,z\n" + rows)
+    fixes = [f"{1714557600 + 0.5 * k},{54.0 + 1e-5 * (k // 2)},10.0,3.0" for k in range(80)]
+    (tmp_path / "gps.csv").write_text("\n".join(["time,lat,lon,alt", *fixes]) + "\n")
+    text = draft(inspect_log([tmp_path])[0], "phone")
+    assert 'file = "gyroscope"\nspecific_force_file = "accelerometer"' in text
+    assert text.count("drop_repeated = true") == 2
+    path = tmp_path / "phone.toml"
+    path.write_text(text)
+    source = LogSource(load(path), 0)
+    block = source.advance(source.duration)
+    assert block.imu.specific_force[:, 2] == pytest.approx(-9.81)
+    assert block.imu.angular_rate[:, 2] == pytest.approx(-0.01)
+    assert np.diff(block.aids["gnss"].time) == pytest.approx(10.0)
+
+
+def test_arrays_with_several_times_are_several_streams(tmp_path):
+    h5py = pytest.importorskip("h5py")
+    path = tmp_path / "a.h5"
+    with h5py.File(path, "w") as file:
+        file["imu/t"] = np.arange(2000, dtype=np.uint64) * 20_000_000  # nanoseconds
+        file["imu/gyro"], file["imu/accel"] = np.zeros((2000, 3)), np.tile([0.0, 0.0, -9.8], (2000, 1))
+        file["gps/t"], file["gps/lat"], file["gps/lon"] = (
+            np.arange(40.0),
+            54.0 + 1e-5 * np.arange(40),
+            np.full(40, 10.0),
+        )
+    streams = {s.name: s for s in streams_of(path)}
+    assert streams["a.h5 imu/t"].keys == {"time": "imu/t", "time_unit": "ns"}
+    assert set(streams["a.h5 gps/t"].table.names) == {"gps/t", "gps/lat", "gps/lon"}
+    toml = tmp_path / "a.toml"
+    toml.write_text(draft(list(streams.values()), "a"))
+    source = LogSource(load(toml), 0)
+    assert source.duration > 30.0
+    assert source.advance(source.duration).imu.specific_force[:, 2] == pytest.approx(-9.8)

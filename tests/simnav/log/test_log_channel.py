@@ -182,7 +182,10 @@ def test_an_imu_with_samples_every_second(tiny):
 def test_a_missing_imu_value(tiny):
     tiny.edit("imu1.csv", 7, "5000120.0,0,0,,0,0,0")
     spec = log(tiny)
-    with pytest.raises(LogError, match=r"imu1\.csv, line 7, column '-az': the value is missing"):
+    with pytest.warns(LogWarning, match=r"1 of 2000 rows without a value of the IMU are left out, the first is line 7"):
+        assert len(read_imu(spec, spec.imu, "1").mean) == 1999
+    spec = log(tiny.replace('samples = "means"', 'samples = "increments"'))
+    with pytest.raises(LogError, match=r"imu1\.csv, line 7, column '-az': the value is missing; an increment"):
         read_imu(spec, spec.imu, "1")
 
 

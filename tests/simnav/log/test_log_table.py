@@ -134,3 +134,35 @@ def test_stamps_with_the_day_of_the_year():
     assert utc_seconds("19+085:10:06:03.188") == utc_seconds("2019-03-26T10:06:03.188Z")
     with pytest.raises(ValueError, match="does not match"):
         utc_seconds("19+485:10:06:03.188")
+
+
+def test_whole_numbers_above_those_of_a_double_are_read(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_text("time,x\n1714557600020000000,1\n1714557600040000000,2\n")
+    assert read_csv(path).column("time")[1] == pytest.approx([1.71455760002e18, 1.71455760004e18], rel=1e-15)
+
+
+@pytest.mark.parametrize(
+    "text", ["t;x;note\n0,50;-1,25;a,b\n0,75;2;c\n", "0,50;-1,25\n0,75;2\n", "t\tx\n0,5\t-1,25\n0,75\t2\n"]
+)
+def test_decimal_commas(tmp_path, text):
+    path = tmp_path / "a.csv"
+    path.write_text(text)
+    found = read_csv(path)
+    assert found.column(1)[1].tolist() == [0.5, 0.75]
+    assert found.column(2)[1].tolist() == [-1.25, 2.0]
+
+
+def test_commas_and_points_are_no_decimal_commas(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_text("t;x\n0.5;1,25\n0.75;2,5\n")
+    found = read_csv(path)
+    assert found.column("t")[1].tolist() == [0.5, 0.75]
+    with pytest.raises(LogError, match="line 2, column 'x': '1,25' is not a number"):
+        found.column("x")
+
+
+def test_lines_that_end_in_a_carriage_return(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_bytes(b"t,x\r0.5,1\r0.75,2\r")
+    assert read_csv(path).column("x")[1].tolist() == [1.0, 2.0]

@@ -224,7 +224,13 @@ def test_repeated_values(tiny):
     assert any(f.level == "note" and "drop_repeated = true" in f.sentence and f.part == "dvl" for f in found.findings)
     spec = tiny.scenario().log
     channel = spec.instruments["dvl"].channel().model_copy(update={"drop_repeated": True})
-    assert len(read_channel(spec, channel, "dvl", "1").time) == 39
+    fresh = read_channel(spec, channel, "dvl", "1")
+    assert len(fresh.time) == 39
+    # A row that is held out is not in the other part once more.
+    taken, left = (channel.model_copy(update=u) for u in ({"every": 3}, {"hold_out": 3}))
+    split = [read_channel(spec, c, "dvl", "1").time for c in (taken, left)]
+    assert [len(time) for time in split] == [13, 26]
+    assert sorted(np.concatenate(split)) == fresh.time.tolist()
 
 
 def test_skip_for_each_recording(tiny):
@@ -264,7 +270,9 @@ def test_a_vessel_that_starts_moored(tiny):
 
 def test_a_heading_that_nobody_knows(tiny):
     moored(tiny).replace("attitude_deg = [0.1, 0.1, 1.0]", "attitude_deg = [0.1, 0.1, 180.0]")
-    assert "heading (unknown)" in LogSource(tiny.scenario(), 0).note
+    with pytest.warns(LogWarning, match="the heading at the start is unknown; only estimators that search it can use"):
+        source = LogSource(tiny.scenario(), 0)
+    assert "heading (unknown)" in source.note
 
 
 def test_a_compass_gives_the_heading_of_a_moored_vessel(tiny):

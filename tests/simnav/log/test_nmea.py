@@ -261,6 +261,16 @@ def test_a_magnetic_heading_becomes_true_by_the_last_variation(tmp_path):
     assert np.degrees(read_nmea(path).table("HDG").columns["heading"]) == pytest.approx([110.0, 111.0])
 
 
+def test_the_variation_does_not_take_a_heading_out_of_the_circle(tmp_path):
+    path = tmp_path / "a.nmea"
+    path.write_text("$HCHDG,359.0,2.0,E,8.5,E\n$HCHDM,355.0,M\n$HCHDG,1.0,,,3.0,W\n$HCHDM,359.5,M\n")
+    file = read_nmea(path)
+    hdg = file.table("HDG")
+    assert np.degrees(hdg.column("heading_magnetic")[1]) == pytest.approx([1.0, 1.0])
+    assert np.degrees(hdg.column("heading")[1]) == pytest.approx([9.5, -2.0])
+    assert np.degrees(file.table("HDM").column("heading")[1]) == pytest.approx([3.5, 356.5])
+
+
 def test_a_usbl_fix_has_the_axes_that_it_says(tmp_path):
     path = write(
         tmp_path / "log",

@@ -1,0 +1,110 @@
+"""All measurements of a step of the inertial filter in one kernel, where nothing adapts between them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TypeAlias
+
+import numpy as np
+
+from simnav.compiled import kernel
+from simnav.types import Array, Integers, Measurement
+
+from .base import RESULTS, StepRule
+from .inertial_update import assimilate_inertial
+from .propagation import MOVING, SAMPLES, Moving, Samples, propagate_inertial
+
+__all__ = ["PLAIN", "STEP", "AidTable", "Measured", "Packet", "filter_inertial"]
+
+#: The instruments of a filter: their codes, numbers of components, and places of bias and scale factor (i, 4); lever
+#: arms (i, 3) [m]; and the elements of their noise (i, 9).
+AidTable: TypeAlias = tuple[Integers, Array, Array]
+#: The k measurements of a step in order of their times: rows of their instruments (k,), times (k,) [s], values (k, 3);
+#: overwritten, for each what `assimilate_inertial` returns, in a row of results (k, 8).
+Measured: TypeAlias = tuple[Integers, Array, Array, Array]
+
+
+#: Types of the arguments of `filter_inertial`.
+STEP = (
+    f"{MOVING}, {SAMPLES}, i8, f8, f8[::1], UniTuple(f8[:, ::1], 3), UniTuple(f8[::1], 4), "
+    "Tuple((Tuple((i8[:, ::1], f8[:, ::1], f8[:, ::1])), Tuple((i8[::1], f8[::1], f8[:, ::1], f8[:, ::1]))))"
+)
+
+
+@kernel(f"i8({STEP})")
+def filter_inertial(
+    state: Moving, samples: Samples, first: int, until: float, noise: Array, matrices: tuple[Array, Array, Array],
+    others: tuple[Array, Array, Array, Array], packet: tuple[AidTable, Measured],
+) -> int:  # fmt: skip
+    """Do `propagate_inertial` and `assimilate_inertial` for each measurement of a step, and propagate to its end.
+
+    Parameters
+    ----------
+    state, samples, first, noise, matrices
+        As of `simnav.estimators.models.propagation.propagate_inertial`.
+    until : float
+        End of the step [s].
+    others : tuple of arrays
+        As of `propagate_inertial`; and the correction (n,), overwritten with that by the last measurement.
+    packet : tuple of tuples
+        The instruments and the measurements, see `AidTable` and `Measured`.
+
+    Returns
+    -------
+    int
+        Index of the first sample that is not completely used.
+    """
+    (codes, arms, noises), (which, times, values, results) = packet
+    position, velocity, dcm, _, bias, _, clock = state
+    calibration, rate, density, correction = others
+    calibrated, covariance = (calibration, rate, density), matrices[2]
+    now = position, velocity, dcm, clock[12:15], bias, calibration
+    for k in range(which.size + 1):
+        time = min(times[k], until) if k < which.size else until
+        if time > clock[0]:
+            first = propagate_inertial(state, samples, first, time, noise, matrices, calibrated, time - clock[0])
+        if k == which.size:
+            break
+        row = which[k]
+        code, d, bias_at, scale_at = codes[row, 0], codes[row, 1], codes[row, 2], codes[row, 3]
+        results[k, 0], results[k, 1] = assimilate_inertial(
+            (code, arms[row], bias_at, scale_at), values[k, :d], now, covariance,
+            noises[row, : d * d].reshape((d, d)), correction,
+        )  # fmt: skip
+    return first
+
+
+#: Every measurement is used with its nominal noise.
+PLAIN = StepRule(filter_inertial, ())
+
+
+class Packet:
+    """The measurements of a step as arrays, which are used again at the next step.
+
+    Parameters
+    ----------
+    names : sequence of str
+        The instruments.
+    aids : tuple of arrays
+        Their parameters, in the order of the names, see `AidTable`.
+    rule : StepRule
+        How they are used.
+    """
+
+    def __init__(self, names: Sequence[str], aids: AidTable, rule: StepRule):
+        self.aids, self.rule = aids, rule
+        self._row = {name: i for i, name in enumerate(names)}
+        self._make_room(8)
+
+    def _make_room(self, count: int) -> None:
+        self._room = np.zeros(count, np.int64), np.zeros(count), np.zeros((count, 3)), np.zeros((count, RESULTS))
+
+    def fill(self, measurements: Sequence[Measurement]) -> Measured:
+        """The measurements as arrays; those of the call before are overwritten."""
+        count = len(measurements)
+        if count > len(self._room[0]):
+            self._make_room(2 * count)
+        which, time, value, result = self._room
+        for i, m in enumerate(measurements):
+            which[i], time[i], value[i, : len(m.value)] = self._row[m.instrument], m.time, m.value
+        return which[:count], time, value, result
