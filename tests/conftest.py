@@ -52,6 +52,11 @@ def pytest_collect_file(file_path: Path) -> Generator[None, list[pytest.Collecto
     return [one for one in found if not (none and isinstance(one, DoctestModule))]
 
 
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Tests that wait for other processes come first: other workers compute meanwhile, and nobody waits at the end."""
+    items.sort(key=lambda item: item.path.parent.name not in ("campaign", "hostile"))
+
+
 def pytest_collection_finish() -> None:
     """The tests stay to the end: no collection of garbage needs to look at their many objects, now or later."""
     gc.collect()

@@ -25,14 +25,20 @@ def beginning() -> Recording:
 @pytest.mark.parametrize("name", [n for n in first_of_each_solver() if not find(n).reference])
 def test_what_a_row_calls_is_loaded(name: str, beginning: Recording, monkeypatch: pytest.MonkeyPatch) -> None:
     called: set[Kernel[..., Any]] = set()
-    plain = Kernel.__call__
+    plain, unchecked = Kernel.__call__, Kernel.unchecked.fget
+    assert unchecked is not None
 
     def watched(self: Kernel[..., Any], *args: Any) -> Any:
         if self.signature is not None:
             called.add(self)
         return plain(self, *args)
 
+    def entered(self: Kernel[..., Any]) -> Any:
+        called.add(self)
+        return unchecked(self)
+
     monkeypatch.setattr(Kernel, "__call__", watched)
+    monkeypatch.setattr(Kernel, "unchecked", property(entered))
     estimator = make(name)
     trial = run_trial(estimator, beginning)
     monkeypatch.undo()
