@@ -198,8 +198,9 @@ class Kernel(Generic[Parameters, Returned]):
         would be misread, without a message.
         """
         if self._entry is None:
-            (overload,) = self.compile().overloads.values()  # type: ignore[attr-defined]
-            self._entry = overload.entry_point
+            function = self.compile()
+            overloads = getattr(function, "overloads", None)  # NUMBA_DISABLE_JIT: it is the plain function
+            self._entry = function if overloads is None else next(iter(overloads.values())).entry_point
         return self._entry
 
     if TYPE_CHECKING:

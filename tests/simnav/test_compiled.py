@@ -234,3 +234,14 @@ def test_a_helper_that_python_calls_is_not_compiled_for_it(monkeypatch: pytest.M
     """A confined estimator could not write what is compiled at its first epoch."""
     monkeypatch.setattr(compiled.Kernel, "compile", lambda self: pytest.fail(f"{self} was compiled"))
     assert compiled.Kernel(lambda x: 2.0 * x, None, False)(3.0) == 6.0
+
+
+def test_a_kernel_is_entered_without_a_check_also_where_nothing_is_compiled(monkeypatch: pytest.MonkeyPatch) -> None:
+    """`NUMBA_DISABLE_JIT` makes a kernel its plain function."""
+    assert compiled.Kernel(_doubled, "f8(f8)", False).unchecked(3.0) == 6.0
+    monkeypatch.setattr(compiled.Kernel, "_jit", lambda self, directory: self.function)
+    assert compiled.Kernel(_doubled, "f8(f8)", False).unchecked(3.0) == 6.0
+
+
+def _doubled(x: float) -> float:
+    return 2.0 * x
