@@ -14,30 +14,12 @@ from simnav.scenario import Scenario, parse
 from simnav.simulation.simulator import simulate
 from simnav.spec import SpecError
 from simnav.world.geoid import read_geoid
+from tests.cases.depth_sensor import HEAD
 
 pytest.importorskip("pyproj")
 
 #: Where the package proj-data of Debian has EGM96 on 15'.
 EGM96 = Path("/usr/share/proj/egm96_15.gtx")
-
-HEAD = """
-name = "level"
-version = 1
-title = "Depth"
-duration_s = 1200.0
-step_s = 10.0
-[start]
-latitude_deg = 54.0
-longitude_deg = 8.0
-depth_m = 12.0
-heading_deg = 0.0
-speed_m_s = 2.0
-[vessel]
-kind = "uuv"
-[instruments.depth]
-rate_hz = 0.1
-sigma_m = 0.0
-"""
 
 
 def grid(folder: Path, name: str = "plane.gtx", middle: float = 54.0) -> Path:
