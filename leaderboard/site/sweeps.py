@@ -64,8 +64,7 @@ class SweepFile:
         """What the page shows of it: charts of one dial, with a slider, or a map of two; and the breaking points."""
         dials, score = self.content["dials"], self.content["score"]
         titles = [_title(d) for d in dials]
-        breaking, values = list(self.content["breaking_points"]), dials[0]["values"]
-        last = values[0 if len(values) > 1 and dials[0].get("clean") == values[-1] else -1]
+        breaking = list(self.content["breaking_points"])
         error = score["title"] + ("" if score["unit"] == "-" else f" [{score['unit']}]")
         if len(dials) == 1:
             caption = "Point and line: median with its 95 % interval. The slider above chooses the value."
@@ -90,7 +89,7 @@ class SweepFile:
                     "value": short(b["value"]["value"]),
                     "low": short(b["value"]["low"]),
                     "high": short(b["value"]["high"]),
-                    "beyond": last,
+                    "beyond": self.content.get("beyond", dials[0]["values"][-1]),
                 }
                 for b in breaking
             ],

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from simnav.leaderboard.ranking.statistics import Interval
 
-__all__ = ["BreakingPoint", "breaking_point", "crossing"]
+__all__ = ["BreakingPoint", "breaking_point", "crossing", "goes_down"]
 
 Array = NDArray[np.float64]
 
@@ -70,6 +70,11 @@ def crossing(dial: Array, error: Array, threshold: float) -> float:
     return float(dial[k - 1] + share * (dial[k] - dial[k - 1]))
 
 
+def goes_down(dial: Sequence[float], clean: int) -> bool:
+    """Whether the breaking point is searched downwards: the clean value, given by its number, is the highest."""
+    return len(dial) > 1 and clean == len(dial) - 1
+
+
 def breaking_point(
     estimator: str,
     dial: Sequence[float],
@@ -97,7 +102,7 @@ def breaking_point(
         Value of the second dial.
     """
     x, y = np.asarray(dial, dtype=np.float64), np.asarray(errors, dtype=np.float64)
-    down = len(x) > 1 and clean == len(x) - 1
+    down = goes_down(dial, clean)
     x, y = (-x[::-1], y[:, ::-1]) if down else (x[clean:], y[:, clean:])
 
     def found(rows: Array) -> tuple[float, float]:

@@ -19,7 +19,7 @@ from simnav.leaderboard.results.shown import Shown
 from simnav.scenario import Dial
 from simnav.scoring import SCORES
 
-from .breaking import BreakingPoint, breaking_point
+from .breaking import BreakingPoint, breaking_point, goes_down
 from .settings import clean_value
 
 if TYPE_CHECKING:
@@ -125,9 +125,7 @@ class Sweep(Shown):
 
     def _breaking_table(self) -> tables.Fitted:
         """Where each estimator breaks."""
-        values = self.values[0]
-        down = len(values) > 1 and clean_value(self.dials[0]) == values[-1]
-        beyond = f"beyond {values[0 if down else -1]:g}"
+        beyond = f"beyond {self._last:g}"
 
         def figure(x: float) -> str:
             return "–" if math.isnan(x) else beyond if math.isinf(x) else f"{x:.3g}"
@@ -145,6 +143,16 @@ class Sweep(Shown):
         columns = ["estimator", *second, "passes", at, "95 % interval"]
         value = ["estimator", at, *second, "95 % interval", "passes"]
         return tables.Fitted("Breaking points", columns, rows, value, always=2 + len(second), numeric=[*second, at])
+
+    @property
+    def _clean(self) -> int:
+        """Number of the clean value of the first dial."""
+        return self.values[0].index(clean_value(self.dials[0]))
+
+    @property
+    def _last(self) -> float:
+        """The value of the first dial at which the search for a breaking point ends."""
+        return self.values[0][0 if goes_down(self.values[0], self._clean) else -1]
 
     @cached_property
     def _errors(self) -> dict[tuple[str, tuple[float, ...]], dict[int, float]]:
@@ -174,8 +182,7 @@ class Sweep(Shown):
         With two dials there is one for each value of the second. Only seeds that were run at every value count.
         """
         found = []
-        values = self.values[0]
-        clean = values.index(clean_value(self.dials[0]))
+        values, clean = self.values[0], self._clean
         for e in self.estimators:
             for at in self.values[1] if len(self.dials) == 2 else (None,):
                 rest = () if at is None else (at,)
@@ -194,14 +201,14 @@ class Sweep(Shown):
             "score": {"name": self.score, "title": score.title, "unit": score.unit},
             "limit": self.limit,
             "dials": [
-                {"name": d.name, "key": d.key, "unit": d.unit, "title": d.title, "values": list(v),
-                 "clean": clean_value(d)}
+                {"name": d.name, "key": d.key, "unit": d.unit, "title": d.title, "values": list(v)}
                 for d, v in zip(self.dials, self.values, strict=True)
             ],
             "points": [
                 {"estimator": p.estimator, "values": list(p.values), "failed": p.failed, "error": asdict(p.error)}
                 for p in self.points
             ],
+            "beyond": self._last,
             "breaking_points": [
                 {"estimator": b.estimator, "criterion": b.criterion, "threshold": b.threshold, "at": b.at,
                  "value": asdict(b.value)}
