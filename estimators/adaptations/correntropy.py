@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from math import exp, sqrt
 from typing import Literal
 
@@ -12,7 +11,7 @@ from simnav.compiled import kernel
 from simnav.types import Array
 
 from .base import Innovation
-from .noise import RULE, NoiseAdaptation, posterior
+from .noise import RULE, WeightedNoise, posterior
 
 __all__ = ["MaximumCorrentropy", "correntropy_noise", "correntropy_rule"]
 
@@ -75,7 +74,7 @@ def correntropy_rule(
     )
 
 
-class MaximumCorrentropy(NoiseAdaptation):
+class MaximumCorrentropy(WeightedNoise):
     """Weights ``exp(-e^2 / (2 bandwidth^2))`` of the residuals after the update, by fixed-point iteration.
 
     Chen, Liu, Zhao and Principe (2017), "Maximum correntropy Kalman filter", Automatica 76, algorithm 1. A residual is
@@ -125,11 +124,4 @@ class MaximumCorrentropy(NoiseAdaptation):
 
     def choose(self, innovation: Innovation) -> Array:
         """The noise divided by the weights; the smallest weight is reported."""
-        m, residual, predicted, nominal, *_ = innovation
-        noise: Array = np.empty((len(nominal), len(nominal)))
-        least = correntropy_rule(*self.memory_of(m.instrument), residual, predicted, nominal, noise)
-        self.report(f"weight.{m.instrument}", least)
-        return noise
-
-    def _note(self, name: str, chosen: Sequence[float]) -> None:
-        self._note_weight(name, chosen)
+        return self.weighted(correntropy_rule, innovation)

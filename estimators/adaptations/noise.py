@@ -18,8 +18,8 @@ from .base import Adaptation, Innovation
 from .prediction import PredictionTest
 
 __all__ = [
-    "RULE", "EstimatedNoise", "NoiseAdaptation", "Posterior", "Scope", "bound", "copied", "normalised_square",
-    "posterior", "scale", "scaled",
+    "RULE", "EstimatedNoise", "NoiseAdaptation", "Posterior", "Scope", "WeightedNoise", "bound", "copied",
+    "normalised_square", "posterior", "scale", "scaled",
 ]  # fmt: skip
 
 #: Signature of a kernel that estimates a noise, from settings and memory of an instrument (which it updates),
@@ -225,12 +225,6 @@ class NoiseAdaptation(Adaptation):
         """Report the sigmas and the further number that a kernel chose; they differ from those before."""
         self._report.update(zip(self._labels[name], chosen))
 
-    def _note_weight(self, name: str, chosen: Sequence[float]) -> None:
-        """`_note` where the further number is a weight."""
-        NoiseAdaptation._note(self, name, chosen)
-        if chosen[-1]:
-            self.report(f"weight.{name}", chosen[-1])
-
     @abstractmethod
     def choose(self, innovation: Innovation) -> Array | None:
         """The (m, m) noise to use, or None to reject the measurement."""
@@ -261,6 +255,22 @@ class NoiseAdaptation(Adaptation):
     def diagnostics(self) -> dict[str, float | Array]:
         """The sigmas last used, and other reported values."""
         return self._report
+
+
+class WeightedNoise(NoiseAdaptation):
+    """Base of robust rules: the nominal noise divided by weights, of which the smallest is reported."""
+
+    def weighted(self, rule: Kernel[..., float], innovation: Innovation) -> Array:
+        """The noise that a kernel (`RULE`) chooses for a measurement, and report its weight."""
+        m, residual, predicted, nominal, *_ = innovation
+        noise: Array = np.empty((len(nominal), len(nominal)))
+        self.report(f"weight.{m.instrument}", rule(*self.memory_of(m.instrument), residual, predicted, nominal, noise))
+        return noise
+
+    def _note(self, name: str, chosen: Sequence[float]) -> None:
+        super()._note(name, chosen)
+        if chosen[-1]:
+            self.report(f"weight.{name}", chosen[-1])
 
 
 class EstimatedNoise(NoiseAdaptation):

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import partial
 
 from simnav.compiled import kernel
 from simnav.types import Array
 
 from .base import Innovation
-from .noise import RULE, NoiseAdaptation, copied, scale, scaled
+from .noise import RULE, WeightedNoise, copied, scale, scaled
 from .prediction import standardised
 
 __all__ = ["EquivalentWeights", "HuberWeights", "Igg3Weights", "huber", "huber_noise", "igg3", "igg3_noise"]
@@ -86,7 +86,7 @@ def igg3_noise(
     )  # fmt: skip
 
 
-class EquivalentWeights(NoiseAdaptation):
+class EquivalentWeights(WeightedNoise):
     """Divides the variance of each component by the weight of its standardised innovation.
 
     Component i of an innovation v with covariance ``S = H P H' + R`` is standardised as ``u = v_i / sqrt(S_ii)``;
@@ -107,9 +107,6 @@ class EquivalentWeights(NoiseAdaptation):
         if not 0.0 < smallest <= 1.0:
             raise ValueError(f"smallest = {smallest:g}: it must lie in (0, 1]")
         self.weight, self.smallest = weight, smallest
-
-    def _note(self, name: str, chosen: Sequence[float]) -> None:
-        self._note_weight(name, chosen)
 
     def choose(self, innovation: Innovation) -> Array:
         """The noise divided by the weights; the smallest weight is reported."""

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from simnav.compiled import kernel
@@ -11,7 +9,7 @@ from simnav.estimators.algebra.cholesky import factorise, invert_factor
 from simnav.types import Array
 
 from .base import Innovation
-from .noise import RULE, NoiseAdaptation, posterior
+from .noise import RULE, WeightedNoise, posterior
 
 __all__ = ["StudentT", "normalised_trace", "student_t_noise", "student_weight"]
 
@@ -75,7 +73,7 @@ def student_t_noise(
     return weight
 
 
-class StudentT(NoiseAdaptation):
+class StudentT(WeightedNoise):
     """The noise of every measurement has Student's t distribution, with the datasheet's covariance R as scale matrix.
 
     A variable with this distribution is Gaussian with the covariance ``R / w``, where w is gamma distributed,
@@ -116,11 +114,4 @@ class StudentT(NoiseAdaptation):
 
     def choose(self, innovation: Innovation) -> Array:
         """The noise divided by the weight, which is reported."""
-        m, residual, predicted, nominal, *_ = innovation
-        noise: Array = np.empty((len(nominal), len(nominal)))
-        weight = student_t_noise(*self.memory_of(m.instrument), residual, predicted, nominal, noise)
-        self.report(f"weight.{m.instrument}", weight)
-        return noise
-
-    def _note(self, name: str, chosen: Sequence[float]) -> None:
-        self._note_weight(name, chosen)
+        return self.weighted(student_t_noise, innovation)
