@@ -152,7 +152,7 @@ class Kernel(Generic[Parameters, Returned]):
         import numba
         from numba.core import config as numba_config
 
-        from simnav.kernel_files import compile_with
+        from simnav.kernel_files import call_by_symbol, compile_with
 
         config: Any = numba_config
         original = self.function
@@ -173,19 +173,26 @@ class Kernel(Generic[Parameters, Returned]):
         function.__module__ = self.__module__
         options: dict[str, Any] = {"nopython": True, "cache": directory is not None, "error_model": "numpy"}
         options["fastmath"] = self.fastmath
+        options["no_cfunc_wrapper"] = True
         if self.signature is None:
+            options["no_cpython_wrapper"] = True
             # A helper is inlined: this is faster by a sixth, and keeps results equal to the last bit. Without inlining
             # a helper would exist once in its own library and again in the library of each caller, optimised
             # differently, and the linker uses the copy that is loaded first. With fast arithmetic a result would then
             # depend on whether its kernels came from the cache.
             options["forceinline"] = True
+        fast = any(k.fastmath for k in self.tree())
         previous = config.CACHE_DIR, config.SLP_VECTORIZE
         # Sums that are written side by side become vector instructions. Each keeps its order; with fast arithmetic it
         # would not, and results would change.
-        config.CACHE_DIR, config.SLP_VECTORIZE = directory or previous[0], not any(k.fastmath for k in self.tree())
+        config.CACHE_DIR, config.SLP_VECTORIZE = directory or previous[0], not fast
         try:
             compiled: Callable[..., Any] = numba.jit(**options)(function)
             compile_with(compiled, self.signature)
+            if self.signature is not None and not fast:
+                # Its callers contain a call of it, and no copy of its code. They are compiled, or loaded, after it.
+                code = self.fingerprint() if directory is None else os.path.basename(directory)
+                call_by_symbol(compiled, f"simnav.{self.__qualname__}.{code}")
         finally:
             config.CACHE_DIR, config.SLP_VECTORIZE = previous
         return compiled

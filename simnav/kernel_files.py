@@ -10,6 +10,7 @@ This module imports Numba; `simnav.compiled` imports it when the first kernel is
 from __future__ import annotations
 
 import contextlib
+import copy
 import hashlib
 import io
 import os
@@ -18,17 +19,20 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from numba.core import typeinfer
+from llvmlite import binding
+from numba.core import base, imputils, typeinfer
 from numba.core.caching import FunctionCache, IndexDataCacheFile
 from numba.core.runtime.nrt import rtsys
 
-__all__ = ["WithDigests", "compile_with"]
+__all__ = ["WithDigests", "call_by_symbol", "compile_with"]
 
 _DIGEST = hashlib.sha256().digest_size
 
 
 _Files: Any = IndexDataCacheFile  # Numba has no annotations
 _Cache: Any = FunctionCache
+_user_function: Any = imputils.user_function
+_Overloads: Any = base.OverloadSelector
 
 
 class WithoutCompiler(_Cache):  # type: ignore[misc]
@@ -102,3 +106,29 @@ def compile_with(dispatcher: Any, signature: str | None) -> None:
         with typeinfer.register_dispatcher(dispatcher):  # as `numba.jit` with a signature does
             dispatcher.compile(signature)
         dispatcher.disable_compile()
+
+
+def call_by_symbol(dispatcher: Any, symbol: str) -> None:
+    """Make the functions that call a compiled one call it by a symbol.
+
+    By itself Numba puts a copy of the code of each function that it has compiled into every function that calls it, and
+    compiles the copy again. A quarter of the machine code of all kernels was such copies.
+
+    Parameters
+    ----------
+    dispatcher : numba.core.dispatcher.Dispatcher
+        A function that is compiled or loaded, for one signature.
+    symbol : str
+        The name of its code: the machine code of a caller is kept in a file, and refers to it by this name.
+    """
+    compiled = list(getattr(dispatcher, "overloads", {}).values())
+    if not compiled:  # NUMBA_DISABLE_JIT
+        return
+    (result,) = compiled
+    binding.add_symbol(symbol, result.library.get_pointer_to_function(result.fndesc.mangled_name))
+    described = copy.copy(result.fndesc)
+    described.mangled_name = symbol
+    call = _user_function(described, ())  # the second are the libraries that a caller would contain
+    calls = _Overloads()
+    calls.append(call, call.signature)
+    dispatcher.targetctx._defns[result.entry_point] = calls  # Numba has no public way to do this

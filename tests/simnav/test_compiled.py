@@ -10,6 +10,7 @@ import sys
 import time
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from simnav import cache_folder, compiled
@@ -245,3 +246,39 @@ def test_a_kernel_is_entered_without_a_check_also_where_nothing_is_compiled(monk
 
 def _doubled(x: float) -> float:
     return 2.0 * x
+
+
+@compiled.kernel("f8(f8[::1])")
+def sum_of_squares(values: compiled.Array) -> float:
+    total = 0.0
+    for k in range(values.size):
+        total += values[k] * values[k]
+    return total
+
+
+@compiled.kernel("f8(f8[::1])")
+def root_of_squares(values: compiled.Array) -> float:
+    if values.size == 0:
+        raise ValueError("nothing")
+    return float(np.sqrt(sum_of_squares(values)))
+
+
+@compiled.kernel("f8(f8[::1])")
+def twice_the_root(values: compiled.Array) -> float:
+    return 2.0 * root_of_squares(values)
+
+
+def test_a_kernel_calls_another_one_and_has_no_copy_of_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The machine code of the caller names the other one; both have the same result if loaded, and raise its error."""
+    monkeypatch.setenv("SIMNAV_CACHE_DIR", str(tmp_path))
+    values = np.array([3.0, 4.0])
+    assert twice_the_root(values) == 10.0
+    (machine_code,) = (root for root in tmp_path.rglob("*.nbc") if "twice_the_root" in root.name)
+    assert b"simnav.root_of_squares." in machine_code.read_bytes()
+    assert b"sum_of_squares" not in machine_code.read_bytes()
+    with pytest.raises(ValueError, match="nothing"):
+        twice_the_root(np.empty(0))
+    command = [sys.executable, "-c", "from test_compiled import *; print(twice_the_root(np.array([3.0, 4.0])))"]
+    env = surroundings(tmp_path, PYTHONPATH=os.pathsep.join([str(Path(__file__).parent), *sys.path]))
+    loaded = subprocess.run(command, env=env, capture_output=True, text=True, check=True)
+    assert loaded.stdout == "10.0\n"
