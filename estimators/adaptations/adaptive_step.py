@@ -1,7 +1,7 @@
 """All measurements of a step of the inertial filter in one kernel, with a noise that is chosen by each innovation.
 
-For the rules of `RULES`. Each is a kernel of its adaptation, which also calls it by itself, so that a filter has the
-same noise measurement by measurement.
+For the rules of `RULES`, and for a mixture of levels. Each is a kernel of its adaptation, which also calls it by
+itself, so that a filter has the same noise measurement by measurement.
 """
 
 from __future__ import annotations
@@ -13,45 +13,67 @@ from typing import TypeAlias
 import numpy as np
 
 from simnav.compiled import kernel
-from simnav.estimators.models.base import INNOVATION, NIS, REPORT, RESULTS, SIGMA, StepRule
-from simnav.estimators.models.inertial_step import STEP, AidTable, Measured
-from simnav.estimators.models.inertial_update import absorb_inertial, innovate_inertial
-from simnav.estimators.models.propagation import Moving, Samples, propagate_inertial
+from simnav.estimators.algebra.inflation import inflate_motion
+from simnav.estimators.algebra.mixture import mixture_update
+from simnav.estimators.models.base import INNOVATION, NIS, REJECTED, REPORT, RESULTS, SIGMA, SIZE, StepRule
+from simnav.estimators.models.inertial_step import STEP, AidTable, Matrices, Measured, Others, aid_of, move_inertial
+from simnav.estimators.models.inertial_update import absorb_inertial, assimilate_inertial, innovate_inertial
+from simnav.estimators.models.propagation import Moving, Samples, correct_inertial
 from simnav.types import Array, Flags, Integers
 
+from .adkf import adkf_noise
 from .correntropy import correntropy_rule
+from .fading import fading_noise
+from .gating import gate_noise
 from .innovation_based import innovation_noise
-from .noise import EstimatedNoise, NoiseAdaptation, copied
-from .prediction import IS_WRONG, judge_prediction
+from .noise import INFLATION, REJECT, TIME, NoiseAdaptation, copied
+from .prediction import (
+    BLAMED,
+    HAS_PASSED,
+    IS_DISTURBED,
+    IS_WRONG,
+    PredictionTest,
+    joint_inflation,
+    judge_prediction,
+)
 from .robust import huber_noise, igg3_noise
 from .sage_husa import sage_husa_noise
 from .student_t import student_t_noise
 from .variational_bayes import variational_bayes_noise
 
-__all__ = ["RULES", "CompiledRules", "adapt_inertial"]
+__all__ = ["RULES", "adapt_inertial", "mixture_rule", "step_rule"]
 
 #: The rules, in the order of the numbers by which a kernel knows them.
 RULES = (
     innovation_noise, sage_husa_noise, variational_bayes_noise, huber_noise, igg3_noise, correntropy_rule,
-    student_t_noise,
+    student_t_noise, gate_noise, adkf_noise, fading_noise,
 )  # fmt: skip
 #: Those before this one are estimates; with a poor prediction the noise used last stands.
 WEIGHTS = 3
-#: What is known of the instruments of a filter, row by row: number of the rule; index of each among all instruments of
-#: the run (i,), whether its noise is estimated (i,), the noise used last (i, 9); settings (k, p), first elements of the
-#: memories (k + 1,) and memories of all of them; and of the test of the prediction, whether it is made, and its
-#: settings, instruments and memory (`simnav.estimators.adaptations.prediction`).
-Rule: TypeAlias = tuple[int, Integers, Flags, Array, Array, Integers, Array]
-Test: TypeAlias = tuple[bool, Array, tuple[Integers, Array, Flags], Array]
+#: The number of a mixture of levels, which has an update of its own.
+MIXTURE = len(RULES)
+#: What an inflation is of: position, velocity and attitude (`inflate_motion`), whose places follow, or all of P.
+NOTHING, MOTION, ALL = range(3)
+PLACES = (0, 6, 6, 9)
+#: What is known of the instruments of a filter of n states, row by row: number of the rule, and what an inflation is
+#: of; index of each among all instruments of the run, and whether its noise is chosen (i, 2); the noise used last
+#: (i, 9), and the variances at the start (n,); settings (k, p), memories of all one after the other, and their first
+#: elements (k + 1,), and what is shared (`simnav.estimators.adaptations.noise.RULE`); and of the test of the
+#: prediction, whether it is made, and its settings, instruments, memory and inflations
+#: (`simnav.estimators.adaptations.prediction`).
+Rule: TypeAlias = tuple[int, int, Integers, Array, Array, Array, Array, Integers, Array]
+Test: TypeAlias = tuple[bool, Array, tuple[Integers, Array, Flags], Array, Array]
 
 
 @kernel()
-def _choose(i: int, row: int, rule: Rule, innovation: Array, predicted: Array, nominal: Array, used: Array) -> float:
+def _choose(
+    row: int, rule: Rule, time: float, innovation: Array, predicted: Array, nominal: Array, used: Array
+) -> float:
     """Write the noise of a measurement into ``used``; what the rule reports, 0 if it was not asked."""
-    code, _, estimated, last, settings, first, memory = rule
-    m = innovation.size
-    copied(nominal, used)
-    if not estimated[row]:
+    code, _, table, last, _, settings, memories, first, shared = rule
+    m, i = innovation.size, table[row, 0]
+    shared[TIME], shared[INFLATION], shared[REJECT] = time, 1.0, 0.0
+    if table[row, 1] == 0:
         return 0.0
     before, trace = 0.0, 0.0
     for a in range(m):
@@ -61,36 +83,42 @@ def _choose(i: int, row: int, rule: Rule, innovation: Array, predicted: Array, n
         for a in range(m * m):
             used[a // m, a % m] = last[row, a] if last[row, 0] > 0.0 else nominal[a // m, a % m]
         return 0.0
-    own = memory[first[i] : first[i + 1]]
+    own, memory = settings[i], memories[first[i] : first[i + 1]]
     if code == 0:
-        return innovation_noise(settings[i], own, innovation, predicted, nominal, used)
+        return innovation_noise(own, memory, shared, innovation, predicted, nominal, used)
     if code == 1:
-        return sage_husa_noise(settings[i], own, innovation, predicted, nominal, used)
+        return sage_husa_noise(own, memory, shared, innovation, predicted, nominal, used)
     if code == 2:
-        return variational_bayes_noise(settings[i], own, innovation, predicted, nominal, used)
+        return variational_bayes_noise(own, memory, shared, innovation, predicted, nominal, used)
     if code == 3:
-        return huber_noise(settings[i], own, innovation, predicted, nominal, used)
+        return huber_noise(own, memory, shared, innovation, predicted, nominal, used)
     if code == 4:
-        return igg3_noise(settings[i], own, innovation, predicted, nominal, used)
+        return igg3_noise(own, memory, shared, innovation, predicted, nominal, used)
     if code == 5:
-        return correntropy_rule(settings[i], own, innovation, predicted, nominal, used)
-    return student_t_noise(settings[i], own, innovation, predicted, nominal, used)
+        return correntropy_rule(own, memory, shared, innovation, predicted, nominal, used)
+    if code == 6:
+        return student_t_noise(own, memory, shared, innovation, predicted, nominal, used)
+    if code == 7:
+        return gate_noise(own, memory, shared, innovation, predicted, nominal, used)
+    if code == 8:
+        return adkf_noise(own, memory, shared, innovation, predicted, nominal, used)
+    return fading_noise(own, memory, shared, innovation, predicted, nominal, used)
 
 
 @kernel(
-    f"i8({STEP}, Tuple((Tuple((i8, i8[::1], b1[::1], f8[:, ::1], f8[:, ::1], i8[::1], f8[::1])), "
-    "Tuple((b1, f8[::1], Tuple((i8[:, ::1], f8[::1], b1[:, ::1])), f8[:, ::1])))))"
+    f"i8({STEP}, Tuple((Tuple((i8, i8, i8[:, ::1], f8[:, ::1], f8[::1], f8[:, ::1], f8[::1], i8[::1], f8[::1])), "
+    "Tuple((b1, f8[::1], Tuple((i8[:, ::1], f8[::1], b1[:, ::1])), f8[:, ::1], f8[::1])))))"
 )
 def adapt_inertial(
-    state: Moving, samples: Samples, start: int, until: float, noise: Array, matrices: tuple[Array, Array, Array],
-    others: tuple[Array, Array, Array, Array], packet: tuple[AidTable, Measured], choice: tuple[Rule, Test],
+    state: Moving, samples: Samples, start: int, until: float, noise: Array, matrices: Matrices, others: Others,
+    packet: tuple[AidTable, Measured], choice: tuple[Rule, Test],
 ) -> int:  # fmt: skip
-    """Do what `simnav.estimators.models.inertial_step.filter_inertial` does, with an estimated noise.
+    """Do what `simnav.estimators.models.inertial_step.filter_inertial` does, with a noise that a rule chooses.
 
     Parameters
     ----------
     state, samples, start, until, noise, matrices, others, packet
-        As of `filter_inertial`; ``start`` is its ``first``. A row of results is that of `StepRule`.
+        As of `filter_inertial`; ``start`` is its ``first``.
     choice : tuple of tuples
         The rule, and the test of the prediction, see `Rule`.
 
@@ -99,71 +127,126 @@ def adapt_inertial(
     int
         Index of the first sample that is not completely used.
     """
-    (codes, arms, noises), (which, times, values, results) = packet
-    rule, test = choice
+    aids, measured = packet
+    which, times, values, results = measured
+    (code, inflates, table, last, variances, settings, memories, first, shared), test = choice
+    tests, limits, known, memory, kept = test
     position, velocity, dcm, _, bias, _, clock = state
-    calibration, rate, density, correction = others
-    calibrated, covariance = (calibration, rate, density), matrices[2]
-    now = position, velocity, dcm, clock[12:15], bias, calibration
-    index, last = rule[1], rule[3]
-    tests, settings, known, memory = test
-    for k in range(which.size + 1):
-        time = min(times[k], until) if k < which.size else until
-        if time > clock[0]:
-            start = propagate_inertial(state, samples, start, time, noise, matrices, calibrated, time - clock[0])
-        if k == which.size:
-            break
-        row = which[k]
-        code, d, bias_at, scale_at = codes[row, 0], codes[row, 1], codes[row, 2], codes[row, 3]
-        innovation, cross, predicted = np.empty(d), np.empty((covariance.shape[0], d)), np.empty((d, d))
-        nominal, used, result = noises[row, : d * d].reshape((d, d)), np.empty((d, d)), results[k]
+    now, covariance, correction = (position, velocity, dcm, clock[12:15], bias, others[0]), matrices[2], others[3]
+    n = covariance.shape[0]
+    for k in range(which.size):
+        start = move_inertial(k, measured, state, samples, start, until, noise, matrices, others)
+        row, result = which[k], results[k]
+        aid, nominal = aid_of(row, aids)
+        i, d, value = table[row, 0], nominal.shape[0], values[k, : nominal.shape[0]]
+        innovation, cross, predicted, used = np.empty(d), np.empty((n, d)), np.empty((d, d)), np.empty((d, d))
         for a in range(RESULTS):
             result[a] = 0.0
-        result[NIS], result[SIGMA] = -1.0, nan
-        if not innovate_inertial(
-            (code, arms[row], bias_at, scale_at), values[k, :d], now, covariance, innovation, cross, predicted
-        ):
+        result[NIS], result[SIGMA], result[SIZE] = -1.0, nan, nan
+        if not innovate_inertial(aid, value, now, covariance, innovation, cross, predicted):
             continue
-        noisy = True
+        noisy, said, inflation = True, 0, 1.0
         for a in range(d):
             noisy = noisy and nominal[a, a] > 0.0
-        i = index[row]
+            result[INNOVATION + a] = innovation[a]
+        if tests and (noisy or code == MIXTURE):
+            said = judge_prediction(innovation, predicted, nominal, i, times[k], limits, known, memory)
+        if code == MIXTURE:
+            if said & IS_WRONG:
+                result[NIS], result[SIZE] = assimilate_inertial(aid, value, now, covariance, nominal, correction)
+                continue
+            probability, count = memories[first[i] : first[i + 1]], first[i + 1] - first[i]
+            levels, transition = settings[i, :count], settings[i, count:].reshape((count, count))
+            result[NIS], expected = mixture_update(
+                covariance, cross, predicted, nominal, innovation, levels, transition, probability, correction
+            )
+            if result[NIS] >= 0.0:
+                correct_inertial(position, velocity, dcm, bias, others[0], correction)
+                result[REPORT] = probability[0]
+                for a in range(d):
+                    result[SIGMA + a] = sqrt(expected * nominal[a, a])
+            continue
         copied(nominal, used)
         if noisy:
-            said = (
-                judge_prediction(innovation, predicted, nominal, i, times[k], settings, known, memory) if tests else 0
-            )
+            if said & HAS_PASSED:
+                kept[BLAMED] = 0.0
             if said & IS_WRONG == 0:
-                result[REPORT] = _choose(i, row, rule, innovation, predicted, nominal, used)
+                result[REPORT] = _choose(row, choice[0], times[k], innovation, predicted, nominal, used)
+                inflation = shared[INFLATION]
+                if shared[REJECT] > 0.0:
+                    result[NIS] = REJECTED
+                    continue
+            elif said & IS_DISTURBED and inflates != NOTHING:
+                inflation = joint_inflation(innovation, predicted, nominal, covariance, limits, kept)
             for a in range(d * d):
                 last[row, a] = used[a // d, a % d]
             for a in range(d):
                 result[SIGMA + a] = sqrt(used[a, a])
-        for a in range(d):
-            result[INNOVATION + a] = innovation[a]
+        if inflation != 1.0 and inflates == ALL:
+            for a in range(n):
+                for b in range(n):
+                    covariance[a, b] *= inflation
+                for b in range(d):
+                    cross[a, b] *= inflation
+            for a in range(d):
+                for b in range(d):
+                    predicted[a, b] *= inflation
+        elif inflation != 1.0:
+            inflate_motion(covariance, inflation, variances, PLACES)
+            innovate_inertial(aid, value, now, covariance, innovation, cross, predicted)
         result[NIS] = absorb_inertial(covariance, cross, predicted, used, innovation, now, correction)
-    return start
+    return move_inertial(which.size, measured, state, samples, start, until, noise, matrices, others)
 
 
-class CompiledRules:
-    """The rules of an adaptation for the instruments of a filter (`simnav.estimators.models.base.StepRules`).
+def step_rule(adaptation: NoiseAdaptation, names: Sequence[str], variances: Array) -> StepRule | None:
+    """The rule of an adaptation for a step of a filter, or None if the adaptation has no kernel.
 
     Parameters
     ----------
     adaptation : NoiseAdaptation
         Begun for the run; a step changes its memory.
+    names : sequence of str
+        The instruments of the filter.
+    variances : (n,) array
+        Variances of its state at the start of the run.
     """
+    if not adaptation.ruled or adaptation.rule not in RULES or adaptation.inflates_position:
+        return None
+    inflates = ALL if adaptation.inflates else MOTION if adaptation.inflates_motion else NOTHING
+    chosen = [adaptation.in_scope(adaptation.instruments[name].kind) for name in names]
+    indices = [adaptation.index[name] for name in names]
+    rule = (
+        RULES.index(adaptation.rule), inflates, np.array([indices, chosen], np.int64).T.copy(),
+        np.zeros((len(names), 9)), variances, adaptation.rule_settings, adaptation.rule_memory, adaptation.rule_first,
+        adaptation.rule_shared,
+    )  # fmt: skip
+    return StepRule(adapt_inertial, names, ((rule, adaptation.prediction.arrays(len(variances))),))
 
-    def __init__(self, adaptation: NoiseAdaptation):
-        self.adaptation = adaptation
 
-    def step_rule(self, names: Sequence[str]) -> StepRule | None:
-        """The rule, or None if the adaptation has no kernel, or bounds a full matrix, which is done by NumPy."""
-        own = self.adaptation
-        if own.rule not in RULES or (isinstance(own, EstimatedNoise) and own.full):
-            return None
-        index = np.array([own.index[name] for name in names], np.int64)
-        estimated = np.array([own.in_scope(own.instruments[name].kind) for name in names], bool)
-        last = np.zeros((len(names), 9))
-        rule = RULES.index(own.rule), index, estimated, last, own.rule_settings, own.rule_first, own.rule_memory
-        return StepRule(adapt_inertial, ((rule, own.prediction.arrays),))
+def mixture_rule(
+    levels: Array, transition: Array, probability: Array, names: Sequence[str], prediction: PredictionTest,
+    variances: Array,
+) -> StepRule:  # fmt: skip
+    """The rule of a mixture of noise levels (`simnav.estimators.algebra.mixture.mixture_update`).
+
+    Parameters
+    ----------
+    levels, transition : (j,) and (j, j) arrays
+        Variances of the levels, as multiples of the nominal ones, and probabilities of the transitions between them.
+    probability : (i, j) array
+        Probability of each level for each instrument of the run; a step changes it.
+    names : sequence of str
+        The instruments of the filter.
+    prediction : PredictionTest
+        The test of the prediction, which knows all i instruments of the run.
+    variances : (n,) array
+        As of `step_rule`.
+    """
+    count = len(levels)
+    indices = [prediction.index[name] for name in names]
+    rule = (
+        MIXTURE, NOTHING, np.array([indices, [1] * len(names)], np.int64).T.copy(), np.zeros((len(names), 9)),
+        variances, np.tile([*levels, *transition.ravel()], (len(probability), 1)), probability.ravel(),
+        np.arange(0, probability.size + 1, count), np.empty(0),
+    )  # fmt: skip
+    return StepRule(adapt_inertial, names, ((rule, prediction.arrays(len(variances))),))

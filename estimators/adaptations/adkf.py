@@ -12,15 +12,16 @@ from simnav.compiled import kernel
 from simnav.types import Array, Instruments
 
 from .base import Innovation
-from .noise import NoiseAdaptation, Posterior, normalised_square
+from .noise import RULE, NoiseAdaptation, Posterior, copied, normalised_square
 from .robust import igg3
 
-__all__ = ["FACTORS", "AdaptiveFactor", "exponential", "three_segment", "two_segment"]
+__all__ = ["FACTORS", "AdaptiveFactor", "adkf_noise", "exponential", "three_segment", "two_segment"]
 
 Statistic = Literal["discrepancy", "residual", "ratio"]
 Factor = Literal["two-segment", "three-segment", "exponential"]
 
 
+@kernel()
 def two_segment(s: float, c0: float, c1: float = 0.0) -> float:
     """Eq. 34: 1 up to c0, then ``c0/s``; continuous.
 
@@ -32,14 +33,16 @@ def two_segment(s: float, c0: float, c1: float = 0.0) -> float:
     return 1.0 if s <= c0 else c0 / s
 
 
-def three_segment(s: float, c0: float, c1: float) -> float:
+@kernel()
+def three_segment(s: float, c0: float, c1: float, two: float = 2.0) -> float:
     """Eq. 35, the same function as IGG-III: 1 up to c0, decreasing to 0 at c1; continuous."""
-    return igg3(s, c0, c1)
+    return igg3(s, c0, c1, two)
 
 
-def exponential(s: float, c0: float, c1: float = 0.0) -> float:
-    """Eq. 36: 1 up to c0, then ``exp(-(s - c0)^2)``; continuous."""
-    return 1.0 if s <= c0 else exp(-min((s - c0) ** 2, 700.0))
+@kernel()
+def exponential(s: float, c0: float, c1: float = 0.0, two: float = 2.0) -> float:
+    """Eq. 36: 1 up to c0, then ``exp(-(s - c0)^2)``; continuous. The exponent is an argument as in `igg3`."""
+    return 1.0 if s <= c0 else exp(-min((s - c0) ** two, 700.0))
 
 
 #: The factor functions of the paper, by name. Arguments: the statistic, c0 and c1. Result: the factor in [0, 1].
@@ -58,6 +61,45 @@ def _printed_residual(residual: Array, predicted: Array, noise: Array) -> float:
         square += residual[i] * residual[i]
         trace += predicted[i, i] + noise[i, i]
     return square / sqrt(trace)
+
+
+#: Places in the settings: whether the statistic is the printed one; the factor function, by its place in `FACTORS`; its
+#: thresholds and its exponent; and the smallest factor.
+PRINTED, FUNCTION, C0, C1, TWO, SMALLEST = range(6)
+
+
+@kernel(RULE)
+def adkf_noise(
+    settings: Array, memory: Array, shared: Array, innovation: Array, predicted: Array, nominal: Array, noise: Array
+) -> float:
+    """Divide the nominal noise by the factor of the residual statistic (`AdaptiveFactor`).
+
+    Returns
+    -------
+    float
+        The factor; 0 if S is singular, and then the noise is the nominal one.
+    """
+    copied(nominal, noise)
+    if settings[PRINTED] > 0.0:
+        statistic = _printed_residual(innovation, predicted, nominal)
+    else:
+        nis = normalised_square(innovation, predicted, nominal)
+        if nis < 0.0:
+            return 0.0
+        statistic = sqrt(nis / innovation.size)
+    c0, c1, two, smallest = settings[C0], settings[C1], settings[TWO], float(settings[SMALLEST])
+    if settings[FUNCTION] == 0.0:
+        factor = two_segment(statistic, c0, c1)
+    elif settings[FUNCTION] == 1.0:
+        factor = three_segment(statistic, c0, c1, two)
+    else:
+        factor = exponential(statistic, c0, c1, two)
+    factor = max(factor, smallest)
+    if factor != 1.0:
+        for i in range(innovation.size):
+            for j in range(innovation.size):
+                noise[i, j] = nominal[i, j] / factor
+    return factor
 
 
 class _Preset(NamedTuple):
@@ -121,6 +163,8 @@ class AdaptiveFactor(NoiseAdaptation):
     """
 
     SMALLEST = 1e-3
+    rule = adkf_noise
+    reported = "factor"
 
     def __init__(
         self,
@@ -145,7 +189,7 @@ class AdaptiveFactor(NoiseAdaptation):
         self.c1 = PRESETS[preset].c1 if c1 is None else c1
         if not (self.c0 > 0.0 and (factor != "three-segment" or self.c1 > self.c0)):
             raise ValueError(f"c0 = {self.c0:g} and c1 = {self.c1:g}: it must be 0 < c0 < c1")
-        self.factor = FACTORS[factor]
+        self.function, self.factor = list(FACTORS).index(factor), FACTORS[factor]
         self.together = 0 if self.printed or target == "P" else together
         self.inflates = target == "P"
         self.inflates_motion = not self.inflates
@@ -155,24 +199,32 @@ class AdaptiveFactor(NoiseAdaptation):
         super().reset(instruments)
         self._variance: dict[str, float] = {}
 
+    @property
+    def ruled(self) -> bool:
+        """As `NoiseAdaptation.ruled`: with the residual statistic and target R."""
+        return super().ruled and self.statistic == "residual" and self.target == "R"
+
+    def settings_of(self, longer: float) -> list[float]:
+        """As `NoiseAdaptation.settings_of`."""
+        return [self.printed, self.function, self.c0, self.c1, 2.0, self.SMALLEST]
+
     def choose(self, innovation: Innovation) -> Array:
         """The noise to use: R divided by the factor if R is the target. Otherwise sets the inflation of P."""
-        name = innovation.measurement.instrument
-        if self.printed and self.statistic == "residual":
-            statistic = _printed_residual(innovation.residual, innovation.predicted, innovation.noise)
+        noise: Array = innovation.noise
+        if self.statistic == "residual":
+            noise = np.empty_like(innovation.noise)
+            factor = self.ask(adkf_noise, innovation, noise)
+        elif normalised_square(innovation.residual, innovation.predicted, innovation.noise) < 0.0:
+            factor = 0.0
         else:
-            nis = normalised_square(innovation.residual, innovation.predicted, innovation.noise)
-            if nis < 0.0:  # singular: the solver leaves it out
-                return innovation.noise
-            residual = self.statistic == "residual"
-            statistic = sqrt(nis / len(innovation.residual)) if residual else self._statistic(innovation)
-        factor = max(self.factor(statistic, self.c0, self.c1), self.SMALLEST)
+            factor = max(self.factor(self._statistic(innovation), self.c0, self.c1), self.SMALLEST)
+            noise = innovation.noise / factor
+        if factor == 0.0:  # singular: the solver leaves it out
+            return innovation.noise
         if self.target == "P":
             self.inflation = self.prediction.limited(1.0 / factor, innovation)
-        self.report(f"factor.{name}", factor)
-        if self.target == "P" or factor == 1.0:
-            return innovation.noise
-        return innovation.noise / factor
+        self.report(f"factor.{innovation.measurement.instrument}", factor)
+        return innovation.noise if self.target == "P" or factor == 1.0 else noise
 
     def _statistic(self, innovation: Innovation) -> float:
         m, posterior = len(innovation.residual), Posterior(innovation, innovation.noise)

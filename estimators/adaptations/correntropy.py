@@ -66,7 +66,7 @@ def correntropy_noise(
 
 @kernel(RULE)
 def correntropy_rule(
-    settings: Array, memory: Array, innovation: Array, predicted: Array, nominal: Array, noise: Array
+    settings: Array, memory: Array, shared: Array, innovation: Array, predicted: Array, nominal: Array, noise: Array
 ) -> float:
     """Call `correntropy_noise`; settings: bandwidth, smallest weight, iterations, whether it begins with the update."""
     return correntropy_noise(

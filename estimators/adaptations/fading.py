@@ -2,14 +2,29 @@
 
 from __future__ import annotations
 
-from math import exp
+from math import exp, isnan
 
-from simnav.types import Array, Instruments
+import numpy as np
+
+from simnav.compiled import kernel
+from simnav.types import Array
 
 from .base import Innovation
-from .noise import NoiseAdaptation
+from .noise import INFLATION, OWN, RULE, TIME, NoiseAdaptation, copied
 
-__all__ = ["FadingMemory"]
+__all__ = ["FadingMemory", "fading_noise"]
+
+
+@kernel(RULE)
+def fading_noise(
+    settings: Array, memory: Array, shared: Array, innovation: Array, predicted: Array, nominal: Array, noise: Array
+) -> float:
+    """Inflate P by the time since the last measurement (`FadingMemory`); the noise is the nominal one; 0."""
+    copied(nominal, noise)
+    if not isnan(shared[OWN]):
+        shared[INFLATION] = exp((shared[TIME] - shared[OWN]) / settings[0])
+    shared[OWN] = shared[TIME]
+    return 0.0
 
 
 class FadingMemory(NoiseAdaptation):
@@ -25,6 +40,7 @@ class FadingMemory(NoiseAdaptation):
         Time in which the weight of information decreases by a factor of e [s].
     """
 
+    rule = fading_noise
     together = 0
     inflates = True
 
@@ -33,14 +49,11 @@ class FadingMemory(NoiseAdaptation):
             raise ValueError(f"memory = {memory:g} s: it must be above 0")
         self.memory = memory
 
-    def reset(self, instruments: Instruments) -> None:
-        """Begin a run."""
-        super().reset(instruments)
-        self._time: float | None = None
+    def settings_of(self, longer: float) -> list[float]:
+        """As `NoiseAdaptation.settings_of`."""
+        return [self.memory]
 
     def choose(self, innovation: Innovation) -> Array:
         """The nominal noise."""
-        time = innovation.measurement.time
-        self.inflation = exp((time - self._time) / self.memory) if self._time is not None else 1.0
-        self._time = time
+        self.ask(fading_noise, innovation, np.empty_like(innovation.noise))
         return innovation.noise

@@ -2,14 +2,41 @@
 
 from __future__ import annotations
 
+from math import isnan, nan
+
+import numpy as np
+
+from simnav.compiled import kernel
 from simnav.estimators.algebra.chi_square import chi_square_limits
 from simnav.estimators.models.channels import ChannelDatasheet
 from simnav.types import Array, Instruments
 
 from .base import Innovation
-from .noise import NoiseAdaptation, normalised_square
+from .noise import REJECT, RULE, TIME, NoiseAdaptation, copied, normalised_square
 
-__all__ = ["ChiSquareGate"]
+__all__ = ["ChiSquareGate", "gate_noise"]
+
+#: Places in the settings: patience [s], and the limits of chi-square for 0 to 3 components; in the memory: time of the
+#: last measurement of the instrument, and the time since which all have failed, NaN if the last one has passed.
+PATIENCE, LIMITS = range(2)
+HEARD, FAILING = range(2)
+
+
+@kernel(RULE)
+def gate_noise(
+    settings: Array, memory: Array, shared: Array, innovation: Array, predicted: Array, nominal: Array, noise: Array
+) -> float:
+    """Make the test of `ChiSquareGate`, without the witnesses among channels; the noise is the nominal one; 0."""
+    copied(nominal, noise)
+    time = memory[HEARD] = shared[TIME]
+    if normalised_square(innovation, predicted, nominal) <= settings[LIMITS + innovation.size]:
+        memory[FAILING] = nan
+    else:
+        if isnan(memory[FAILING]):
+            memory[FAILING] = time
+        if not time - memory[FAILING] >= settings[PATIENCE]:
+            shared[REJECT] = 1.0
+    return 0.0
 
 
 class ChiSquareGate(NoiseAdaptation):
@@ -29,6 +56,8 @@ class ChiSquareGate(NoiseAdaptation):
         Time without a passed test after which the measurements of an instrument are used again [s].
     """
 
+    rule = gate_noise
+
     def __init__(self, probability: float = 0.999, patience: float = 10.0):
         if not 0.0 < probability < 1.0:
             raise ValueError(f"probability = {probability:g}: it must lie between 0 and 1")
@@ -39,26 +68,34 @@ class ChiSquareGate(NoiseAdaptation):
     def reset(self, instruments: Instruments) -> None:
         """Begin a run."""
         super().reset(instruments)
-        self._limits = chi_square_limits(self.probability)
-        self._failing: dict[str, float] = {}
-        self._heard: dict[str, float] = {}
-        self._owner = {s.name: s.instrument for s in instruments.values() if isinstance(s, ChannelDatasheet)}
+        owner = {s.name: s.instrument for s in instruments.values() if isinstance(s, ChannelDatasheet)}
+        self._siblings = {name: [n for n in owner if owner[n] == of] for name, of in owner.items()}
+
+    def settings_of(self, longer: float) -> list[float]:
+        """As `NoiseAdaptation.settings_of`."""
+        return [self.patience, *chi_square_limits(self.probability)]
+
+    def begun(self, longer: float, m: int) -> Array:
+        """As `NoiseAdaptation.begun`."""
+        return np.array([-np.inf, np.nan])
 
     def choose(self, innovation: Innovation) -> Array | None:
         """The nominal noise, or None."""
-        nis = normalised_square(innovation.residual, innovation.predicted, innovation.noise)
+        self.ask(gate_noise, innovation, np.empty_like(innovation.noise))
         name, time = innovation.measurement.instrument, innovation.measurement.time
-        self._heard[name] = time
-        if nis <= self._limits[len(innovation.residual)]:
-            self._failing.pop(name, None)
-            return innovation.noise
-        since = self._failing.setdefault(name, time)
-        return innovation.noise if time - since >= self.patience and self._doubtful(name, time) else None
+        rejected = self.rule_shared[REJECT] > 0.0
+        if not rejected and self._fails(name):
+            rejected = not self._doubtful(name, time)
+        return None if rejected else innovation.noise
+
+    def _fails(self, name: str) -> bool:
+        since: float = self.memory_of(name)[1][FAILING]
+        return since == since
 
     def _doubtful(self, name: str, time: float) -> bool:
         """Whether the filter is doubted, and not a channel: most channels of the instrument fail."""
-        owner = self._owner.get(name)
-        if owner is None:
+        siblings = self._siblings.get(name)
+        if siblings is None:
             return True
-        heard = [n for n, last in self._heard.items() if self._owner.get(n) == owner and time - last <= self.patience]
-        return 2 * sum(n in self._failing for n in heard) > len(heard)
+        heard = [n for n in siblings if time - self.memory_of(n)[1][HEARD] <= self.patience]
+        return 2 * sum(map(self._fails, heard)) > len(heard)

@@ -164,7 +164,7 @@ def _contradicted(settings: Array, place: int, estimate: Array, nominal: Array, 
 
 @kernel(RULE)
 def innovation_noise(
-    settings: Array, memory: Array, innovation: Array, predicted: Array, nominal: Array, noise: Array
+    settings: Array, memory: Array, shared: Array, innovation: Array, predicted: Array, nominal: Array, noise: Array
 ) -> float:
     """Estimate the noise (`InnovationBased`), and write it into ``noise`` within its bounds, or the nominal one.
 
@@ -286,7 +286,7 @@ class InnovationBased(EstimatedNoise):
         """The bounded estimate."""
         m, residual, predicted, nominal, *_ = innovation
         own, noise = self.memory_of(m.instrument), np.empty_like(nominal)
-        found = innovation_noise(*own, residual, predicted, nominal, noise)
+        found = self.ask(innovation_noise, innovation, noise)
         self.report(f"window.{m.instrument}", int(abs(found)))
         if self.full:
             if found < 0.0:

@@ -11,21 +11,24 @@ import numpy as np
 
 from simnav.compiled import Kernel, kernel
 from simnav.estimators.algebra.joseph import joseph_update
-from simnav.estimators.models.base import SIGMA
+from simnav.estimators.models.base import REPORT, SIGMA
 from simnav.types import KINDS, Array, Instruments
 
 from .base import Adaptation, Innovation
 from .prediction import PredictionTest
 
 __all__ = [
-    "RULE", "EstimatedNoise", "NoiseAdaptation", "Posterior", "Scope", "WeightedNoise", "bound", "copied",
-    "normalised_square", "posterior", "scale", "scaled",
+    "INFLATION", "OWN", "REJECT", "RULE", "TIME", "EstimatedNoise", "NoiseAdaptation", "Posterior", "Scope",
+    "WeightedNoise", "bound", "copied", "normalised_square", "posterior", "scale", "scaled",
 ]  # fmt: skip
 
-#: Signature of a kernel that estimates a noise, from settings and memory of an instrument (which it updates),
-#: innovation (m,), H P H' (m, m) and the nominal R (m, m). It overwrites the last array (m, m), and returns a number to
-#: be reported, or 0.
-RULE = "f8(f8[::1], f8[::1], f8[::1], f8[:, ::1], f8[:, ::1], f8[:, ::1])"
+#: Signature of a kernel that chooses a noise, from settings and memory of an instrument (which it updates), what is
+#: shared by all instruments, innovation (m,), H P H' (m, m) and the nominal R (m, m). It overwrites the last array
+#: (m, m), and returns a number to be reported, or 0.
+RULE = "f8(f8[::1], f8[::1], f8[::1], f8[::1], f8[:, ::1], f8[:, ::1], f8[:, ::1])"
+#: Places in what is shared: time of the measurement [s]; what a rule may overwrite, the factor on P (before it is 1)
+#: and whether the measurement is rejected (0); and a number of its own, at first NaN.
+TIME, INFLATION, REJECT, OWN = range(4)
 
 Scope = Literal["fixes", "all"]
 
@@ -174,6 +177,8 @@ class NoiseAdaptation(Adaptation):
     #: The kernel that chooses, or that estimates (`RULE`); None if there is none, as for a subclass that chooses in its
     #: own way.
     rule: ClassVar[Kernel[..., float] | None] = None
+    #: What the number that the rule returns is reported as.
+    reported: ClassVar[str] = ""
 
     def __init_subclass__(cls) -> None:
         super().__init_subclass__()
@@ -196,6 +201,12 @@ class NoiseAdaptation(Adaptation):
         begun = [self.begun(longer, len(self._labels[name])) for name, longer in self.longer.items()]
         self.rule_first = np.cumsum([0, *map(len, begun)])
         self.rule_memory = np.concatenate([*begun, np.empty(0)])
+        self.rule_shared = np.full(OWN + 1, np.nan)
+
+    @property
+    def ruled(self) -> bool:
+        """Whether a rule does all that `choose` does, with the parameters of this adaptation."""
+        return self.rule is not None
 
     def settings_of(self, longer: float) -> list[float]:
         """What the rule needs to know of an instrument with so many measurements in a second, at least 1."""
@@ -210,13 +221,22 @@ class NoiseAdaptation(Adaptation):
         i = self.index[name]
         return self.rule_settings[i], self.rule_memory[self.rule_first[i] : self.rule_first[i + 1]]
 
+    def ask(self, rule: Kernel[..., float], innovation: Innovation, noise: Array) -> float:
+        """What a rule returns for a measurement; it overwrites the noise, and its inflation is set."""
+        m, residual, predicted, nominal, *_ = innovation
+        shared = self.rule_shared
+        shared[TIME], shared[INFLATION], shared[REJECT] = m.time, 1.0, 0.0
+        found = rule(*self.memory_of(m.instrument), shared, residual, predicted, nominal, noise)
+        self.inflation = float(shared[INFLATION])
+        return found
+
     def in_scope(self, kind: str) -> bool:
         """Whether the noise of a kind of instrument is chosen; otherwise it is the nominal one."""
         return True
 
     def noted(self, name: str, row: Sequence[float]) -> None:
         """Report what a kernel chose for an instrument; the row is that of `simnav.estimators.models.base.StepRule`."""
-        chosen = row[SIGMA:]
+        chosen = row[SIGMA : REPORT + 1]
         if chosen[0] == chosen[0] and chosen != self._noted.get(name):
             self._noted[name] = chosen
             self._note(name, chosen)
@@ -224,6 +244,8 @@ class NoiseAdaptation(Adaptation):
     def _note(self, name: str, chosen: Sequence[float]) -> None:
         """Report the sigmas and the further number that a kernel chose; they differ from those before."""
         self._report.update(zip(self._labels[name], chosen))
+        if self.reported and chosen[-1]:
+            self.report(f"{self.reported}.{name}", chosen[-1])
 
     @abstractmethod
     def choose(self, innovation: Innovation) -> Array | None:
@@ -260,17 +282,13 @@ class NoiseAdaptation(Adaptation):
 class WeightedNoise(NoiseAdaptation):
     """Base of robust rules: the nominal noise divided by weights, of which the smallest is reported."""
 
+    reported = "weight"
+
     def weighted(self, rule: Kernel[..., float], innovation: Innovation) -> Array:
         """The noise that a kernel (`RULE`) chooses for a measurement, and report its weight."""
-        m, residual, predicted, nominal, *_ = innovation
-        noise: Array = np.empty((len(nominal), len(nominal)))
-        self.report(f"weight.{m.instrument}", rule(*self.memory_of(m.instrument), residual, predicted, nominal, noise))
+        noise: Array = np.empty_like(innovation.noise)
+        self.report(f"weight.{innovation.measurement.instrument}", self.ask(rule, innovation, noise))
         return noise
-
-    def _note(self, name: str, chosen: Sequence[float]) -> None:
-        super()._note(name, chosen)
-        if chosen[-1]:
-            self.report(f"weight.{name}", chosen[-1])
 
 
 class EstimatedNoise(NoiseAdaptation):
@@ -307,9 +325,23 @@ class EstimatedNoise(NoiseAdaptation):
             raise ValueError(f"scope = {scope!r}: it must be 'fixes' or 'all'")
         self.lowest, self.highest, self.full, self.scope = lowest, highest, full, scope
 
+    @property
+    def ruled(self) -> bool:
+        """As `NoiseAdaptation.ruled`; a full matrix is bounded by NumPy."""
+        return super().ruled and not self.full
+
     @abstractmethod
     def estimate(self, innovation: Innovation) -> Array:
         """The (m, m) estimate of the noise within the bounds, including this innovation."""
+
+    def ask(self, rule: Kernel[..., float], innovation: Innovation, noise: Array) -> float:
+        """What a rule returns for a measurement; it overwrites the noise, and its inflation is set."""
+        m, residual, predicted, nominal, *_ = innovation
+        shared = self.rule_shared
+        shared[TIME], shared[INFLATION], shared[REJECT] = m.time, 1.0, 0.0
+        found = rule(*self.memory_of(m.instrument), shared, residual, predicted, nominal, noise)
+        self.inflation = float(shared[INFLATION])
+        return found
 
     def in_scope(self, kind: str) -> bool:
         """Whether the noise of a kind of instrument is estimated, by the scope."""

@@ -14,7 +14,10 @@ from simnav.types import Array, Flags, Instruments, Integers
 
 from .base import Innovation
 
-__all__ = ["IS_WRONG", "PredictionTest", "judge_prediction", "standardised"]
+__all__ = [
+    "BLAMED", "HAS_PASSED", "IS_DISTURBED", "IS_WRONG", "PredictionTest", "joint_inflation", "judge_prediction",
+    "standardised",
+]  # fmt: skip
 
 
 @kernel("UniTuple(f8, 3)(f8[::1], f8[:, ::1], f8[:, ::1])")
@@ -31,9 +34,14 @@ def standardised(residual: Array, predicted: Array, noise: Array) -> tuple[float
 #: found the prediction wrong, -inf if it no longer does; number of failures in a row of its joint test, and time of the
 #: last test; and whether a log was against it since its innovations persist.
 WRONG, FAILURES, TESTED, CONDEMNED = range(COURSE, COURSE + 4)
-#: Places of the settings: number of joint failures; whether there is an IMU; the normal quantiles of the class; and,
-#: from LIMITS on, the limits of chi-square for 0 to 3 components.
-TOGETHER, INERTIAL, LARGE, PERSISTENT, WHITE, ALONE, RECENT, LIMITS = range(8)
+#: Places of the settings: number of joint failures; whether there is an IMU; the normal quantiles of the class; number
+#: of failures between two inflations; and, from LIMITS on, the limits of chi-square for 0 to 3 components.
+TOGETHER, INERTIAL, LARGE, PERSISTENT, WHITE, ALONE, RECENT, ROUND, LIMITS = range(9)
+#: Places of what is kept of inflations: number of failures of the prediction since a joint test was passed; and, from
+#: FIRST on, the variances of the state before the first inflation, or zeros.
+BLAMED, FIRST = range(2)
+#: The largest factor of an inflation, and the largest one of all of them together.
+LARGEST, TOTAL = 100.0, 1e8
 #: What `judge_prediction` says of an innovation: bits of an integer.
 IS_WRONG, IS_DISTURBED, HAS_PASSED = 1, 2, 4
 
@@ -129,6 +137,33 @@ def judge_prediction(
     return found + IS_WRONG if wrong else found
 
 
+@kernel("f8(f8, f8[:, ::1], f8[::1])")
+def limited_inflation(inflation: float, covariance: Array, kept: Array) -> float:
+    """Limit an inflation of P (`PredictionTest.limited`)."""
+    if inflation <= 1.0:
+        return 1.0
+    grown = 0.0
+    begins = kept[FIRST] == 0.0
+    for i in range(covariance.shape[0]):
+        variance = covariance[i, i]
+        if begins:
+            kept[FIRST + i] = max(variance, 1e-30)
+        grown = max(grown, variance / kept[FIRST + i])
+    return max(1.0, min(inflation, LARGEST, TOTAL / grown))
+
+
+@kernel("f8(f8[::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[::1], f8[::1])")
+def joint_inflation(
+    residual: Array, predicted: Array, noise: Array, covariance: Array, settings: Array, kept: Array
+) -> float:
+    """Count a failure of the prediction, and return the factor on the variances (`PredictionTest.inflation`)."""
+    kept[BLAMED] += 1.0
+    if int(kept[BLAMED] - 1.0) % int(settings[ROUND]) != 0:
+        return 1.0
+    u0, u1, u2 = standardised(residual, predicted, noise)
+    return limited_inflation(0.5 * sqrt((u0 * u0 + u1 * u1 + u2 * u2) / residual.size), covariance, kept)
+
+
 class PredictionTest:
     """Tests of the innovations of fixes and logs: whether a large innovation comes from a wrong prediction.
 
@@ -180,13 +215,14 @@ class PredictionTest:
     ----------
     disturbed : bool
         Whether the last innovation failed jointly with those of another instrument.
+    index : dict of str to int
+        Place of each instrument among those of the run.
     """
 
     RECENT = 5.0  # s; what another instrument did before, or before its last three periods, does not count
     PERSISTENT = 0.99  # probability that the innovations of a white noise are not found correlated
     WHITE = 0.95  # the same for a witness, which must be beyond doubt
     ALONE = 0.9  # probability that failures of a lone log by white noise are not found to have a common direction
-    LARGEST, TOTAL = 100.0, 1e8
 
     def __init__(self, instruments: Instruments, together: int = 3, probability: float = 0.999):
         self.together, self.disturbed = together, False
@@ -196,8 +232,9 @@ class PredictionTest:
             group = {}
         against = witnesses(instruments) if together and inertial else {}
         quantiles = [normal_quantile(p) for p in (probability, self.PERSISTENT, self.WHITE, self.ALONE)]
-        self._settings = np.array([together, inertial, *quantiles, self.RECENT, *chi_square_limits(probability)])
-        self._index = {name: i for i, name in enumerate(instruments)}
+        limits = chi_square_limits(probability)
+        self._settings = np.array([together, inertial, *quantiles, self.RECENT, together * len(group), *limits])
+        self.index = {name: i for i, name in enumerate(instruments)}
         self._known = (
             np.array([(group.get(n, -1), n in against) for n in instruments], np.int64).reshape(-1, 2),
             np.array([max(self.RECENT, 3.0 / sheet.rate) for sheet in instruments.values()]),
@@ -205,15 +242,17 @@ class PredictionTest:
         )
         self._memory = begun(len(instruments), more=4)
         self._memory[:, WRONG] = -np.inf
-        self._count = len(group)
         self._tests = bool(group or against)
-        self._first: Array | None = None
-        self._blamed = 0
+        self._kept = np.zeros(FIRST)
 
-    @property
-    def arrays(self) -> tuple[bool, Array, tuple[Integers, Array, Flags], Array]:
-        """Whether a test is made, and the last three arguments of `judge_prediction`."""
-        return self._tests, self._settings, self._known, self._memory
+    def arrays(self, n: int) -> tuple[bool, Array, tuple[Integers, Array, Flags], Array, Array]:
+        """Whether a test is made, the last three arguments of `judge_prediction`, and what is kept for n states."""
+        return self._tests, self._settings, self._known, self._memory, self._kept_of(n)
+
+    def _kept_of(self, n: int) -> Array:
+        if len(self._kept) == FIRST:
+            self._kept = np.concatenate([self._kept, np.zeros(n)])
+        return self._kept
 
     def fails(self, innovation: Innovation) -> bool:
         """Whether the prediction of this innovation is taken as wrong, by one of the tests."""
@@ -221,10 +260,10 @@ class PredictionTest:
         if not self._tests:
             return False
         m, residual, predicted, noise, *_ = innovation
-        i = self._index.get(m.instrument, -1)
+        i = self.index.get(m.instrument, -1)
         found = judge_prediction(residual, predicted, noise, i, m.time, self._settings, self._known, self._memory)
         if found & HAS_PASSED:
-            self._blamed = 0
+            self._kept[BLAMED] = 0.0
         self.disturbed = found & IS_DISTURBED > 0
         return found & IS_WRONG > 0
 
@@ -234,21 +273,17 @@ class PredictionTest:
         The root of the mean squared standardised component, over 2 (eqs. 28 and 34 of Zhan et al. 2026), within
         `limited`.
         """
-        self._blamed += 1
-        if (self._blamed - 1) % (self.together * self._count):
+        _, residual, predicted, noise, covariance, _ = innovation
+        if covariance is None:
             return 1.0
-        components = standardised(innovation.residual, innovation.predicted, innovation.noise)
-        return self.limited(0.5 * sqrt(sum(u * u for u in components) / len(innovation.residual)), innovation)
+        kept = self._kept_of(len(covariance))
+        return joint_inflation(residual, predicted, noise, covariance, self._settings, kept)
 
     def limited(self, inflation: float, innovation: Innovation) -> float:
         """Limit an inflation. Without the limit, the variances of unobserved states would grow without bound.
 
         A single inflation is at most `LARGEST`, and no variance exceeds `TOTAL` times its value before the first one.
         """
-        if inflation <= 1.0 or innovation.covariance is None:
+        if innovation.covariance is None:
             return 1.0
-        variances = innovation.covariance.diagonal()
-        if self._first is None:
-            self._first = np.maximum(variances, 1e-30)
-        grown = float(np.max(variances / self._first))
-        return max(1.0, min(inflation, self.LARGEST, self.TOTAL / grown))
+        return limited_inflation(inflation, innovation.covariance, self._kept_of(len(innovation.covariance)))

@@ -66,7 +66,7 @@ def _weigh(w0: float, w1: float, w2: float, smallest: float, nominal: Array, noi
 
 @kernel(RULE)
 def huber_noise(
-    settings: Array, memory: Array, innovation: Array, predicted: Array, nominal: Array, noise: Array
+    settings: Array, memory: Array, shared: Array, innovation: Array, predicted: Array, nominal: Array, noise: Array
 ) -> float:
     """Divide the nominal noise by Huber's weights; the least. The settings are k and the smallest weight."""
     u0, u1, u2 = standardised(innovation, predicted, nominal)
@@ -76,7 +76,7 @@ def huber_noise(
 
 @kernel(RULE)
 def igg3_noise(
-    settings: Array, memory: Array, innovation: Array, predicted: Array, nominal: Array, noise: Array
+    settings: Array, memory: Array, shared: Array, innovation: Array, predicted: Array, nominal: Array, noise: Array
 ) -> float:
     """Divide the nominal noise by IGG-III weights; the least. The settings are k0, k1, 2 and the smallest weight."""
     u0, u1, u2 = standardised(innovation, predicted, nominal)

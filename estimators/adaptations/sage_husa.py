@@ -21,7 +21,7 @@ COUNT, BEGUN, ESTIMATE = range(3)
 
 @kernel(RULE)
 def sage_husa_noise(
-    settings: Array, memory: Array, innovation: Array, predicted: Array, nominal: Array, noise: Array
+    settings: Array, memory: Array, shared: Array, innovation: Array, predicted: Array, nominal: Array, noise: Array
 ) -> float:
     """Update the estimate by the recursion of `SageHusa`, and write it into ``noise`` within its bounds; 0."""
     m = innovation.size
@@ -93,12 +93,10 @@ class SageHusa(EstimatedNoise):
 
     def estimate(self, innovation: Innovation) -> Array:
         """The bounded estimate, this innovation included."""
-        _, residual, predicted, nominal, *_ = innovation
-        settings, memory = self.memory_of(innovation.measurement.instrument)
+        nominal = innovation.noise
         noise = np.empty_like(nominal)
-        sage_husa_noise(settings, memory, residual, predicted, nominal, noise)
-        return (
-            self.bounded(memory[ESTIMATE : ESTIMATE + nominal.size].reshape(nominal.shape), nominal)
-            if self.full
-            else noise
-        )
+        self.ask(sage_husa_noise, innovation, noise)
+        if not self.full:
+            return noise
+        _, memory = self.memory_of(innovation.measurement.instrument)
+        return self.bounded(memory[ESTIMATE : ESTIMATE + nominal.size].reshape(nominal.shape), nominal)

@@ -63,7 +63,7 @@ def student_weight(innovation: Array, predicted: Array, noise: Array, dof: float
 
 @kernel(RULE)
 def student_t_noise(
-    settings: Array, memory: Array, innovation: Array, predicted: Array, nominal: Array, noise: Array
+    settings: Array, memory: Array, shared: Array, innovation: Array, predicted: Array, nominal: Array, noise: Array
 ) -> float:
     """Divide the nominal noise by `student_weight`, which is returned; settings: degrees of freedom, iterations."""
     weight = student_weight(innovation, predicted, nominal, settings[0], int(settings[1]))

@@ -64,7 +64,7 @@ SHAPE, SCALES = range(2)
 
 @kernel(RULE)
 def variational_bayes_noise(
-    settings: Array, memory: Array, innovation: Array, predicted: Array, nominal: Array, noise: Array
+    settings: Array, memory: Array, shared: Array, innovation: Array, predicted: Array, nominal: Array, noise: Array
 ) -> float:
     """Make one step of `VariationalBayes`, and write the noise of its last iteration into ``noise``; 0."""
     memory[SHAPE] = settings[FORGETTING] * memory[SHAPE] + 0.5
@@ -135,7 +135,6 @@ class VariationalBayes(EstimatedNoise):
 
     def estimate(self, innovation: Innovation) -> Array:
         """The noise of the last iteration, bounded."""
-        _, residual, predicted, nominal, *_ = innovation
-        noise: Array = np.empty_like(nominal)
-        variational_bayes_noise(*self.memory_of(innovation.measurement.instrument), residual, predicted, nominal, noise)
+        noise: Array = np.empty_like(innovation.noise)
+        self.ask(variational_bayes_noise, innovation, noise)
         return noise

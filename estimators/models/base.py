@@ -5,12 +5,13 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
-from typing import Any, ClassVar, NamedTuple, Protocol
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
 from simnav.compiled import Kernel
 from simnav.estimator.needs import Needs
+from simnav.estimators.algebra.inflation import inflate_motion
 from simnav.estimators.algebra.joseph import joseph_update, project
 from simnav.geometry.rotation import left_jacobian
 from simnav.types import (
@@ -27,7 +28,7 @@ from simnav.types import (
 from .many_readings import ManyReadings
 from .own_observation import OwnObservation
 
-__all__ = ["ErrorModel", "Linearised", "Observation", "StepRule", "StepRules"]
+__all__ = ["ErrorModel", "Linearised", "Observation", "StepRule"]
 
 #: A measurement of m components with the covariance P of n states: innovation (m,), P H' (n, m), H P H' (m, m) and
 #: noise (m, m).
@@ -35,32 +36,32 @@ Observation = tuple[Array, Array, Array, Array]
 
 
 #: Places in a row of results of a step, see `StepRule`.
-NIS, INNOVATION, SIGMA, REPORT, RESULTS = 0, 1, 4, 7, 8
+NIS, INNOVATION, SIGMA, REPORT, SIZE, RESULTS = 0, 1, 4, 7, 8, 9
+#: Instead of the normalised innovation squared: the measurement was set aside.
+REJECTED = -2.0
 
 
 class StepRule(NamedTuple):
     """How a kernel uses all measurements of a step and chooses the noise of each.
 
     For each measurement it overwrites a row of results: from `NIS` on the normalised innovation squared, -1 if nothing
-    was changed; from `INNOVATION` on the innovation (3,); from `SIGMA` on the square roots of the variances that were
-    used (3,), NaN if none was chosen; and at `REPORT` a further number to be reported, or 0.
+    was changed, or `REJECTED`; from `INNOVATION` on the innovation (3,); from `SIGMA` on the square roots of the
+    variances that were used (3,), NaN if none was chosen; at `REPORT` a further number to be reported, or 0; and at
+    `SIZE` the norm of the innovation, NaN if it is to be computed from the components.
 
     Attributes
     ----------
     kernel : Kernel
         It takes the arguments of `simnav.estimators.models.inertial_step.filter_inertial` and ``arrays``.
+    names : sequence of str
+        The instruments, in the order in which the arrays have them.
     arrays : tuple of arrays
         What the rule knows.
     """
 
     kernel: Kernel[..., int]
+    names: Sequence[str]
     arrays: tuple[Any, ...]
-
-
-class StepRules(Protocol):
-    """What has such a rule for instruments in the order of their names, or None."""
-
-    def step_rule(self, names: Sequence[str]) -> StepRule | None: ...
 
 
 class Linearised(NamedTuple):
@@ -267,7 +268,7 @@ class ErrorModel(ABC):
 
     def assimilate_step(
         self, measurements: Sequence[Measurement], until: float, covariance: Array, correction: Array,
-        rules: StepRules | None = None,
+        rule: StepRule | None = None,
     ) -> list[list[float]] | None:  # fmt: skip
         """Use the measurements of a step, each at its time, and propagate to the step's end.
 
@@ -279,14 +280,14 @@ class ErrorModel(ABC):
             End of the step [s].
         covariance, correction
             As of `assimilate`; the correction is that by the last measurement.
-        rules : StepRules, optional
-            Chooses the noise of each measurement; None: the nominal noise.
+        rule : StepRule, optional
+            Chooses the noise of each measurement, the same in all steps of a run; None: the nominal noise.
 
         Returns
         -------
         list of list of float, or None
-            For each measurement, what `assimilate` returns; with rules, a row of results (`StepRule`). None if the
-            model has no faster implementation than `propagate` and `assimilate`; with rules this is so for a whole run.
+            For each measurement, a row of results (`StepRule`). None if the model has no faster implementation than
+            `propagate` and `assimilate`; with a rule this is so for a whole run.
         """
         return None
 
@@ -328,11 +329,8 @@ class ErrorModel(ABC):
             corrections stay in the linear range.
         """
         motion, attitude = self.moving
-        factors = np.ones(self.size)
-        factors[motion] = inflation
-        factors[attitude] = np.clip(first[attitude] / covariance.diagonal()[attitude], 1.0, inflation)
-        sigmas = np.sqrt(factors)
-        covariance *= sigmas[:, None] * sigmas
+        places = (*motion.indices(self.size)[:2], *attitude.indices(self.size)[:2])
+        inflate_motion(covariance, inflation, first, places)
 
     def by_correction(self, jacobian: Array, correction: Array) -> Array:
         """A (m, n) Jacobian at the corrected state, taken with respect to the correction that led there.

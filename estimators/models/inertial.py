@@ -57,11 +57,11 @@ from simnav.types import (
     Measurement,
 )
 
-from .base import ErrorModel, Linearised, Observation, StepRules
+from .base import ErrorModel, Linearised, Observation, StepRule
 from .declared_errors import CURRENT, bias_of, bias_of_triad
 from .delayed import is_delayed
 from .equations import EQUATIONS, equation_of
-from .inertial_step import PLAIN, AidTable, Packet
+from .inertial_step import AidTable, Packet, filter_inertial
 from .inertial_update import absorb_inertial, assimilate_inertial, innovate_inertial
 from .levered import is_own, with_lever_arms
 from .many_readings import of_instruments
@@ -475,21 +475,20 @@ class InertialModel(ErrorModel):
 
     def assimilate_step(
         self, measurements: Sequence[Measurement], until: float, covariance: Array, correction: Array,
-        rules: StepRules | None = None,
+        rule: StepRule | None = None,
     ) -> list[list[float]] | None:  # fmt: skip
         """As `ErrorModel.assimilate_step`, in one kernel, if no instrument has an equation or a clock of its own."""
         if self._packet is None:
-            names = list(self.noise)
-            rule = PLAIN if rules is None else rules.step_rule(names)
-            if self._fused != set(names) or self.blocks.clocks or rule is None:
+            chosen = rule or StepRule(filter_inertial, list(self.noise), ())
+            if not self._fused == set(self.noise) == set(chosen.names) or self.blocks.clocks:
                 return None
-            self._packet = Packet(names, self._table(names), rule)
-        measured, rule = self._packet.fill(measurements), self._packet.rule
-        self._first = rule.kernel.unchecked(
+            self._packet = Packet(self._table(chosen.names), chosen)
+        measured, chosen = self._packet.fill(measurements), self._packet.rule
+        self._first = chosen.kernel.unchecked(
             (self.position, self.velocity, self.dcm, self._memory, self.bias, self._turn, self._clock), self._samples,
             self._first, until, self._noise, (self.transition, self.process_noise, covariance),
             (self.calibration, self._decay, self._density, correction), (self._packet.aids, measured),
-            *rule.arrays,
+            *chosen.arrays,
         )  # fmt: skip
         self.time = float(self._clock[0])
         used: list[list[float]] = measured[3][: len(measurements)].tolist()

@@ -15,7 +15,7 @@ import numpy as np
 
 from simnav.types import Array, Instruments, Measurement
 
-from .base import ErrorModel, Linearised, Observation, StepRules
+from .base import ErrorModel, Linearised, Observation, StepRule
 from .chain import Chain
 
 __all__ = ["with_stated_sigmas"]
@@ -62,9 +62,9 @@ class _Stated(ErrorModel):
 
     def assimilate_step(
         self, measurements: Sequence[Measurement], until: float, covariance: Array, correction: Array,
-        rules: StepRules | None = None,
+        rule: StepRule | None = None,
     ) -> list[list[float]] | None:  # fmt: skip
-        if rules is not None or any(map(self._states, measurements)):
+        if rule is not None or any(map(self._states, measurements)):
             return None
         return super().assimilate_step(measurements, until, covariance, correction)
 

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from math import ceil, exp, hypot, log, sqrt
+from collections.abc import Mapping, Sequence
+from math import ceil, hypot, log, sqrt
 from typing import ClassVar
 
 import numpy as np
 
-from simnav.compiled import kernel
+from simnav.estimators.adaptations.adaptive_step import mixture_rule
 from simnav.estimators.adaptations.base import Innovation
 from simnav.estimators.adaptations.prediction import PredictionTest
-from simnav.estimators.algebra.cholesky import factorise, invert_factor
+from simnav.estimators.algebra.mixture import mixture_update
+from simnav.estimators.models.base import REPORT, SIGMA, StepRule
 from simnav.estimators.models.channels import summary
 from simnav.estimators.models.coupling import by_source
 from simnav.estimators.models.suitable import ModelChoice
@@ -20,115 +21,7 @@ from simnav.types import KINDS, Array, Estimate, InitialState, Instruments, Meas
 from .kalman import KalmanEstimator
 from .smoother import Smoother
 
-__all__ = ["ImmEstimator", "mixture_update"]
-
-
-@kernel(
-    "UniTuple(f8, 2)(f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[::1], f8[::1], f8[:, ::1], f8[::1], f8[::1])"
-)
-def mixture_update(
-    covariance: Array, cross: Array, predicted: Array, noise: Array, residual: Array, variances: Array,
-    transition: Array, probability: Array, correction: Array,
-) -> tuple[float, float]:  # fmt: skip
-    """Kalman update with every noise level, weighted by likelihood and merged by moments, in place.
-
-    With ``S_j = H P H' + variances_j R``, ``y_j = S_j^-1 v`` and mu_j proportional to the probability of level j times
-    N(v; 0, S_j): the correction is ``P H' sum(mu_j y_j)``, and ``P H' (sum(mu_j S_j^-1) - spread of y_j) H P`` is
-    subtracted from P.
-
-    Parameters
-    ----------
-    covariance : (n, n) array
-        Covariance P of the state's error, updated.
-    cross : (n, m) array
-        P H', with the Jacobian H of the measurement.
-    predicted, noise : (m, m) array
-        H P H' and the nominal noise R.
-    residual : (m,) array
-        Innovation v.
-    variances : (j,) array
-        Variance of each level, as a multiple of R.
-    transition : (j, j) array
-        Probabilities of the transitions between levels from one measurement to the next.
-    probability : (j,) array
-        Probability of each level at the previous measurement; overwritten by that at this one.
-    correction : (n,) array
-        Overwritten with the correction of the state.
-
-    Returns
-    -------
-    nis : float
-        Normalised innovation squared of the first level; -1 if an S_j is singular, and then nothing is changed.
-    expected : float
-        Expected variance, as a multiple of R.
-    """
-    n, m = cross.shape
-    count = variances.size
-    inverses, solved = np.zeros((count, m, m)), np.zeros((count, m))
-    likelihood, distance = np.empty(count), np.empty(count)
-    L, W, pivot = np.zeros((m, m)), np.empty((m, m)), np.empty(m)  # W: L^-1
-    for j in range(count):
-        for r in range(m):
-            for c in range(r + 1):
-                L[r, c] = predicted[r, c] + variances[j] * noise[r, c]
-        if not factorise(L, m, 1e-14, pivot):
-            return -1.0, 0.0
-        determinant = 0.0
-        for r in range(m):
-            determinant += log(pivot[r])
-        invert_factor(L, m, W)
-        for r in range(m):
-            for c in range(m):
-                x = 0.0
-                for k in range(max(r, c), m):
-                    x += W[k, r] * W[k, c]
-                inverses[j, r, c] = x
-        nis = 0.0
-        for r in range(m):
-            x = 0.0
-            for c in range(m):
-                x += inverses[j, r, c] * residual[c]
-            solved[j, r] = x
-            nis += x * residual[r]
-        distance[j] = nis
-        likelihood[j] = -0.5 * (nis + determinant)
-    best = likelihood.max()
-    total = 0.0
-    for j in range(count):
-        prior = 0.0
-        for k in range(count):
-            prior += probability[k] * transition[k, j]
-        likelihood[j] = prior * exp(likelihood[j] - best)
-        total += likelihood[j]
-    if not total > 0.0:
-        return -1.0, 0.0
-    merged, expected = np.zeros(m), 0.0
-    for j in range(count):
-        probability[j] = likelihood[j] / total
-        expected += probability[j] * variances[j]
-        for r in range(m):
-            merged[r] += probability[j] * solved[j, r]
-    information = np.zeros((m, m))
-    for j in range(count):
-        for r in range(m):
-            for c in range(m):
-                apart = (solved[j, r] - merged[r]) * (solved[j, c] - merged[c])
-                information[r, c] += probability[j] * (inverses[j, r, c] - apart)
-    half = np.zeros((n, m))
-    for r in range(n):
-        correction[r] = 0.0
-        for i in range(m):
-            correction[r] += cross[r, i] * merged[i]
-            for k in range(m):
-                half[r, i] += cross[r, k] * information[k, i]
-    for r in range(n):
-        for c in range(r + 1):
-            x = covariance[r, c]
-            for i in range(m):
-                x -= half[r, i] * cross[c, i]
-            covariance[r, c] = x
-            covariance[c, r] = x
-    return distance[0], expected
+__all__ = ["ImmEstimator"]
 
 
 class ImmEstimator(KalmanEstimator):
@@ -166,7 +59,6 @@ class ImmEstimator(KalmanEstimator):
 
     pieces = ("model", "smoother")
     sets_aside: ClassVar[bool] = True
-    takes_steps = False
     refuses: ClassVar[Mapping[str, str]] = {
         **KalmanEstimator.refuses,
         "adaptation": "the noise of each measurement is a mixture over its levels",
@@ -203,16 +95,27 @@ class ImmEstimator(KalmanEstimator):
         """Begin a run."""
         instruments = by_source(instruments, self._choice, self.label)
         super().reset(start, instruments)
-        self._prediction = PredictionTest(instruments)
-        # The chain's stationary distribution
-        values, vectors = np.linalg.eig(self.transition.T)
-        first = np.real(vectors[:, int(np.argmax(np.real(values)))])
-        self._probability = {name: first / first.sum() for name in self._names}
         self._report: dict[str, float | Array] = {}
         self._labels = {n: [f"sigma_{e}.{n}" for e in KINDS[s.kind].errors] for n, s in instruments.items()}
         for name in self._names:
             self._report.update(zip(self._labels[name], map(float, instruments[name].sigma)))
             self._report[f"quiet.{name}"] = float(self._probability[name][0])
+
+    def _step_rule(self, instruments: Instruments) -> StepRule:
+        self._prediction = PredictionTest(instruments)
+        # The chain's stationary distribution
+        values, vectors = np.linalg.eig(self.transition.T)
+        first = np.real(vectors[:, int(np.argmax(np.real(values)))])
+        probability = np.tile(first / first.sum(), (len(instruments), 1))
+        self._probability = dict(zip(instruments, probability, strict=True))
+        return mixture_rule(
+            self._variances, self.transition, probability, self._names, self._prediction, self._first_variances
+        )
+
+    def _noted(self, name: str, row: Sequence[float]) -> None:
+        if row[SIGMA] == row[SIGMA]:
+            self._report.update(zip(self._labels[name], row[SIGMA:]))
+            self._report[f"quiet.{name}"] = row[REPORT]
 
     def update(self, measurements: Measurements) -> Estimate:
         """Take one step's measurements."""

@@ -23,12 +23,12 @@ from typing import ClassVar
 
 import numpy as np
 
-from simnav.estimators.adaptations.adaptive_step import CompiledRules
+from simnav.estimators.adaptations.adaptive_step import step_rule
 from simnav.estimators.adaptations.base import Adaptation, Innovation
 from simnav.estimators.adaptations.intersection import weaken_position
 from simnav.estimators.adaptations.noise import NoiseAdaptation
 from simnav.estimators.composition import Solver
-from simnav.estimators.models.base import INNOVATION, NIS, ErrorModel, Linearised, Observation
+from simnav.estimators.models.base import INNOVATION, NIS, REJECTED, SIZE, ErrorModel, Linearised, Observation, StepRule
 from simnav.estimators.models.channels import owners, summary
 from simnav.estimators.models.coupling import by_source
 from simnav.estimators.models.stated_sigmas import with_stated_sigmas
@@ -113,8 +113,8 @@ class KalmanEstimator(Solver):
         self._keys = {name: (f"innovation.{name}", f"nis.{name}") for name in self._names}
         self._blank = dict.fromkeys((label for pair in self._keys.values() for label in pair), np.nan)
         self._plain = self.assimilates and self.adaptation is None and not self._stepwise
-        self._rules = CompiledRules(self.adaptation) if isinstance(self.adaptation, NoiseAdaptation) else None
-        known = self.adaptation is None or self._rules is not None
+        self._rule = self._step_rule(instruments)
+        known = self.adaptation is None or self._rule is not None
         single = self.iteration is not None or self.smoother is not None
         self._whole = self.assimilates and self.takes_steps and known and not single
         self._linearised: Linearised | None = None
@@ -132,7 +132,7 @@ class KalmanEstimator(Solver):
         diagnostics: dict[str, float | Array] = dict(self._blank)
         flagged: list[tuple[str, float]] = []
         admitted = self._admission.admit(measurements, model.time)
-        if not (self._whole and self._take_step(admitted, measurements.time, diagnostics)):
+        if not (self._whole and self._take_step(admitted, measurements.time, diagnostics, flagged)):
             advance = self._propagate if self.smoother is None else self._advance
             for group in self._together(admitted):
                 advance(min(group[0].time, measurements.time))
@@ -246,23 +246,36 @@ class KalmanEstimator(Solver):
             return ((m,) for m in measurements)
         return together(measurements, self._owners)
 
+    def _step_rule(self, instruments: Instruments) -> StepRule | None:
+        """How the noise of each measurement is chosen in a kernel; None: it is nominal, or chosen in Python."""
+        own = self.adaptation
+        return step_rule(own, self._names, self._first_variances) if isinstance(own, NoiseAdaptation) else None
+
     def _take_step(
-        self, measurements: Sequence[Measurement], until: float, diagnostics: dict[str, float | Array]
-    ) -> bool:
+        self, measurements: Sequence[Measurement], until: float, diagnostics: dict[str, float | Array],
+        flagged: list[tuple[str, float]],
+    ) -> bool:  # fmt: skip
         """Use the measurements of a step, and propagate to its end; False if they have to be taken one by one."""
-        rules = self._rules
-        used = self.model.assimilate_step(measurements, until, self.covariance, self._correction, rules)
+        rule = self._rule
+        used = self.model.assimilate_step(measurements, until, self.covariance, self._correction, rule)
         if used is None:
-            self._whole = self._whole and rules is None  # otherwise it is so for the run
+            self._whole = self._whole and rule is None  # otherwise it is so for the run
             return False
-        if rules is None:
-            for m, row in zip(measurements, used, strict=True):
-                self._note(m, row[0], row[1], diagnostics)
-            return True
         for m, row in zip(measurements, used, strict=True):
-            rules.adaptation.noted(m.instrument, row)
-            self._note(m, row[NIS], hypot(*row[INNOVATION : INNOVATION + len(m.value)]), diagnostics)
+            if row[NIS] == REJECTED:
+                flagged.append((m.instrument, m.time))
+                continue
+            size = row[SIZE]
+            if rule is not None:
+                self._noted(m.instrument, row)
+                size = size if size == size else hypot(*row[INNOVATION : INNOVATION + len(m.value)])
+            self._note(m, row[NIS], size, diagnostics)
         return True
+
+    def _noted(self, name: str, row: Sequence[float]) -> None:
+        """Report what a kernel chose for an instrument."""
+        assert isinstance(self.adaptation, NoiseAdaptation)
+        self.adaptation.noted(name, row)
 
     def _take_together(self, group: Sequence[Measurement], diagnostics: dict[str, float | Array]) -> bool:
         """Use the measurements of a group; False if they have to be taken one by one."""

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from simnav.estimator import make
-from simnav.estimators.adaptations.adaptive_step import CompiledRules
+from simnav.estimators.adaptations.adaptive_step import step_rule
+from simnav.estimators.adaptations.adkf import AdaptiveFactor
 from simnav.estimators.adaptations.base import Adaptation
 from simnav.estimators.adaptations.sage_husa import SageHusa
 from simnav.estimators.algebra.joseph import project
@@ -69,33 +70,46 @@ def counted(model, name: str) -> list[int]:
     return times
 
 
-ADAPTIVE = ("iae", "rae", "sage-husa", "vb-akf", "huber-kf", "igg3", "mckf", "student-t")
+ADAPTIVE = ("iae", "rae", "sage-husa", "vb-akf", "huber-kf", "igg3", "mckf", "student-t", "adkf", "adkf-paper", "imm")
+FACTORS = ("adkf:factor=two-segment", "adkf:factor=exponential")
 
 
-@pytest.mark.parametrize("row", ["ekf", *ADAPTIVE])
+@pytest.mark.parametrize("row", ["ekf", "gated-ekf", "fading-ekf", *ADAPTIVE, *FACTORS])
 def test_a_step_in_one_call_has_the_same_bits(recording_of, row: str):
     """Readings between the samples of the IMU, two at one time, many of them, wrong ones, none, and no IMU."""
     recording = recording_of(2, 40.0)
-    whole, single = make(row), make(row)
+    name, _, option = row.partition(":")
+    parameters = dict([option.split("=")]) if option else {}
+    whole, single = make(name, **parameters), make(name, **parameters)
     single.solver.takes_steps = False
     for estimator in (whole, single):
         estimator.reset(recording.start, recording.instruments)
     times, rng, used = counted(whole.model, "assimilate_step"), np.random.default_rng(3), set()
+    flagged = 0
     for k, packet in enumerate(recording.steps()):
         aids = [m for _ in range(4) for m in packet.aids] if k % 5 == 1 else packet.aids if k % 5 else []
         late = sorted(min(m.time, packet.time - rng.uniform(0.0, 0.9)) for m in aids)
         aids = [m._replace(time=time) for m, time in zip(aids, late, strict=True)]
         if k % 4 == 2:
             aids = [m._replace(value=m.value + 1e-5 * rng.standard_normal(len(m.value))) for m in aids]
+        if 20 <= k < 28:  # all at once: the prediction is taken as wrong
+            aids = [m._replace(value=m.value + (1e-4 if m.kind == "gnss_position" else 2.0)) for m in aids]
         packet = replace(packet, aids=aids, imu=None if k % 7 == 3 else packet.imu)
         a, b = whole.update(packet), single.update(packet)
         np.testing.assert_equal(a.diagnostics, b.diagnostics)
+        assert a.flagged == b.flagged
+        flagged += len(a.flagged)
         for state in (*whole.model.state, *whole.model.memory):
             np.testing.assert_array_equal(getattr(whole.model, state), getattr(single.model, state))
         np.testing.assert_array_equal(whole.covariance, single.covariance)
         used.add(tuple(value for name, value in a.diagnostics.items() if name.startswith("sigma_")))
     assert times[0] == 40
-    assert (len(used) > 5) == (row in ADAPTIVE)
+    assert (len(used) > 5) == (name in ADAPTIVE)
+    assert (flagged > 5) == (row == "gated-ekf")
+    if isinstance(whole.solver.adaptation, AdaptiveFactor) and name == "adkf":
+        kept = [e.solver.adaptation.prediction.arrays(whole.model.size)[-1] for e in (whole, single)]
+        np.testing.assert_array_equal(*kept)
+        assert kept[0][1:].all()  # the motion was inflated
 
 
 def test_an_adaptation_that_chooses_in_its_own_way_is_asked(recording_of, run_over):
@@ -109,9 +123,19 @@ def test_an_adaptation_that_chooses_in_its_own_way_is_asked(recording_of, run_ov
     run_over(KalmanEstimator(InertialModel(), Own()), recording_of(2, 5.0))
     assert asked
     assert Own.rule is None is not SageHusa.rule
-    rules = CompiledRules(SageHusa(full=True))
-    rules.adaptation.reset(recording_of(2, 5.0).instruments)
-    assert rules.step_rule(list(recording_of(2, 5.0).instruments)) is None  # NumPy bounds a full matrix
+    instruments = recording_of(2, 5.0).instruments
+    for full in (False, True):
+        adaptation = SageHusa(full=full)
+        adaptation.reset(instruments)
+        rule = step_rule(adaptation, list(instruments), np.ones(15))
+        assert (rule is None) == full  # NumPy bounds a full matrix
+
+
+@pytest.mark.parametrize("own", [{"statistic": "ratio"}, {"target": "P"}])
+def test_a_factor_that_only_numpy_computes_has_no_rule(recording_of, own: dict[str, str]):
+    adaptation = AdaptiveFactor(**own)
+    adaptation.reset(recording_of(2, 5.0).instruments)
+    assert step_rule(adaptation, list(adaptation.instruments), np.ones(15)) is None
 
 
 @pytest.mark.parametrize("hook", ["_observe", "_absorb"])
