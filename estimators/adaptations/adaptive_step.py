@@ -149,6 +149,8 @@ def adapt_inertial(
         for a in range(d):
             noisy = noisy and nominal[a, a] > 0.0
             result[INNOVATION + a] = innovation[a]
+        if d == 1:
+            result[SIZE] = abs(innovation[0])
         if tests and (noisy or code == MIXTURE):
             said = judge_prediction(innovation, predicted, nominal, i, times[k], limits, known, memory)
         if code == MIXTURE:

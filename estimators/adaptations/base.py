@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import ClassVar, NamedTuple
 
 from simnav.types import Array, Instruments, Measurement
@@ -79,6 +80,12 @@ class Adaptation:
     def adapt(self, innovation: Innovation) -> Array | None:
         """Return the (m, m) noise to use, or None to reject the measurement, which is then flagged as faulty."""
         return innovation.noise
+
+    def noted(self, name: str, row: Sequence[float]) -> None:
+        """Take note of what a kernel chose for an instrument in place of `adapt`.
+
+        The row is that of `simnav.estimators.models.base.StepRule`.
+        """
 
     def diagnostics(self) -> dict[str, float | Array]:
         """Named values of the last step, which are recorded at each epoch."""

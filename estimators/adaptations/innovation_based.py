@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 
 from simnav.compiled import kernel
+from simnav.estimators.models.base import REPORT
 from simnav.types import Array
 
 from .base import Innovation
@@ -52,13 +53,17 @@ def _push(rows: Array, count: int, innovation: Array, residual: Array, sign: flo
             at += 1
 
 
-@kernel("f8(f8[:, ::1], i8, i8, i8)")
-def _sum(rows: Array, count: int, n: int, column: int) -> float:
-    """Sum of a column over the last n of ``count`` rows."""
-    total = 0.0
-    for k in range(count - n, count):
-        total += rows[k % rows.shape[0], column]
-    return total
+@kernel()
+def _sums(rows: Array, count: int, n: int, sums: Array) -> None:
+    """Overwrite with the sums of all columns over the last n of ``count`` rows."""
+    ring, columns = rows.shape
+    for c in range(columns):
+        sums[c] = 0.0
+    r = (count - n) % ring
+    for _ in range(n):
+        for c in range(columns):
+            sums[c] += rows[r, c]
+        r = r + 1 if r + 1 < ring else 0
 
 
 @kernel("i8(f8[:, ::1], i8, f8[:, ::1], f8[:, ::1], Tuple((i8, i8, f8, f8)), b1, f8, f8[:, ::1])")
@@ -92,22 +97,25 @@ def _average(
         Length of the window.
     """
     shortest, longest, low, high = window
-    m, ring = nominal.shape[0], rows.shape[0]
-    length = shortest
+    m, ring, sums = nominal.shape[0], rows.shape[0], np.zeros(rows.shape[1])
+    length, n = shortest, 0
     if longest > shortest and count > 1:
         n = min(longest, count, ring)
+        _sums(rows, count, n, sums)
         variance, trace = 0.0, 0.0
         for i in range(m):
-            mean = _sum(rows, count, n, i) / n
-            variance += _sum(rows, count, n, m + i * (m + 1)) / n - mean * mean
+            mean = sums[i] / n
+            variance += sums[m + i * (m + 1)] / n - mean * mean
             trace += nominal[i, i] + predicted[i, i]
         length = adaptive_window(variance, trace, low, high, shortest, longest)
-    n = min(length, count, ring)
+    if n != min(length, count, ring):
+        n = min(length, count, ring)
+        _sums(rows, count, n, sums)
     for i in range(m):
         for j in range(m):
             at = m + i * m + j
-            subtracted = n * predicted[i, j] if newest else _sum(rows, count, n, at + 2 * m * m)
-            mean = (_sum(rows, count, n, at + m * m) - subtracted + (length - n) * nominal[i, j]) / length
+            subtracted = n * predicted[i, j] if newest else sums[at + 2 * m * m]
+            mean = (sums[at + m * m] - subtracted + (length - n) * nominal[i, j]) / length
             estimate[i, j] += forgetting * (mean - estimate[i, j])
     return length
 
@@ -296,10 +304,11 @@ class InnovationBased(EstimatedNoise):
                 _remember(*own, residual, predicted, noise)
         return noise if found < 0.0 else nominal
 
-    def _note(self, name: str, chosen: Sequence[float]) -> None:
-        super()._note(name, chosen)
-        if chosen[-1]:
-            self.report(f"window.{name}", int(abs(chosen[-1])))
+    def noted(self, name: str, row: Sequence[float]) -> None:
+        """As `NoiseAdaptation.noted`; the number is the length of the window, with a sign."""
+        super().noted(name, row)
+        if row[REPORT]:
+            self.report(f"window.{name}", int(abs(row[REPORT])))
 
 
 class FixedWindow(InnovationBased):

@@ -10,6 +10,7 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from simnav.compiled import Kernel, kernel
+from simnav.estimators.algebra.cholesky import factorise, solve_factor
 from simnav.estimators.algebra.joseph import joseph_update
 from simnav.estimators.models.base import REPORT, SIGMA
 from simnav.types import KINDS, Array, Instruments
@@ -57,6 +58,16 @@ def posterior(innovation: Array, predicted: Array, noise: Array, residual: Array
         Normalised innovation squared ``v' S^-1 v``; -1 if S is singular, and then there is no update.
     """
     m = innovation.size
+    if m == 1:  # the same operations in the same order, without arrays
+        prior, total = predicted[0, 0], predicted[0, 0] + noise[0, 0]
+        residual[0], after[0, 0] = innovation[0], prior
+        if not total > 1e-14 * total:
+            return -1.0
+        root = sqrt(total)
+        gain, white = prior / root / root, innovation[0] / root
+        residual[0] = innovation[0] - gain * innovation[0]
+        after[0, 0] = prior + ((gain * total - prior) * gain - gain * prior)
+        return white * white
     spread = np.empty((m, m))
     for i in range(m):
         for j in range(m):
@@ -72,7 +83,19 @@ def posterior(innovation: Array, predicted: Array, noise: Array, residual: Array
 def normalised_square(innovation: Array, predicted: Array, noise: Array) -> float:
     """Normalised innovation squared ``v' S^-1 v`` with ``S = H P H' + R``; -1 if S is singular."""
     m = innovation.size
-    return posterior(innovation, predicted, noise, np.empty(m), np.empty((m, m)))
+    L, white = np.empty((m, m)), np.empty(m)
+    for i in range(m):
+        for j in range(m):
+            L[i, j] = predicted[i, j] + noise[i, j]
+    if not factorise(L, m, 1e-14, white):
+        return -1.0
+    for i in range(m):
+        white[i] = innovation[i]
+    solve_factor(L, m, white)
+    nis = 0.0
+    for i in range(m):
+        nis += white[i] * white[i]
+    return nis
 
 
 @kernel("void(f8[:, ::1], f8, f8, f8, f8[:, ::1])")
@@ -192,9 +215,9 @@ class NoiseAdaptation(Adaptation):
         self._report: dict[str, float | Array] = {}
         self._noisy: dict[str, Array] = {}  # a noise found above zero, and the one reported last
         self._reported: dict[str, Array] = {}
-        self._noted: dict[str, Sequence[float]] = {}
         for name, sheet in instruments.items():
             self._report.update(zip(self._labels[name], map(float, sheet.sigma)))
+        self._places = {name: list(zip(labels, range(SIGMA, REPORT))) for name, labels in self._labels.items()}
         self.instruments, self.index = instruments, {name: i for i, name in enumerate(instruments)}
         self.longer = {name: max(sheet.rate, 1.0) for name, sheet in instruments.items()}
         self.rule_settings = np.array([self.settings_of(longer) for longer in self.longer.values()], dtype=np.float64)
@@ -235,17 +258,13 @@ class NoiseAdaptation(Adaptation):
         return True
 
     def noted(self, name: str, row: Sequence[float]) -> None:
-        """Report what a kernel chose for an instrument; the row is that of `simnav.estimators.models.base.StepRule`."""
-        chosen = row[SIGMA : REPORT + 1]
-        if chosen[0] == chosen[0] and chosen != self._noted.get(name):
-            self._noted[name] = chosen
-            self._note(name, chosen)
-
-    def _note(self, name: str, chosen: Sequence[float]) -> None:
-        """Report the sigmas and the further number that a kernel chose; they differ from those before."""
-        self._report.update(zip(self._labels[name], chosen))
-        if self.reported and chosen[-1]:
-            self.report(f"{self.reported}.{name}", chosen[-1])
+        """Report the sigmas that a kernel chose for an instrument, and the further number if it is not 0."""
+        if row[SIGMA] == row[SIGMA]:
+            report = self._report
+            for label, place in self._places[name]:
+                report[label] = row[place]
+            if row[REPORT] and self.reported:
+                report[f"{self.reported}.{name}"] = row[REPORT]
 
     @abstractmethod
     def choose(self, innovation: Innovation) -> Array | None:

@@ -14,20 +14,32 @@ from .noise import RULE, WeightedNoise, posterior
 __all__ = ["StudentT", "normalised_trace", "student_t_noise", "student_weight"]
 
 
-@kernel("f8(f8[:, ::1], f8[::1], f8[:, ::1])")
-def normalised_trace(noise: Array, residual: Array, spread: Array) -> float:
-    """``tr(R^-1 (e e' + A))`` of a residual e and an (m, m) matrix A (``spread``); -1 if R is singular."""
-    m = residual.size
-    L, inverse = noise.copy(), np.empty((m, m))
-    if not factorise(L, m, 1e-14, np.empty(m)):
-        return -1.0
+@kernel()
+def _whitening(noise: Array, inverse: Array) -> bool:
+    """Overwrite with the inverse of the Cholesky factor of R; whether R is positive definite."""
+    m = noise.shape[0]
+    L = noise.copy()
+    definite: bool = factorise(L, m, 1e-14, np.empty(m))
     invert_factor(L, m, inverse)
+    return definite
+
+
+@kernel()
+def _trace(inverse: Array, residual: Array, spread: Array) -> float:
+    """As `normalised_trace`, given `_whitening`."""
     total = 0.0
-    for r in range(m):
+    for r in range(residual.size):
         for i in range(r + 1):
             for j in range(r + 1):
                 total += inverse[r, i] * inverse[r, j] * (residual[i] * residual[j] + spread[i, j])
     return total
+
+
+@kernel("f8(f8[:, ::1], f8[::1], f8[:, ::1])")
+def normalised_trace(noise: Array, residual: Array, spread: Array) -> float:
+    """``tr(R^-1 (e e' + A))`` of a residual e and an (m, m) matrix A (``spread``); -1 if R is singular."""
+    inverse = np.empty((residual.size, residual.size))
+    return _trace(inverse, residual, spread) if _whitening(noise, inverse) else -1.0
 
 
 @kernel("f8(f8[::1], f8[:, ::1], f8[:, ::1], f8, i8)")
@@ -46,7 +58,9 @@ def student_weight(innovation: Array, predicted: Array, noise: Array, dof: float
         Number of alternating updates of state and weight.
     """
     m = innovation.size
-    residual, after, used = np.empty(m), np.empty((m, m)), np.empty((m, m))
+    residual, after, used, inverse = np.empty(m), np.empty((m, m)), np.empty((m, m)), np.empty((m, m))
+    if not _whitening(noise, inverse):
+        return 1.0
     weight = 1.0
     for _ in range(iterations):
         for i in range(m):
@@ -54,7 +68,7 @@ def student_weight(innovation: Array, predicted: Array, noise: Array, dof: float
                 used[i, j] = noise[i, j] / weight
         if posterior(innovation, predicted, used, residual, after) < 0.0:
             return 1.0
-        trace = normalised_trace(noise, residual, after)
+        trace = _trace(inverse, residual, after)
         if trace < 0.0:
             return 1.0
         weight = (dof + m) / (dof + trace)

@@ -120,7 +120,9 @@ class ImmEstimator(KalmanEstimator):
     def update(self, measurements: Measurements) -> Estimate:
         """Take one step's measurements."""
         estimate = super().update(measurements)
-        estimate.diagnostics = {**estimate.diagnostics, **self._report, **summary(self._report, self._owners)}
+        estimate.diagnostics.update(self._report)
+        if self._owners:
+            estimate.diagnostics.update(summary(self._report, self._owners))
         return estimate
 
     def _take(self, m: Measurement, diagnostics: dict[str, float | Array], flagged: list[tuple[str, float]]) -> None:

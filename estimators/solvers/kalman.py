@@ -274,7 +274,7 @@ class KalmanEstimator(Solver):
 
     def _noted(self, name: str, row: Sequence[float]) -> None:
         """Report what a kernel chose for an instrument."""
-        assert isinstance(self.adaptation, NoiseAdaptation)
+        assert self.adaptation is not None
         self.adaptation.noted(name, row)
 
     def _take_together(self, group: Sequence[Measurement], diagnostics: dict[str, float | Array]) -> bool:
