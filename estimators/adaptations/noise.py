@@ -64,7 +64,7 @@ def posterior(innovation: Array, predicted: Array, noise: Array, residual: Array
         if not total > 1e-14 * total:
             return -1.0
         root = sqrt(total)
-        gain, white = prior / root / root, innovation[0] / root
+        gain, white = prior / root / root, float(innovation[0] / root)
         residual[0] = innovation[0] - gain * innovation[0]
         after[0, 0] = prior + ((gain * total - prior) * gain - gain * prior)
         return white * white

@@ -263,17 +263,18 @@ class FederatedEstimator(KalmanEstimator):
 
 def _inverse(matrix: Array, use: NDArray[np.bool_]) -> Array:
     """Inverse of the rows and columns in use of a covariance or information matrix, scaled by its diagonal; else 0."""
-    inverse = np.zeros_like(matrix)
-    at = np.ix_(use, use)
+    at = slice(None) if use.all() else np.ix_(use, use)
     part = matrix[at]
     scale = 1.0 / np.sqrt(np.diag(part))
-    correlation = part * (scale[:, None] * scale)
+    scales = scale[:, None] * scale
+    correlation = part * scales
     try:
         root = np.linalg.inv(np.linalg.cholesky(correlation))
     except np.linalg.LinAlgError:  # singular to rounding: what is known beyond it counts as known to rounding
         values, vectors = np.linalg.eigh(correlation)
         root = (vectors / np.sqrt(np.maximum(values, 1e-14 * len(values)))).T
-    inverse[at] = (root.T @ root) * (scale[:, None] * scale)
+    inverse = np.zeros_like(matrix)
+    inverse[at] = (root.T @ root) * scales
     return inverse
 
 

@@ -120,9 +120,8 @@ class ImmEstimator(KalmanEstimator):
     def update(self, measurements: Measurements) -> Estimate:
         """Take one step's measurements."""
         estimate = super().update(measurements)
-        estimate.diagnostics.update(self._report)
-        if self._owners:
-            estimate.diagnostics.update(summary(self._report, self._owners))
+        means = summary(self._report, self._owners) if self._owners else {}
+        estimate.diagnostics = {**estimate.diagnostics, **self._report, **means}
         return estimate
 
     def _take(self, m: Measurement, diagnostics: dict[str, float | Array], flagged: list[tuple[str, float]]) -> None:

@@ -16,20 +16,21 @@ A filter whose heading sigma is above `KNOWN_HEADING` is not tested, because fil
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from math import radians, sqrt
+from collections.abc import Mapping, Sequence
+from math import radians
 
 import numpy as np
 
 from simnav.types import Array, Estimate
 
 from .hypotheses import Hypothesis
-from .state_difference import difference
+from .state_difference import differences
 
 __all__ = ["KNOWN_HEADING", "SeparationTest"]
 
 #: Components whose separation is tested: position, velocity, heading.
 _TESTED = (0, 1, 2, 3, 4, 5, 8)
+_IS_TESTED = np.isin(np.arange(9), _TESTED)
 #: Part of the main filter's sigma that a separation may have by linearisation alone.
 _LINEARISATION = 0.1
 #: Standard deviation of the heading up to which a filter is compared with another one [rad].
@@ -61,36 +62,40 @@ class SeparationTest:
             return True
         return float(estimate.covariance[8, 8]) <= KNOWN_HEADING**2
 
-    def variances(self, sub: Hypothesis, estimate: Estimate) -> tuple[Array, Array]:
-        """Variances of a sub-filter's nine components, and of its separation from the main filter's estimate."""
-        assert sub.estimate is not None
-        assert sub.estimate.covariance is not None
+    def variances(self, subs: Sequence[Hypothesis], estimate: Estimate) -> tuple[Array, Array]:
+        """(k, 9) variances of sub-filters' components, and of their separation from the main filter's estimate."""
         assert estimate.covariance is not None
         main = estimate.covariance.diagonal()
-        own = sub.estimate.covariance.diagonal()
+        own = np.array([_estimate_of(sub).covariance.diagonal() for sub in subs])  # type: ignore[union-attr]
         apart = np.maximum(own - main, 0.0) + _LINEARISATION**2 * main
         if estimate.velocity is not None:  # a heading error as large as its test allows, at second order
-            apart[3:5] += (0.5 * self.factor * own[8] * estimate.velocity[:2]) ** 2
+            apart[:, 3:5] += (0.5 * self.factor * own[:, 8:] * estimate.velocity[:2]) ** 2
         return own, apart
 
-    def largest(self, subs: Iterable[Hypothesis], estimate: Estimate) -> float:
-        """The largest ratio of separation to threshold, over all tested components of the sub-filters.
+    def largest(self, groups: Mapping[str, Sequence[Hypothesis]], estimate: Estimate) -> dict[str, float]:
+        """The largest ratio of separation to threshold, over all tested components of the sub-filters of each group.
 
         Parameters
         ----------
-        subs : iterable of Hypothesis
+        groups : mapping of str to sequence of Hypothesis
             The sub-filters that are compared.
         estimate : Estimate
             Estimate of the main filter.
         """
-        mask, largest = estimate.mask(), 0.0
-        for sub in subs:
-            assert sub.estimate is not None
-            if not self.applies(sub.estimate):
-                continue
-            apart = difference(sub.estimate, estimate).tolist()
-            _, variance = self.variances(sub, estimate)
-            for q in _TESTED:
-                if mask[q] and variance[q] > 0.0:
-                    largest = max(largest, abs(apart[q]) / (self.factor * sqrt(variance[q])))
-        return largest
+        ratios = dict.fromkeys(groups, 0.0)
+        tested = [(name, sub) for name, subs in groups.items() for sub in subs if self.applies(_estimate_of(sub))]
+        if not tested:
+            return ratios
+        names, subs = zip(*tested)
+        apart = np.abs(differences([_estimate_of(sub) for sub in subs], estimate))
+        _, variance = self.variances(subs, estimate)
+        counted = (estimate.mask() & _IS_TESTED) & (variance > 0.0)
+        ratio = np.divide(apart, self.factor * np.sqrt(variance), out=np.zeros_like(apart), where=counted)
+        for name, row in zip(names, ratio.tolist()):
+            ratios[name] = max(ratios[name], *row)
+        return ratios
+
+
+def _estimate_of(sub: Hypothesis) -> Estimate:
+    assert sub.estimate is not None
+    return sub.estimate

@@ -298,7 +298,8 @@ class SolutionSeparation(Solver):
             if self._inertial and self._heading_sources <= without:
                 sub.turn(self._gyroscope_noise)
         flagged = list(estimate.flagged)
-        ratios = {name: self._separation(name, estimate) for name in self._names if name not in out}
+        pairs = {name: pair for name, pair in self._pairs.items() if name not in out}
+        ratios = {name: self._rules.counted(name, x) for name, x in self._test.largest(pairs, estimate).items()}
         most = max(ratios.values(), default=0.0)  # the start is blamed only where instruments contradict each other
         ratios |= self._test_of_the_start(measurements, estimate, fading)
         ratios |= self._test_of_the_imu(measurements, estimate, fading)
@@ -343,7 +344,7 @@ class SolutionSeparation(Solver):
         sub.filter.watch(sub.estimate, self._components, fading)
         if self._disagreement(sub.filter) > _AGREEMENT:
             return {}
-        return {_START: self._test.largest([sub], estimate)}
+        return self._test.largest({_START: [sub]}, estimate)
 
     def _other_opinion_of_the_imu(self) -> ImuHypothesis:
         """The filter that does not believe the IMU or, while the main one does not, a filter that does."""
@@ -367,7 +368,7 @@ class SolutionSeparation(Solver):
         more_is_wrong = without != out and not (agrees and without <= out) and self._time - self._trial >= COASTING
         if more_is_wrong or not self._test.applies(imu.estimate):
             self._begin_imu(imu, without=out)
-        return {_IMU: self._test.largest([imu], estimate)} if agrees and self._witnesses else {}
+        return self._test.largest({_IMU: [imu]}, estimate) if agrees and self._witnesses else {}
 
     def _begin_imu(self, imu: ImuHypothesis, without: Collection[str]) -> None:
         """Begin the filter of the other opinion anew from the main one, without some instruments."""
@@ -461,10 +462,6 @@ class SolutionSeparation(Solver):
 
     def _older_filter(self, name: str) -> Hypothesis:
         return min(self._pairs[name], key=lambda sub: sub.start)
-
-    def _separation(self, name: str, estimate: Estimate) -> float:
-        """The largest separation over its threshold, of both sub-filters without an instrument."""
-        return self._rules.counted(name, self._test.largest(self._pairs[name], estimate))
 
     def _exclude(self, name: str) -> Estimate:
         """Take the sub-filter without an instrument for the main filter; all others begin anew from it."""
@@ -584,13 +581,12 @@ class SolutionSeparation(Solver):
     def _protection_level(self, estimate: Estimate) -> float:
         """The horizontal protection level [m]."""
         assert estimate.covariance is not None
+        used = [self._older_filter(name) for name in self._names if name not in self._exclusion.excluded]
+        own, apart = self._test.variances(used, estimate) if used else (np.empty((0, 9)), np.empty((0, 9)))
         levels = []
         for q in (0, 1):
             level = self._quiet * sqrt(max(float(estimate.covariance[q, q]), 0.0))
-            for name in self._names:
-                if name in self._exclusion.excluded:
-                    continue
-                own, apart = self._test.variances(self._older_filter(name), estimate)
-                level = max(level, self._test.factor * sqrt(float(apart[q])) + self._missed * sqrt(float(own[q])))
+            for one, between in zip(own[:, q].tolist(), apart[:, q].tolist(), strict=True):
+                level = max(level, self._test.factor * sqrt(between) + self._missed * sqrt(one))
             levels.append(level)
         return hypot(*levels)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -10,26 +11,42 @@ from simnav.geometry.earth import displace, relative_position
 from simnav.geometry.rotation import dcm_from_rotation_vector, dcm_from_rpy, rotation_vector_from_dcm, rpy_from_dcm
 from simnav.types import Array, Estimate
 
-__all__ = ["difference", "displaced"]
+__all__ = ["difference", "differences", "displaced"]
 
 
-def difference(estimate: Estimate, other: Estimate) -> Array:
-    """One estimate minus another, over `simnav.types.COMPONENTS` [m, m/s, rad].
+def differences(estimates: Sequence[Estimate], other: Estimate) -> Array:
+    """Estimates minus another one, over `simnav.types.COMPONENTS` [m, m/s, rad].
 
     Returns
     -------
-    (9,) array
-        The attitude as the rotation vector of ``C C_other'``; zero for vectors that one of them lacks.
+    (k, 9) array
+        The attitude as the rotation vector of ``C C_other'``; zero for vectors that one of the two lacks.
     """
-    found = np.zeros(9)
-    if estimate.position is not None and other.position is not None:
-        found[:3] = relative_position(estimate.position, other.position)
-    if estimate.velocity is not None and other.velocity is not None:
-        found[3:6] = estimate.velocity - other.velocity
-    if estimate.attitude is not None and other.attitude is not None:
-        turn = dcm_from_rpy(estimate.attitude) @ dcm_from_rpy(other.attitude).T
-        found[6:] = rotation_vector_from_dcm(turn)
+    found = np.zeros((len(estimates), 9))
+    at, positions = _those(estimates, "position")
+    if at and other.position is not None:
+        found[at, :3] = relative_position(positions, other.position)
+    at, velocities = _those(estimates, "velocity")
+    if at and other.velocity is not None:
+        found[at, 3:6] = velocities - other.velocity
+    at, attitudes = _those(estimates, "attitude")
+    if at and other.attitude is not None:
+        turns = dcm_from_rpy(attitudes) @ dcm_from_rpy(other.attitude).T
+        found[at, 6:] = rotation_vector_from_dcm(turns)
     return found
+
+
+def difference(estimate: Estimate, other: Estimate) -> Array:
+    """`differences` of one estimate, (9,)."""
+    first: Array = differences([estimate], other)[0]
+    return first
+
+
+def _those(estimates: Sequence[Estimate], name: str) -> tuple[list[int], Array]:
+    """The places of the estimates that have a vector, and the vectors."""
+    given = [getattr(one, name) for one in estimates]
+    at = [k for k, vector in enumerate(given) if vector is not None]
+    return at, np.array([given[k] for k in at])
 
 
 def displaced(estimate: Estimate, error: Array, covariance: Array) -> Estimate:

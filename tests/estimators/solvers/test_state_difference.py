@@ -1,0 +1,29 @@
+"""The difference of estimates: that by which one was displaced, and zero for what one of them lacks."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from simnav.estimators.solvers.state_difference import difference, differences, displaced
+from simnav.types import Estimate
+
+OTHER = Estimate(3.0, np.array([0.9, 0.2, 4.0]), np.array([3.0, -1.0, 0.1]), np.array([0.02, -0.01, 2.0]), np.eye(9))
+
+
+def test_many_at_a_time_have_the_bits_of_each_by_itself():
+    rng = np.random.default_rng(4)
+    errors = rng.standard_normal((8, 9)) * np.repeat((5.0, 0.3, 0.02), 3)
+    displaced_ones = [displaced(OTHER, error, np.eye(9)) for error in errors]
+    found = differences(displaced_ones, OTHER)
+    np.testing.assert_allclose(found, errors, rtol=1e-5, atol=1e-8)
+    np.testing.assert_array_equal(found, [difference(one, OTHER) for one in displaced_ones])
+
+
+def test_what_one_of_them_lacks_is_zero():
+    moved = displaced(OTHER, np.ones(9), np.eye(9))
+    lacking = [replace(moved, velocity=None), replace(moved, position=None, attitude=None), moved]
+    found = differences(lacking, OTHER) != 0.0
+    np.testing.assert_array_equal(found[:, ::3], [[True, False, True], [False, True, False], [True, True, True]])
+    np.testing.assert_array_equal(differences([moved], replace(OTHER, attitude=None))[0, 6:], 0.0)
