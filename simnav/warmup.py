@@ -7,8 +7,8 @@ import importlib.util
 import multiprocessing
 import os
 import warnings
-from collections.abc import Callable, Iterator
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Future, ProcessPoolExecutor, wait
 from pathlib import Path
 from typing import Any
 
@@ -96,15 +96,26 @@ def _compile_beside(missing: list[Kernel[..., Any]], processes: int) -> Iterator
     if processes < 2 or "fork" not in multiprocessing.get_all_start_methods():
         return
     context = multiprocessing.get_context("fork")
-    _todo[:] = sorted(missing, key=_size, reverse=True)  # the longest first, so that no process works alone at the end
+    _todo[:] = missing
+    calls = [{k for k in kernel.tree() if k is not kernel and k in missing} for kernel in missing]
+    sizes = [_size({*kernel.tree()}.difference(*(k.tree() for k in called))) for kernel, called in zip(missing, calls)]
+    # The longest first, so that no process works alone at the end.
+    waiting = sorted(range(len(missing)), key=sizes.__getitem__, reverse=True)
+    done: set[Kernel[..., Any]] = set()
+    running: dict[Future[str], int] = {}
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", DeprecationWarning)  # fork beside threads
-            with ProcessPoolExecutor(processes, mp_context=context) as pool:
-                futures = [pool.submit(_compile, i) for i in range(len(missing))]
-                for future in as_completed(futures):
-                    with contextlib.suppress(Exception):
-                        yield future.result()
+            with ProcessPoolExecutor(processes, mp_context=context) as pool, contextlib.suppress(BrokenExecutor):
+                while waiting or running:
+                    # A kernel after those that it calls, which are then in the cache.
+                    for i in [i for i in waiting if calls[i] <= done][: processes - len(running)]:
+                        waiting.remove(i)
+                        running[pool.submit(_compile, i)] = i
+                    for future in wait(running, return_when=FIRST_COMPLETED).done:
+                        done.add(missing[running.pop(future)])
+                        with contextlib.suppress(Exception):
+                            yield future.result()
     finally:
         _todo.clear()
 
@@ -112,9 +123,9 @@ def _compile_beside(missing: list[Kernel[..., Any]], processes: int) -> Iterator
 _todo: list[Kernel[..., Any]] = []
 
 
-def _size(kernel: Kernel[..., Any]) -> int:
-    """The size of the code of a kernel and of all kernels that it calls, as a measure of its compile time."""
-    return sum(len(k.function.__code__.co_code) for k in kernel.tree())
+def _size(parts: Iterable[Kernel[..., Any]]) -> int:
+    """The size of the code of kernels, as a measure of their compile time."""
+    return sum(len(k.function.__code__.co_code) for k in parts)
 
 
 def _compile(index: int) -> str:

@@ -246,6 +246,7 @@ class InnovationBased(EstimatedNoise):
     """
 
     rule = innovation_noise
+    reported = "window"
 
     def __init__(
         self,
@@ -295,7 +296,7 @@ class InnovationBased(EstimatedNoise):
         m, residual, predicted, nominal, *_ = innovation
         own, noise = self.memory_of(m.instrument), np.empty_like(nominal)
         found = self.ask(innovation_noise, innovation, noise)
-        self.report(f"window.{m.instrument}", int(abs(found)))
+        self.report(self._further[m.instrument], int(abs(found)))
         if self.full:
             if found < 0.0:
                 elements = own[1][ESTIMATE : ESTIMATE + nominal.size]
@@ -308,7 +309,7 @@ class InnovationBased(EstimatedNoise):
         """As `NoiseAdaptation.noted`; the number is the length of the window, with a sign."""
         super().noted(name, row)
         if row[REPORT]:
-            self.report(f"window.{name}", int(abs(row[REPORT])))
+            self.report(self._further[name], int(abs(row[REPORT])))
 
 
 class FixedWindow(InnovationBased):

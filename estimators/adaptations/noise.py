@@ -218,6 +218,7 @@ class NoiseAdaptation(Adaptation):
         for name, sheet in instruments.items():
             self._report.update(zip(self._labels[name], map(float, sheet.sigma)))
         self._places = {name: list(zip(labels, range(SIGMA, REPORT))) for name, labels in self._labels.items()}
+        self._further = {name: f"{self.reported}.{name}" for name in instruments}
         self.instruments, self.index = instruments, {name: i for i, name in enumerate(instruments)}
         self.longer = {name: max(sheet.rate, 1.0) for name, sheet in instruments.items()}
         self.rule_settings = np.array([self.settings_of(longer) for longer in self.longer.values()], dtype=np.float64)
@@ -264,7 +265,7 @@ class NoiseAdaptation(Adaptation):
             for label, place in self._places[name]:
                 report[label] = row[place]
             if row[REPORT] and self.reported:
-                report[f"{self.reported}.{name}"] = row[REPORT]
+                report[self._further[name]] = row[REPORT]
 
     @abstractmethod
     def choose(self, innovation: Innovation) -> Array | None:
