@@ -307,7 +307,7 @@ class WeightedNoise(NoiseAdaptation):
     def weighted(self, rule: Kernel[..., float], innovation: Innovation) -> Array:
         """The noise that a kernel (`RULE`) chooses for a measurement, and report its weight."""
         noise: Array = np.empty_like(innovation.noise)
-        self.report(f"weight.{innovation.measurement.instrument}", self.ask(rule, innovation, noise))
+        self.report(self._further[innovation.measurement.instrument], self.ask(rule, innovation, noise))
         return noise
 
 
