@@ -16,9 +16,9 @@ from simnav.compiled import kernel
 from simnav.estimators.algebra.inflation import inflate_motion
 from simnav.estimators.algebra.mixture import mixture_update
 from simnav.estimators.models.base import INNOVATION, NIS, REJECTED, REPORT, RESULTS, SIGMA, SIZE, StepRule
-from simnav.estimators.models.inertial_step import STEP, AidTable, Matrices, Measured, Others, aid_of, move_inertial
+from simnav.estimators.models.inertial_step import STEP, AidTable, Matrices, Measured, Others
 from simnav.estimators.models.inertial_update import absorb_inertial, assimilate_inertial, innovate_inertial
-from simnav.estimators.models.propagation import Moving, Samples, correct_inertial
+from simnav.estimators.models.propagation import Moving, Samples, correct_inertial, propagate_inertial
 from simnav.types import Array, Flags, Integers
 
 from .adkf import adkf_noise
@@ -127,18 +127,23 @@ def adapt_inertial(
     int
         Index of the first sample that is not completely used.
     """
-    aids, measured = packet
-    which, times, values, results = measured
+    (codes, arms, noises), (which, times, values, results) = packet
     (code, inflates, table, last, variances, settings, memories, first, shared), test = choice
     tests, limits, known, memory, kept = test
     position, velocity, dcm, _, bias, _, clock = state
-    now, covariance, correction = (position, velocity, dcm, clock[12:15], bias, others[0]), matrices[2], others[3]
-    n = covariance.shape[0]
-    for k in range(which.size):
-        start = move_inertial(k, measured, state, samples, start, until, noise, matrices, others)
+    calibration, rate, density, correction = others
+    calibrated, covariance = (calibration, rate, density), matrices[2]
+    now, n = (position, velocity, dcm, clock[12:15], bias, calibration), covariance.shape[0]
+    for k in range(which.size + 1):
+        time = min(times[k], until) if k < which.size else until
+        if time > clock[0]:
+            start = propagate_inertial(state, samples, start, time, noise, matrices, calibrated, time - clock[0])
+        if k == which.size:
+            break
         row, result = which[k], results[k]
-        aid, nominal = aid_of(row, aids)
-        i, d, value = table[row, 0], nominal.shape[0], values[k, : nominal.shape[0]]
+        i, d = table[row, 0], codes[row, 1]
+        aid, value = (codes[row, 0], arms[row], codes[row, 2], codes[row, 3]), values[k, :d]
+        nominal = noises[row, : d * d].reshape((d, d))
         innovation, cross, predicted, used = np.empty(d), np.empty((n, d)), np.empty((d, d)), np.empty((d, d))
         for a in range(RESULTS):
             result[a] = 0.0
@@ -163,7 +168,7 @@ def adapt_inertial(
                 covariance, cross, predicted, nominal, innovation, levels, transition, probability, correction
             )
             if result[NIS] >= 0.0:
-                correct_inertial(position, velocity, dcm, bias, others[0], correction)
+                correct_inertial(position, velocity, dcm, bias, calibration, correction)
                 result[REPORT] = probability[0]
                 for a in range(d):
                     result[SIGMA + a] = sqrt(expected * nominal[a, a])
@@ -197,7 +202,7 @@ def adapt_inertial(
             inflate_motion(covariance, inflation, variances, PLACES)
             innovate_inertial(aid, value, now, covariance, innovation, cross, predicted)
         result[NIS] = absorb_inertial(covariance, cross, predicted, used, innovation, now, correction)
-    return move_inertial(which.size, measured, state, samples, start, until, noise, matrices, others)
+    return start
 
 
 def step_rule(adaptation: NoiseAdaptation, names: Sequence[str], variances: Array) -> StepRule | None:

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from functools import cache
 from typing import Literal
 
 import numpy as np
 
 from simnav.compiled import kernel
-from simnav.estimators.models.base import REPORT
 from simnav.types import Array
 
 from .base import Innovation
@@ -296,7 +294,7 @@ class InnovationBased(EstimatedNoise):
         m, residual, predicted, nominal, *_ = innovation
         own, noise = self.memory_of(m.instrument), np.empty_like(nominal)
         found = self.ask(innovation_noise, innovation, noise)
-        self.report(self._further[m.instrument], int(abs(found)))
+        self.report(self._further[m.instrument], self.said(found))
         if self.full:
             if found < 0.0:
                 elements = own[1][ESTIMATE : ESTIMATE + nominal.size]
@@ -305,11 +303,9 @@ class InnovationBased(EstimatedNoise):
                 _remember(*own, residual, predicted, noise)
         return noise if found < 0.0 else nominal
 
-    def noted(self, name: str, row: Sequence[float]) -> None:
-        """As `NoiseAdaptation.noted`; the number is the length of the window, with a sign."""
-        super().noted(name, row)
-        if row[REPORT]:
-            self.report(self._further[name], int(abs(row[REPORT])))
+    def said(self, number: float) -> float:
+        """The length of the window; the number has a sign."""
+        return int(abs(number))
 
 
 class FixedWindow(InnovationBased):

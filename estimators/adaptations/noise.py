@@ -12,7 +12,7 @@ import numpy as np
 from simnav.compiled import Kernel, kernel
 from simnav.estimators.algebra.cholesky import factorise, solve_factor
 from simnav.estimators.algebra.joseph import joseph_update
-from simnav.estimators.models.base import REPORT, SIGMA
+from simnav.estimators.models.base import SIGMA, SIZE
 from simnav.types import KINDS, Array, Instruments
 
 from .base import Adaptation, Innovation
@@ -217,7 +217,7 @@ class NoiseAdaptation(Adaptation):
         self._reported: dict[str, Array] = {}
         for name, sheet in instruments.items():
             self._report.update(zip(self._labels[name], map(float, sheet.sigma)))
-        self._places = {name: list(zip(labels, range(SIGMA, REPORT))) for name, labels in self._labels.items()}
+        self._noted: dict[str, Sequence[float]] = {}
         self._further = {name: f"{self.reported}.{name}" for name in instruments}
         self.instruments, self.index = instruments, {name: i for i, name in enumerate(instruments)}
         self.longer = {name: max(sheet.rate, 1.0) for name, sheet in instruments.items()}
@@ -260,12 +260,16 @@ class NoiseAdaptation(Adaptation):
 
     def noted(self, name: str, row: Sequence[float]) -> None:
         """Report the sigmas that a kernel chose for an instrument, and the further number if it is not 0."""
-        if row[SIGMA] == row[SIGMA]:
-            report = self._report
-            for label, place in self._places[name]:
-                report[label] = row[place]
-            if row[REPORT] and self.reported:
-                report[self._further[name]] = row[REPORT]
+        chosen = row[SIGMA:SIZE]
+        if chosen[0] == chosen[0] and chosen != self._noted.get(name):
+            self._noted[name] = chosen
+            self._report.update(zip(self._labels[name], chosen))
+            if chosen[-1] and self.reported:
+                self._report[self._further[name]] = self.said(chosen[-1])
+
+    def said(self, number: float) -> float:
+        """The number that a rule returns, as it is reported."""
+        return number
 
     @abstractmethod
     def choose(self, innovation: Innovation) -> Array | None:

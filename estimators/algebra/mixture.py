@@ -87,8 +87,9 @@ def mixture_update(
             nis += x * residual[r]
         distance[j] = nis
         likelihood[j] = -0.5 * (nis + determinant)
-    best = likelihood.max()
-    total = 0.0
+    best, total = likelihood[0], 0.0
+    for j in range(1, count):
+        best = max(best, likelihood[j])
     for j in range(count):
         prior = 0.0
         for k in range(count):

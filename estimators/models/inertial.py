@@ -150,14 +150,15 @@ class InertialModel(ErrorModel):
     memory = ("_memory", "_turn", "_clock")
     attitude_at = 6
     moving = (slice(0, 6), slice(6, 9))
-    #: True if the kernels of `simnav.estimators.models.inertial_update` may replace `measure` and `correct`. A model
-    #: with another form of one of these methods sets it to False.
+    #: True if the kernels of `simnav.estimators.models.inertial_update` may replace `measure` and `correct`, and
+    #: `inflate_motion` `loosen`. A model with another form of one of these methods sets it to False.
     fused: ClassVar[bool] = True
 
     def __init_subclass__(cls) -> None:
         super().__init_subclass__()
-        if ("measure" in vars(cls) or "correct" in vars(cls)) and cls.fused and "fused" not in vars(cls):
-            raise TypeError(f"{cls.__name__} measures or corrects in a way of its own; it has to say: fused = False")
+        own = {"measure", "correct", "loosen"} & vars(cls).keys()
+        if own and cls.fused and "fused" not in vars(cls):
+            raise TypeError(f"{cls.__name__} has {', '.join(sorted(own))} of its own; it has to say: fused = False")
 
     def __init__(self, calibrate: bool = True):
         self.calibrate = calibrate

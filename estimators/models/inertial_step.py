@@ -12,10 +12,9 @@ from simnav.types import Array, Integers, Measurement
 
 from .base import NIS, RESULTS, SIZE, StepRule
 from .inertial_update import assimilate_inertial
-from .measurements import Aid
 from .propagation import MOVING, SAMPLES, Moving, Samples, propagate_inertial
 
-__all__ = ["STEP", "AidTable", "Matrices", "Measured", "Others", "Packet", "aid_of", "filter_inertial", "move_inertial"]
+__all__ = ["STEP", "AidTable", "Matrices", "Measured", "Others", "Packet", "filter_inertial"]
 
 #: Of a model of n states: transition and process noise (15, 15), and covariance (n, n).
 Matrices: TypeAlias = tuple[Array, Array, Array]
@@ -34,29 +33,6 @@ STEP = (
     f"{MOVING}, {SAMPLES}, i8, f8, f8[::1], UniTuple(f8[:, ::1], 3), UniTuple(f8[::1], 4), "
     "Tuple((Tuple((i8[:, ::1], f8[:, ::1], f8[:, ::1])), Tuple((i8[::1], f8[::1], f8[:, ::1], f8[:, ::1]))))"
 )
-
-
-@kernel()
-def move_inertial(
-    k: int, measured: Measured, state: Moving, samples: Samples, first: int, until: float, noise: Array,
-    matrices: Matrices, others: Others,
-) -> int:  # fmt: skip
-    """Do `propagate_inertial` to the time of measurement k, or to the end of the step after the last one."""
-    which, times, _, _ = measured
-    time = min(times[k], until) if k < which.size else until
-    elapsed = time - state[6][0]
-    if elapsed > 0.0:
-        calibrated = others[0], others[1], others[2]
-        first = propagate_inertial(state, samples, first, time, noise, matrices, calibrated, elapsed)
-    return first
-
-
-@kernel()
-def aid_of(row: int, aids: AidTable) -> tuple[Aid, Array]:
-    """An instrument, and its noise (d, d)."""
-    codes, arms, noises = aids
-    d = codes[row, 1]
-    return (codes[row, 0], arms[row], codes[row, 2], codes[row, 3]), noises[row, : d * d].reshape((d, d))
 
 
 @kernel(f"i8({STEP})")
@@ -80,17 +56,24 @@ def filter_inertial(
     int
         Index of the first sample that is not completely used.
     """
-    aids, measured = packet
-    which, _, values, results = measured
+    (codes, arms, noises), (which, times, values, results) = packet
     position, velocity, dcm, _, bias, _, clock = state
-    now = position, velocity, dcm, clock[12:15], bias, others[0]
-    for k in range(which.size):
-        first = move_inertial(k, measured, state, samples, first, until, noise, matrices, others)
-        aid, nominal = aid_of(which[k], aids)
+    calibration, rate, density, correction = others
+    calibrated, covariance = (calibration, rate, density), matrices[2]
+    now = position, velocity, dcm, clock[12:15], bias, calibration
+    for k in range(which.size + 1):
+        time = min(times[k], until) if k < which.size else until
+        if time > clock[0]:
+            first = propagate_inertial(state, samples, first, time, noise, matrices, calibrated, time - clock[0])
+        if k == which.size:
+            break
+        row = which[k]
+        code, d, bias_at, scale_at = codes[row, 0], codes[row, 1], codes[row, 2], codes[row, 3]
         results[k, NIS], results[k, SIZE] = assimilate_inertial(
-            aid, values[k, : nominal.shape[0]], now, matrices[2], nominal, others[3]
-        )
-    return move_inertial(which.size, measured, state, samples, first, until, noise, matrices, others)
+            (code, arms[row], bias_at, scale_at), values[k, :d], now, covariance,
+            noises[row, : d * d].reshape((d, d)), correction,
+        )  # fmt: skip
+    return first
 
 
 class Packet:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from math import ceil, hypot, log, sqrt
 from typing import ClassVar
 
@@ -111,6 +111,9 @@ class ImmEstimator(KalmanEstimator):
         return mixture_rule(
             self._variances, self.transition, probability, self._names, self._prediction, self._first_variances
         )
+
+    def _reporter(self) -> Callable[[str, Sequence[float]], None]:
+        return self._noted
 
     def _noted(self, name: str, row: Sequence[float]) -> None:
         if row[SIGMA] == row[SIGMA]:

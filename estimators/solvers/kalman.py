@@ -17,7 +17,7 @@ Source: P. D. Groves 2013, sections 3.2 and 3.4.3.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from math import hypot
 from typing import ClassVar
 
@@ -261,21 +261,26 @@ class KalmanEstimator(Solver):
         if used is None:
             self._whole = self._whole and rule is None  # otherwise it is so for the run
             return False
+        if rule is None:
+            for m, row in zip(measurements, used, strict=True):
+                self._note(m, row[NIS], row[SIZE], diagnostics)
+            return True
+        noted = self._reporter()
         for m, row in zip(measurements, used, strict=True):
             if row[NIS] == REJECTED:
                 flagged.append((m.instrument, m.time))
                 continue
+            noted(m.instrument, row)
             size = row[SIZE]
-            if rule is not None:
-                self._noted(m.instrument, row)
-                size = size if size == size else hypot(*row[INNOVATION : INNOVATION + len(m.value)])
+            if size != size:
+                size = hypot(*row[INNOVATION : INNOVATION + len(m.value)])
             self._note(m, row[NIS], size, diagnostics)
         return True
 
-    def _noted(self, name: str, row: Sequence[float]) -> None:
-        """Report what a kernel chose for an instrument."""
+    def _reporter(self) -> Callable[[str, Sequence[float]], None]:
+        """What is told by `_take_step` what a kernel chose for an instrument, see `Adaptation.noted`."""
         assert self.adaptation is not None
-        self.adaptation.noted(name, row)
+        return self.adaptation.noted
 
     def _take_together(self, group: Sequence[Measurement], diagnostics: dict[str, float | Array]) -> bool:
         """Use the measurements of a group; False if they have to be taken one by one."""
