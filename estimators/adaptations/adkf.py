@@ -9,10 +9,11 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from simnav.compiled import kernel
+from simnav.estimators.algebra.direct_update import normalised_square
 from simnav.types import Array, Instruments
 
 from .base import Innovation
-from .noise import RULE, NoiseAdaptation, Posterior, copied, normalised_square
+from .noise import RULE, NoiseAdaptation, Posterior, copied
 from .robust import igg3
 
 __all__ = ["FACTORS", "AdaptiveFactor", "adkf_noise", "exponential", "three_segment", "two_segment"]

@@ -8,11 +8,12 @@ import numpy as np
 
 from simnav.compiled import kernel
 from simnav.estimators.algebra.chi_square import chi_square_limits
+from simnav.estimators.algebra.direct_update import normalised_square
 from simnav.estimators.models.channels import ChannelDatasheet
 from simnav.types import Array, Instruments
 
 from .base import Innovation
-from .noise import REJECT, RULE, TIME, NoiseAdaptation, copied, normalised_square
+from .noise import REJECT, RULE, TIME, NoiseAdaptation, copied
 
 __all__ = ["ChiSquareGate", "gate_noise"]
 

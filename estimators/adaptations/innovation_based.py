@@ -8,10 +8,11 @@ from typing import Literal
 import numpy as np
 
 from simnav.compiled import kernel
+from simnav.estimators.algebra.direct_update import posterior
 from simnav.types import Array
 
 from .base import Innovation
-from .noise import RULE, EstimatedNoise, Scope, bound, copied, posterior
+from .noise import RULE, EstimatedNoise, Scope, bound, copied
 
 __all__ = ["FixedWindow", "InnovationBased", "adaptive_window", "innovation_noise"]
 

@@ -10,8 +10,7 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from simnav.compiled import Kernel, kernel
-from simnav.estimators.algebra.cholesky import factorise, solve_factor
-from simnav.estimators.algebra.joseph import joseph_update
+from simnav.estimators.algebra.direct_update import posterior
 from simnav.estimators.models.base import SIGMA, SIZE
 from simnav.types import KINDS, Array, Instruments
 
@@ -20,7 +19,7 @@ from .prediction import PredictionTest
 
 __all__ = [
     "INFLATION", "OWN", "REJECT", "RULE", "TIME", "EstimatedNoise", "NoiseAdaptation", "Posterior", "Scope",
-    "WeightedNoise", "bound", "copied", "normalised_square", "posterior", "scale", "scaled",
+    "WeightedNoise", "bound", "copied", "scale", "scaled",
 ]  # fmt: skip
 
 #: Signature of a kernel that chooses a noise, from settings and memory of an instrument (which it updates), what is
@@ -32,70 +31,6 @@ RULE = "f8(f8[::1], f8[::1], f8[::1], f8[::1], f8[:, ::1], f8[:, ::1], f8[:, ::1
 TIME, INFLATION, REJECT, OWN = range(4)
 
 Scope = Literal["fixes", "all"]
-
-
-@kernel("f8(f8[::1], f8[:, ::1], f8[:, ::1], f8[::1], f8[:, ::1])")
-def posterior(innovation: Array, predicted: Array, noise: Array, residual: Array, after: Array) -> float:
-    """Residual and covariance of the prediction after an update, in the m components of the measurement.
-
-    With ``S = H P H' + R`` they are ``v - H P H' S^-1 v`` and ``H P+ H' = H P H' - H P H' S^-1 H P H'``. This is the
-    update of a state of m components that is observed directly, so the kernel of the solver computes it.
-
-    Parameters
-    ----------
-    innovation : (m,) array
-        v, the measurement minus its prediction.
-    predicted, noise : (m, m) arrays
-        H P H' (covariance of the prediction) and R (covariance of the measurement noise).
-    residual : (m,) array
-        Overwritten with the residual after the update.
-    after : (m, m) array
-        Overwritten with H P+ H'.
-
-    Returns
-    -------
-    float
-        Normalised innovation squared ``v' S^-1 v``; -1 if S is singular, and then there is no update.
-    """
-    m = innovation.size
-    if m == 1:  # the same operations in the same order, without arrays
-        prior, total = predicted[0, 0], predicted[0, 0] + noise[0, 0]
-        residual[0], after[0, 0] = innovation[0], prior
-        if not total > 1e-14 * total:
-            return -1.0
-        root = sqrt(total)
-        gain, white = prior / root / root, float(innovation[0] / root)
-        residual[0] = innovation[0] - gain * innovation[0]
-        after[0, 0] = prior + ((gain * total - prior) * gain - gain * prior)
-        return white * white
-    spread = np.empty((m, m))
-    for i in range(m):
-        for j in range(m):
-            after[i, j] = predicted[i, j]
-            spread[i, j] = predicted[i, j] + noise[i, j]
-    nis = joseph_update(after, predicted, spread, innovation, residual)
-    for i in range(m):
-        residual[i] = innovation[i] - residual[i] if nis >= 0.0 else innovation[i]
-    return nis
-
-
-@kernel("f8(f8[::1], f8[:, ::1], f8[:, ::1])")
-def normalised_square(innovation: Array, predicted: Array, noise: Array) -> float:
-    """Normalised innovation squared ``v' S^-1 v`` with ``S = H P H' + R``; -1 if S is singular."""
-    m = innovation.size
-    L, white = np.empty((m, m)), np.empty(m)
-    for i in range(m):
-        for j in range(m):
-            L[i, j] = predicted[i, j] + noise[i, j]
-    if not factorise(L, m, 1e-14, white):
-        return -1.0
-    for i in range(m):
-        white[i] = innovation[i]
-    solve_factor(L, m, white)
-    nis = 0.0
-    for i in range(m):
-        nis += white[i] * white[i]
-    return nis
 
 
 @kernel("void(f8[:, ::1], f8, f8, f8, f8[:, ::1])")

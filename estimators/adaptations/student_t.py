@@ -6,10 +6,11 @@ import numpy as np
 
 from simnav.compiled import kernel
 from simnav.estimators.algebra.cholesky import factorise, invert_factor
+from simnav.estimators.algebra.direct_update import posterior
 from simnav.types import Array
 
 from .base import Innovation
-from .noise import RULE, WeightedNoise, posterior
+from .noise import RULE, WeightedNoise
 
 __all__ = ["StudentT", "normalised_trace", "student_t_noise", "student_weight"]
 

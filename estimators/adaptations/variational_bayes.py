@@ -7,10 +7,11 @@ from math import sqrt
 import numpy as np
 
 from simnav.compiled import kernel
+from simnav.estimators.algebra.direct_update import posterior
 from simnav.types import Array
 
 from .base import Innovation
-from .noise import RULE, EstimatedNoise, Scope, posterior
+from .noise import RULE, EstimatedNoise, Scope
 
 __all__ = ["VariationalBayes", "variational_bayes_noise", "variational_noise"]
 

@@ -14,8 +14,8 @@ from math import radians
 import numpy as np
 
 from simnav.estimators.adaptations.base import Adaptation, Innovation
-from simnav.estimators.adaptations.noise import normalised_square
 from simnav.estimators.algebra.chi_square import chi_square_limits
+from simnav.estimators.algebra.direct_update import normalised_square
 from simnav.types import Array, Estimate, InitialState, Instruments
 
 from .kalman import KalmanEstimator

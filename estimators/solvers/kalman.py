@@ -28,7 +28,17 @@ from simnav.estimators.adaptations.base import Adaptation, Innovation
 from simnav.estimators.adaptations.intersection import weaken_position
 from simnav.estimators.adaptations.noise import NoiseAdaptation
 from simnav.estimators.composition import Solver
-from simnav.estimators.models.base import INNOVATION, NIS, REJECTED, SIZE, ErrorModel, Linearised, Observation, StepRule
+from simnav.estimators.models.base import (
+    INNOVATION,
+    NIS,
+    REJECTED,
+    SIGMA,
+    SIZE,
+    ErrorModel,
+    Linearised,
+    Observation,
+    StepRule,
+)
 from simnav.estimators.models.channels import owners, summary
 from simnav.estimators.models.coupling import by_source
 from simnav.estimators.models.stated_sigmas import with_stated_sigmas
@@ -273,7 +283,7 @@ class KalmanEstimator(Solver):
             noted(m.instrument, row)
             size = row[SIZE]
             if size != size:
-                size = hypot(*row[INNOVATION : INNOVATION + len(m.value)])
+                size = hypot(*row[INNOVATION:SIGMA])
             self._note(m, row[NIS], size, diagnostics)
         return True
 
