@@ -68,13 +68,22 @@ class Kernel(Generic[Parameters, Returned]):
         its first call. Small helpers that other kernels call have none; a call from Python runs them as Python.
     fastmath : bool or set of str
         Permitted changes of floating-point arithmetic; passed to Numba.
+    borrows : bool
+        See `kernel`.
     """
 
-    def __init__(self, function: Callable[Parameters, Returned], signature: str | None, fastmath: bool | set[str]):
+    def __init__(
+        self,
+        function: Callable[Parameters, Returned],
+        signature: str | None,
+        fastmath: bool | set[str],
+        borrows: bool = False,
+    ):
         assert isinstance(function, types.FunctionType)
         self.function: types.FunctionType = function
         self.signature = signature
         self.fastmath = fastmath
+        self.borrows = borrows
         self._dispatcher: Callable[..., Any] | None = None
         self._entry: Callable[..., Any] | None = None
         self.__name__ = function.__name__
@@ -105,11 +114,14 @@ class Kernel(Generic[Parameters, Returned]):
         import numba
         import numpy as np
 
+        from simnav.kernel_files import call_by_symbol, compile_with
+
         text = [str(sys.implementation.cache_tag), numba.__version__, np.__version__]
-        text += _code_text(Kernel._jit.__code__)  # how kernels are compiled
+        for how in (Kernel._jit, compile_with, call_by_symbol):  # they are compiled
+            text += _code_text(how.__code__)
         for k in self.tree():
             fastmath = sorted(k.fastmath) if isinstance(k.fastmath, set) else k.fastmath
-            text += [k.__module__, k.__qualname__, f"{k.signature!r} {fastmath!r}"]
+            text += [k.__module__, k.__qualname__, f"{k.signature!r} {fastmath!r} {k.borrows!r}"]
             # The code in memory is hashed, not the file: a file may be edited after it was imported.
             text += _code_text(k.function.__code__)
             text.append(repr(k.function.__defaults__))
@@ -173,18 +185,20 @@ class Kernel(Generic[Parameters, Returned]):
         function.__module__ = self.__module__
         options: dict[str, Any] = {"nopython": True, "cache": directory is not None, "error_model": "numpy"}
         options["fastmath"] = self.fastmath
-        options["no_cfunc_wrapper"] = True
+        if self.borrows:
+            options["_nrt"] = False  # the runtime of Numba, which counts references
         if self.signature is None:
-            options["no_cpython_wrapper"] = True
             # A helper is inlined: this is faster by a sixth, and keeps results equal to the last bit. Without inlining
             # a helper would exist once in its own library and again in the library of each caller, optimised
             # differently, and the linker uses the copy that is loaded first. With fast arithmetic a result would then
             # depend on whether its kernels came from the cache.
             options["forceinline"] = True
+            options["no_cpython_wrapper"] = True
+        options["no_cfunc_wrapper"] = True  # C never calls a kernel, and Python no helper
         fast = any(k.fastmath for k in self.tree())
         previous = config.CACHE_DIR, config.SLP_VECTORIZE
         # Sums that are written side by side become vector instructions. Each keeps its order; with fast arithmetic it
-        # would not, and results would change.
+        # would not, and results would change. Helpers have none of their own (`simnav.kernel_files.compile_with`).
         config.CACHE_DIR, config.SLP_VECTORIZE = directory or previous[0], not fast
         try:
             compiled: Callable[..., Any] = numba.jit(**options)(function)
@@ -290,7 +304,7 @@ def ready(array: Array) -> Array:
 
 
 def kernel(
-    signature: str | None = None, *, fastmath: bool | set[str] = False
+    signature: str | None = None, *, fastmath: bool | set[str] = False, borrows: bool = False
 ) -> Callable[[Callable[Parameters, Returned]], Kernel[Parameters, Returned]]:
     """Make a function a `Kernel`.
 
@@ -301,10 +315,13 @@ def kernel(
         `simnav warmup` can compile it in advance. Helpers that only kernels call need none.
     fastmath : bool or set of str
         Permitted changes of floating-point arithmetic; passed to Numba.
+    borrows : bool
+        True for a function that makes no array, and returns none but its arguments. Numba then counts no references to
+        arrays. For a short helper in a loop the count may take longer than the work.
     """
 
     def wrap(function: Callable[Parameters, Returned]) -> Kernel[Parameters, Returned]:
-        k = Kernel(function, signature, fastmath)
+        k = Kernel(function, signature, fastmath, borrows)
         _kernels.append(k)
         return k
 

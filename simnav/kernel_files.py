@@ -15,12 +15,13 @@ import hashlib
 import io
 import os
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, BinaryIO
 
 from llvmlite import binding
 from numba.core import base, imputils, typeinfer
+from numba.core import config as numba_config
 from numba.core.caching import FunctionCache, IndexDataCacheFile
 from numba.core.runtime.nrt import rtsys
 
@@ -33,6 +34,7 @@ _Files: Any = IndexDataCacheFile  # Numba has no annotations
 _Cache: Any = FunctionCache
 _user_function: Any = imputils.user_function
 _Overloads: Any = base.OverloadSelector
+config: Any = numba_config
 
 
 class WithoutCompiler(_Cache):  # type: ignore[misc]
@@ -94,7 +96,7 @@ def compile_with(dispatcher: Any, signature: str | None) -> None:
     dispatcher : numba.core.dispatcher.Dispatcher
         A function decorated by `numba.jit` without a signature.
     signature : str or None
-        Numba signature. None: Numba compiles the function later, for each caller.
+        Numba signature. None: Numba compiles the function later, for each caller, as a helper.
     """
     cache = getattr(dispatcher, "_cache", None)
     if cache is None:  # NUMBA_DISABLE_JIT: it is the plain function
@@ -102,7 +104,20 @@ def compile_with(dispatcher: Any, signature: str | None) -> None:
     if hasattr(cache, "_cache_file"):
         cache._cache_file.__class__ = WithDigests  # Numba has no public way to choose these classes
         cache.__class__ = WithoutCompiler
-    if signature is not None:
+    if signature is None:
+        # Vector instructions for statements side by side are left to the callers. A loop over a helper that has them
+        # could not become a loop of vector instructions; and the cache of a helper is that of all its callers.
+        compile_for: Callable[[Any], Any] = dispatcher.compile
+
+        def compile_plainly(types: Any) -> Any:
+            previous, config.SLP_VECTORIZE = config.SLP_VECTORIZE, False
+            try:
+                return compile_for(types)
+            finally:
+                config.SLP_VECTORIZE = previous
+
+        dispatcher.compile = compile_plainly
+    else:
         with typeinfer.register_dispatcher(dispatcher):  # as `numba.jit` with a signature does
             dispatcher.compile(signature)
         dispatcher.disable_compile()

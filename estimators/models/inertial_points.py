@@ -25,7 +25,8 @@ import numpy as np
 from simnav.compiled import kernel
 from simnav.geometry.earth import radii_scalar
 from simnav.geometry.rotation import rotate_left, rotation_coefficients
-from simnav.strapdown import mechanize_step, sample_from_motion
+from simnav.inverse_strapdown import sample_from_motion
+from simnav.strapdown import mechanize_step
 from simnav.types import Array, Measurement
 
 from .inertial import InertialModel

@@ -4,9 +4,9 @@ An oracle must not be beaten by more than chance, so it has to know what nobody 
 IMU that is how it moves: a model of its motion is right for some manoeuvres and wrong for others, and a row whose model
 happens to suit the manoeuvre beats an oracle with another one. So the oracle is told the motion. It gets the samples of
 an inertial unit that is level and has no errors but white noise, of navigation grade. They are made from the truth by
-inverting the mechanization (`simnav.strapdown.increments`). Position, velocity and heading at the start, and the errors
-of all aiding instruments, stay unknown. Without the noise the filter would become so sure of the velocity that the
-second order of a heading error of a degree, a millimetre a second, would make it inconsistent.
+inverting the mechanization (`simnav.inverse_strapdown.increments`). Position, velocity and heading at the start, and
+the errors of all aiding instruments, stay unknown. Without the noise the filter would become so sure of the velocity
+that the second order of a heading error of a degree, a millimetre a second, would make it inconsistent.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ import numpy as np
 
 from simnav.geometry.earth import relative_position
 from simnav.geometry.rotation import wrap_angle
+from simnav.inverse_strapdown import increments
 from simnav.recording import Recording
-from simnav.strapdown import increments
 from simnav.streams import stream
 from simnav.types import ImuDatasheet, ImuSamples, InitialState, Instruments, TriadDatasheet
 

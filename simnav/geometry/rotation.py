@@ -29,6 +29,7 @@ __all__ = [
     "rotation_vector_from_dcm",
     "rpy_from_dcm",
     "skew",
+    "small_rotation_coefficients",
     "wrap_angle",
     "wrap_scalar",
 ]
@@ -253,13 +254,19 @@ def cross(a0: float, a1: float, a2: float, b0: float, b1: float, b2: float) -> t
 
 
 @kernel()
+def small_rotation_coefficients(angle2: float) -> tuple[float, float]:
+    """`rotation_coefficients` by their series, exact to rounding for ``angle2`` below 1e-3."""
+    # Reciprocals are folded when compiled: a division costs as much as five products.
+    a = 1.0 - angle2 * (1.0 / 6.0 - angle2 * (1.0 / 120.0 - angle2 * (1.0 / 5040.0)))
+    b = 0.5 - angle2 * (1.0 / 24.0 - angle2 * (1.0 / 720.0 - angle2 * (1.0 / 40320.0)))
+    return a, b
+
+
+@kernel()
 def rotation_coefficients(angle2: float) -> tuple[float, float]:
     """The coefficients sin(x)/x and (1 - cos(x))/x^2 for x^2 = ``angle2``, exact to rounding."""
     if angle2 < 1e-3:
-        # Reciprocals are folded when compiled: a division costs as much as five products.
-        a = 1.0 - angle2 * (1.0 / 6.0 - angle2 * (1.0 / 120.0 - angle2 * (1.0 / 5040.0)))
-        b = 0.5 - angle2 * (1.0 / 24.0 - angle2 * (1.0 / 720.0 - angle2 * (1.0 / 40320.0)))
-        return a, b
+        return small_rotation_coefficients(angle2)
     angle = sqrt(angle2)
     return sin(angle) / angle, (1.0 - cos(angle)) / angle2
 

@@ -27,6 +27,7 @@ import numpy as np
 from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
 from simnav.compiled import kernel, ready
+from simnav.normal_variates import NormalVariates
 from simnav.sensors.imu_effects import Effects, ImuEffects
 from simnav.sensors.imu_models import GRADES, Grade, ImuModel, imu_model
 from simnav.sensors.instrument import figures_of, times_datasheet
@@ -335,19 +336,16 @@ class _Triad:
         self.density = spec.random_walk
         self.range, self.step = spec.range, spec.quantization
         self.residual = np.zeros(3)
-        self._rng = stream(seed, "instrument", "imu", name, "random_walk")
-
+        self._noise = NormalVariates(stream(seed, "instrument", "imu", name, "random_walk"))
         self._variates = np.zeros((_CHUNK, 3))
 
     def ahead(self, variates: Array, until: float) -> tuple[Array, int, Array, int]:
         """Fill the (n, 3) variates of `sense`; return both bias tables, each with the number of its first row."""
         if self.density > 0.0:
-            self._rng.standard_normal(out=variates)
+            self._noise.fill(variates)
         return *self.instability.table(until), *self.walk.table(until)
 
-    def sense(self, ideal: Array, time: Array, interval: Array, overwrite: bool) -> Array:
-        ideal = ready(ideal)
-        out = ideal if overwrite else np.empty(ideal.shape)
+    def sense(self, ideal: Array, time: Array, interval: Array, out: Array) -> None:
         until = float(time[-1])
         triad: Triad = (self.matrix, self.bias, self.density, self.range, self.step)
         in_run = (*self.instability.table(until), self.instability.per_second)
@@ -355,11 +353,10 @@ class _Triad:
         for a in range(0, len(time), _CHUNK):
             part = slice(a, a + _CHUNK)
             if self.density > 0.0:
-                self._rng.standard_normal(out=self._variates[: len(time[part])])
+                self._noise.fill(self._variates[: len(time[part])])
             triad_errors(
                 ideal[part], self._variates, out[part], time[part], interval[part], triad, in_run, walk, self.residual
             )  # fmt: skip
-        return out
 
 
 class Imu:
@@ -401,9 +398,9 @@ class Imu:
         if self.effects is not None:
             ideal = self.effects.apply(ideal)
         time, interval = ready(ideal.time), ready(ideal.interval)
-        return ImuSamples(
-            ideal.time,
-            ideal.interval,
-            self.gyroscope.sense(ideal.angular_rate, time, interval, overwrite),
-            self.accelerometer.sense(ideal.specific_force, time, interval, overwrite),
-        )
+        both = ready(ideal.angular_rate), ready(ideal.specific_force)
+        # One piece of memory: in a long run the system gives it in large pages.
+        rate, force = both if overwrite else np.empty((2, len(time), 3))
+        self.gyroscope.sense(both[0], time, interval, rate)
+        self.accelerometer.sense(both[1], time, interval, force)
+        return ImuSamples(ideal.time, ideal.interval, rate, force)

@@ -35,6 +35,8 @@ _COLUMNS: Mapping[str, tuple[tuple[str, float], ...]] = {
 _SIGMAS = [(f"sigma_{name}_{unit}", factor) for name, (unit, factor) in zip(
     COMPONENTS, [("m", 1.0)] * 3 + [("m_s", 1.0)] * 3 + [("deg", _RADIAN)] * 3, strict=True
 )]  # fmt: skip
+#: Columns that have limits, and the largest size.
+_LARGEST = {"latitude_deg": 90.0, "longitude_deg": 360.0, "pitch_deg": 90.0}
 _TOLERANCE = 1e-6
 #: Forward-left-up to forward-starboard-down; its own inverse.
 _FLIP = np.diag([1.0, -1.0, -1.0])
@@ -110,7 +112,15 @@ def read_estimates(path: Path, start: InitialState) -> _Read:
 def _column(table: Table, name: str, factor: float) -> Array:
     if name not in table.names:
         return np.full(len(table), np.nan)
-    return factor * table.column(name)[1]
+    value = table.column(name)[1]
+    high = _LARGEST.get(name, np.inf)
+    low = 0.0 if name.startswith("sigma_") else -high
+    wrong = np.flatnonzero((value < low) | (value > high))
+    if wrong.size:
+        k = wrong[0]
+        right = "0 or more" if high == np.inf else f"between {low:g} and {high:g}"
+        raise LogError(f"{table.source}, line {table.line[k]}: {name} = {value[k]:g} must be {right}")
+    return factor * value
 
 
 def _checked(table: Table, name: str, states: Array, sigmas: Array | None) -> _Read:

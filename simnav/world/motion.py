@@ -2,8 +2,9 @@
 
 For each sample it executes the manoeuvre table (guidance), advances speed, yaw rate and flight-path angle through
 critically damped lags, advances the wave components by their encounter phase, composes velocity and attitude, and
-computes the sample of ideal instruments by the inverse strapdown equations (`simnav.strapdown.sample_from_motion`). So
-truth and samples agree up to rounding.
+computes the sample of ideal instruments by the inverse strapdown equations (`simnav.inverse_strapdown`). So truth and
+samples agree up to rounding. This is done for blocks of 64 samples, one part after the other: a part is then a short
+loop, whose iterations the processor overlaps, or a loop of vector instructions.
 """
 
 from __future__ import annotations
@@ -13,12 +14,27 @@ from math import atan2, cos, exp, inf, sin
 import numpy as np
 
 from simnav.compiled import Array, Flags, Integers, kernel
-from simnav.declared_process import oscillation
 from simnav.geometry.rotation import wrap_scalar
-from simnav.strapdown import sample_from_motion
+from simnav.inverse_strapdown import AXES, BLOCK, BLOCK_COLUMNS, INTERVAL, POSITION, VELOCITY, ideal_samples
+from simnav.strapdown import Triple
 from simnav.world.manoeuvres import ACCELERATE, COLUMNS, DEPTH, HOLD, TURN, WAYPOINTS, ZIGZAG
 from simnav.world.manoeuvring.dynamics import HULL, RATE, RATE_CHANGE, SAIL, SPEED, SPEED_CHANGE, SWAY, sail
-from simnav.world.sea import ROWS, YAW
+from simnav.world.motion_block import (
+    ANGLES,
+    BLOCK_ROWS,
+    BOW,
+    COURSE,
+    DEPTHS,
+    FLOW,
+    body_rate,
+    cosine_sine,
+    matrix,
+    orient,
+    tap_at,
+    wrapped,
+)
+from simnav.world.sea import ROWS
+from simnav.world.seaway import Responses, Transitions, answers, transitions, wave_responses
 
 __all__ = [
     "DIVE",
@@ -71,50 +87,14 @@ TAP_COLUMNS = 14
 #: Rows of the phases of waves, and columns of an eddy.
 PHASES, EDDY_COLUMNS = 3, 6
 
-#: What waves cause at the surface: velocity north, east, down [m/s]; slopes that roll and pitch follow from [rad].
-Responses = tuple[float, float, float, float, float, float, float]
-#: Velocity north-east-down [m/s], direction cosine matrix of the body axes by rows, roll and pitch [rad].
-Composed = tuple[
-    tuple[float, float, float],
-    tuple[float, float, float, float, float, float, float, float, float],
-    float,
-    float,
-]
+#: Without waves and current: speed, yaw rate, heading, its cosine and sine, path angle, its cosine and sine, depth,
+#: sway velocity.
+Course = tuple[float, float, float, float, float, float, float, float, float, float]
+#: Velocity north-east-down [m/s], roll, pitch [rad], cosine and sine of the heading of the bow.
+Composed = tuple[Triple, float, float, float, float]
 
 
-@kernel(fastmath={"reassoc", "contract", "nsz", "arcp"})
-def _waves(phase: Array, table: Array, north: float, east: float, dt: float) -> Responses:
-    """Advance the phases of the wave components by one step, and sum the seven responses.
-
-    ``north`` and ``east`` are the velocity of the vessel through the water [m/s], ``dt`` is the length of the step [s].
-    """
-    # Two loops: the second only reads the rows that the first writes. So the compiler can vectorise both without a
-    # check at run time whether the rows overlap.
-    for i in range(phase.shape[1]):
-        rate = table[0, i] - table[1, i] * north - table[2, i] * east
-        d = rate * dt
-        d2 = d * d
-        # Encounter phases advance by less than 0.2 rad a sample; the series are exact to rounding there.
-        sd = d * (1.0 - d2 / 6.0 * (1.0 - d2 / 20.0 * (1.0 - d2 / 42.0 * (1.0 - d2 / 72.0))))
-        cd = 1.0 - d2 / 2.0 * (1.0 - d2 / 12.0 * (1.0 - d2 / 30.0 * (1.0 - d2 / 56.0 * (1.0 - d2 / 90.0))))
-        c, s = phase[0, i], phase[1, i]
-        phase[0, i] = c * cd - s * sd
-        phase[1, i] = s * cd + c * sd
-        phase[2, i] = rate
-    s0 = s1 = s2 = s3 = s4 = s5 = s6 = 0.0
-    for i in range(phase.shape[1]):
-        c, s, rate = phase[0, i], phase[1, i], phase[2, i]
-        s0 += rate * (table[4, i] * c - table[3, i] * s)
-        s1 += rate * (table[6, i] * c - table[5, i] * s)
-        s2 += rate * (table[8, i] * c - table[7, i] * s)
-        s3 += table[9, i] * c + table[10, i] * s
-        s4 += table[11, i] * c + table[12, i] * s
-        s5 += table[13, i] * c + table[14, i] * s
-        s6 += table[15, i] * c + table[16, i] * s
-    return s0, s1, s2, s3, s4, s5, s6
-
-
-@kernel()
+@kernel(borrows=True)
 def _lag(x: float, dx: float, command: float, dt: float, tau: float, decay: float) -> tuple[float, float]:
     """Exact step of a critically damped second-order lag under a constant command.
 
@@ -126,13 +106,7 @@ def _lag(x: float, dx: float, command: float, dt: float, tau: float, decay: floa
     return command + (y + b * dt) * decay, (dx - b * dt / tau) * decay
 
 
-@kernel()
-def _wrap(angle: float) -> float:
-    wrapped: float = angle - 2.0 * np.pi * np.floor((angle + np.pi) / (2.0 * np.pi))
-    return wrapped
-
-
-@kernel()
+@kernel(borrows=True)
 def _waypoint(points: Array, j: int, relative: float, x: Array) -> tuple[float, float]:
     """Waypoint j as distances north and east of the start of the run [m]."""
     a, b = points[j, 0], points[j, 1]
@@ -142,7 +116,7 @@ def _waypoint(points: Array, j: int, relative: float, x: Array) -> tuple[float, 
     return a, b
 
 
-@kernel()
+@kernel(borrows=True)
 def _guide(x: Array, index: Integers, p: Array, rows: Array, points: Array, time: float) -> float:
     """Execute the manoeuvre table: store the references in the state, and return the commanded yaw rate [rad/s]."""
     psi = x[PSI] + x[ERROR_HEADING] - x[TO_TRACK]
@@ -158,7 +132,6 @@ def _guide(x: Array, index: Integers, p: Array, rows: Array, points: Array, time
             index[3] = 1
             x[SEGMENT_TIME] = time
             x[SEGMENT_PSI] = x[PSI_REFERENCE]
-            x[SEGMENT_NORTH], x[SEGMENT_EAST] = x[NORTH], x[EAST]
             x[RATE_LIMIT] = p[TURN_RATE]
             if kind == ACCELERATE:
                 x[SPEED_TARGET], x[SPEED_SLEW] = rows[i, 2], rows[i, 3]
@@ -170,6 +143,7 @@ def _guide(x: Array, index: Integers, p: Array, rows: Array, points: Array, time
                 x[SEGMENT_SIGN] = 1.0
             elif kind == WAYPOINTS:
                 index[2] = int(rows[i, 2])
+                x[SEGMENT_NORTH], x[SEGMENT_EAST] = x[NORTH], x[EAST]
             elif kind == DEPTH:
                 x[DEPTH_REFERENCE], x[GAMMA_LIMIT] = rows[i, 2], rows[i, 3]
         done = time - x[SEGMENT_TIME] >= rows[i, 1] - 1e-9
@@ -216,7 +190,7 @@ def _guide(x: Array, index: Integers, p: Array, rows: Array, points: Array, time
                 passed = (north - a) * (a - from_a) + (east - b) * (b - from_b) > 0.0
                 if (a - north) ** 2 + (b - east) ** 2 > rows[i, 4] ** 2 and not passed:
                     # The vessel steers for the waypoint itself: there is no correction back to a track.
-                    x[PSI_REFERENCE] = psi + _wrap(atan2(b - east, a - north) - x[TO_TRACK] - psi)
+                    x[PSI_REFERENCE] = psi + wrapped(atan2(b - east, a - north) - x[TO_TRACK] - psi)
                     break
                 index[2] += 1
             done = index[2] >= int(rows[i, 3])
@@ -236,87 +210,61 @@ def _guide(x: Array, index: Integers, p: Array, rows: Array, points: Array, time
     return rate_command
 
 
-@kernel()
-def _cosine_sine(angle: float) -> tuple[float, float]:
-    """Cosine and sine. For small angles, as roll and pitch mostly are, by their series, exact to rounding."""
-    if abs(angle) > 0.3:
-        return cos(angle), sin(angle)
-    a = angle * angle
-    c = 1.0 - a * (1 / 2 - a * (1 / 24 - a * (1 / 720 - a * (1 / 40320 - a * (1 / 3628800 - a * (1 / 479001600))))))
-    s = 1.0 - a * (
-        1 / 6 - a * (1 / 120 - a * (1 / 5040 - a * (1 / 362880 - a * (1 / 39916800 - a * (1 / 6227020800)))))
-    )
-    return c, s * angle
-
-
-@kernel()
-def _compose(x: Array, p: Array, waves: Responses) -> Composed:
-    """Velocity, attitude, roll and pitch of the state, with the responses to the waves added."""
+@kernel(borrows=True)
+def _compose(course: Course, water: tuple[float, float], yaw_answer: float, p: Array, waves: Responses) -> Composed:
+    """Velocity, roll, pitch, and cosine and sine of the heading of the bow, with current and waves added."""
     w0, w1, w2, w3, w4, w5, w6 = waves
-    cp, sp, cg, sg = x[COS_PSI], x[SIN_PSI], x[COS_GAMMA], x[SIN_GAMMA]
+    u, r, psi, cp, sp, gamma, cg, sg, depth, sway = course
     shade, flow = 1.0, 1.0
     # The bow yaws about the course that the vessel keeps.
     ch, sh = cp, sp
-    if x[DEPTH_CALM] > 0.0:
-        shade = exp(-p[ATTENUATION] * x[DEPTH_CALM])
-        flow = max(0.0, 1.0 - p[SHEAR] * x[DEPTH_CALM])
+    if depth > 0.0:
+        shade = exp(-p[ATTENUATION] * depth)
+        flow = max(0.0, 1.0 - p[SHEAR] * depth)
     if p[OSCILLATORS] > 0.0:
-        yaw = x[PSI] + shade * x[YAW_ANSWER]
+        yaw = psi + shade * yaw_answer
         ch, sh = cos(yaw), sin(yaw)
-    v0 = x[U] * cg * cp + flow * x[WATER_NORTH] + shade * w0
-    v1 = x[U] * cg * sp + flow * x[WATER_EAST] + shade * w1
-    v2 = -x[U] * sg + shade * w2
-    roll = shade * (w3 * sp - w4 * cp) - p[HEEL] * x[U] * x[R] * (1.0 / 9.81)
-    pitch = x[GAMMA] + shade * (w5 * cp + w6 * sp)
-    cr, sr = _cosine_sine(roll)
-    ct, st = _cosine_sine(pitch)
+    v0 = u * cg * cp + flow * water[0] + shade * w0
+    v1 = u * cg * sp + flow * water[1] + shade * w1
+    v2 = -u * sg + shade * w2
+    roll = shade * (w3 * sp - w4 * cp) - p[HEEL] * u * r * (1.0 / 9.81)
+    pitch = gamma + shade * (w5 * cp + w6 * sp)
+    if p[HAS_HULL] > 0.0:
+        v0, v1 = v0 - sway * sp, v1 + sway * cp
+    return (v0, v1, v2), roll, pitch, ch, sh
+
+
+@kernel(borrows=True)
+def _course(x: Array) -> Course:
+    """The course of a state."""
     return (
-        (v0, v1, v2),
-        (
-            ct * ch, sr * st * ch - cr * sh, cr * st * ch + sr * sh,
-            ct * sh, sr * st * sh + cr * ch, cr * st * sh - sr * ch,
-            -st, sr * ct, cr * ct,
-        ),
-        roll,
-        pitch,
+        x[U], x[R], x[PSI], x[COS_PSI], x[SIN_PSI], x[GAMMA], x[COS_GAMMA], x[SIN_GAMMA], x[DEPTH_CALM],
+        x[HULL_STATE + SWAY],
     )  # fmt: skip
 
 
-@kernel()
-def _oscillate(x: Array, p: Array, k: int, force: float, dt: float) -> float:
-    """Exact step of oscillator k under a force that is linear within the step. Return its new value.
-
-    With the force a + b t the equation y'' + 2 z w y' + w^2 y = w^2 (a + b t) has the solution a + b t - 2 z b / w, to
-    which the free oscillation is added.
-    """
-    at = ANSWERS + 3 * k
-    w, z = p[OSCILLATORS + 2 * k], p[OSCILLATORS + 2 * k + 1]
-    slope = (force - x[at + 2]) / dt if dt > 0.0 else 0.0
-    lag = 2.0 * z * slope / w
-    y, rate = x[at] - (x[at + 2] - lag), x[at + 1] - slope
-    a, b, c, d = oscillation(dt, w, z)
-    x[at], x[at + 1], x[at + 2] = a * y + b * rate + force - lag, c * y + d * rate + slope, force
-    value: float = x[at]
-    return value
+@kernel(borrows=True)
+def _course_at(block: Array, k: int) -> Course:
+    """The course at the end of interval k."""
+    return (
+        block[COURSE, k], block[COURSE + 1, k], block[COURSE + 2, k], block[COURSE + 3, k], block[COURSE + 4, k],
+        block[COURSE + 5, k], block[COURSE + 6, k], block[COURSE + 7, k], block[DEPTHS, k], block[DEPTHS + 1, k],
+    )  # fmt: skip
 
 
-@kernel()
-def _answer(x: Array, p: Array, waves: Responses, phase: Array, table: Array, dt: float) -> Responses:
-    """The responses of the oscillators to the waves at the vessel, in the form of `_waves`; yaw stays in the state."""
-    w0, w1, w2, w3, w4, w5, w6 = waves
-    cp, sp = x[COS_PSI], x[SIN_PSI]
-    first = second = 0.0
-    for i in range(phase.shape[1]):
-        first += table[YAW, i] * phase[0, i]
-        second += table[YAW + 1, i] * phase[0, i]
-    heave = _oscillate(x, p, 0, w2, dt)
-    roll = _oscillate(x, p, 1, w3 * sp - w4 * cp, dt)
-    pitch = _oscillate(x, p, 2, w5 * cp + w6 * sp, dt)
-    _oscillate(x, p, 3, first * (cp * cp - sp * sp) - second * 2.0 * cp * sp, dt)
-    return w0, w1, heave, roll * sp, -roll * cp, pitch * cp, pitch * sp
+@kernel(borrows=True)
+def _through_water(p: Array, course: Course) -> tuple[float, float]:
+    """Velocity through the water, north and east [m/s], without the waves."""
+    u, _, _, cp, sp, _, cg, _, _, sway = course
+    ahead = u * cg
+    north, east = ahead * cp, ahead * sp
+    if p[HAS_HULL] > 0.0:
+        north -= sway * sp
+        east += sway * cp
+    return north, east
 
 
-@kernel()
+@kernel(borrows=True)
 def _water(x: Array, p: Array, eddies: Array, time: float) -> None:
     """Store the velocity of the surface water at the vessel's position in the state."""
     north, east = p[CURRENT_N], p[CURRENT_E]
@@ -327,7 +275,7 @@ def _water(x: Array, p: Array, eddies: Array, time: float) -> None:
     x[WATER_NORTH], x[WATER_EAST] = north, east
 
 
-@kernel()
+@kernel(borrows=True)
 def _sail(x: Array, p: Array, rate_command: float, time: float, decay: tuple[float, float]) -> None:
     """Advance speed, sway, yaw rate and heading of a hull with three degrees of freedom by one sample."""
     dt, h = p[DT], x[HULL_STATE:STATE]
@@ -340,47 +288,41 @@ def _sail(x: Array, p: Array, rate_command: float, time: float, decay: tuple[flo
     )  # fmt: skip
 
 
-@kernel()
-def _drifted(x: Array, composed: Composed) -> Composed:
-    """The same with the sway velocity."""
-    v, c, roll, pitch = composed
-    sway = x[HULL_STATE + SWAY]
-    return (v[0] - sway * x[SIN_PSI], v[1] + sway * x[COS_PSI], v[2]), c, roll, pitch
-
-
 @kernel("void(f8[::1], f8[::1], f8[:, ::1], f8[:, ::1], f8[:, ::1])")
 def initialise(x: Array, p: Array, phase: Array, table: Array, eddies: Array) -> None:
     """Complete the state at time 0: velocity and attitude with the waves and the current of that time."""
     _water(x, p, eddies, 0.0)
     x[COS_PSI], x[SIN_PSI], x[COS_GAMMA], x[SIN_GAMMA] = cos(x[PSI]), sin(x[PSI]), cos(x[GAMMA]), sin(x[GAMMA])
-    ahead = x[U] * x[COS_GAMMA]
-    w = _waves(phase, table, ahead * x[COS_PSI], ahead * x[SIN_PSI], 0.0)
+    course = _course(x)
+    north, east = _through_water(p, course)
+    w = wave_responses(phase, table, north, east, 0.0)
     if p[OSCILLATORS] > 0.0:
-        w = _answer(x, p, w, phase, table, 0.0)
-    v, c, roll, pitch = _compose(x, p, w)
+        own = p[OSCILLATORS:HAS_HULL]
+        w = answers(x[ANSWERS:HULL_STATE], own, w, course[3], course[4], phase, table, 0.0, transitions(own, 0.0))
+    v, roll, pitch, ch, sh = _compose(course, (x[WATER_NORTH], x[WATER_EAST]), x[YAW_ANSWER], p, w)
     x[V], x[V + 1], x[V + 2] = v
+    cr, sr = cosine_sine(roll)
+    ct, st = cosine_sine(pitch)
+    c = matrix(cr, sr, ct, st, ch, sh)
     for i in range(9):
         x[C + i] = c[i]
     x[ROLL], x[PITCH] = roll, pitch
 
 
-@kernel()
-def _advance_one(
-    x: Array, index: Integers, p: Array, plan: tuple[Array, Array], water: tuple[Array, Array, Array],
-    tap_time: Array, taps: Array, imu: tuple[Array, Array],
-) -> None:  # fmt: skip
-    """Advance one world by as many samples as ``imu`` has room for. The arguments are those of `advance`."""
+@kernel(borrows=True)
+def _steer(x: Array, index: Integers, p: Array, plan: tuple[Array, Array], block: Array, first: int, last: int) -> None:
+    """Guidance and the dynamics of the vessel in intervals of a block: store the course at their ends.
+
+    ``first`` and ``last`` are the number of the first interval, and that after the last one. The other arguments are
+    those of `advance`.
+    """
     rows, points = plan
-    phase, table, eddies = water
-    rate, force = imu
     dt = p[DT]
     decay_u, decay_r, decay_g = exp(-dt / p[TAU_U]), exp(-dt / p[TAU_R]), exp(-dt / p[TAU_G])
-    memory = x[MEMORY : MEMORY + 6]
-    tap = 0
-    for k in range(rate.shape[0]):
-        t0, t1 = index[0] * dt, (index[0] + 1) * dt
+    psi = x[PSI]
+    for k in range(first, last):
+        t0 = index[0] * dt
         index[0] += 1
-        # Guidance and vessel dynamics
         rate_command = _guide(x, index, p, rows, points, t0)
         step = x[SPEED_SLEW] * dt
         x[SPEED_COMMAND] = min(max(x[SPEED_TARGET], x[SPEED_COMMAND] - step), x[SPEED_COMMAND] + step)
@@ -399,42 +341,94 @@ def _advance_one(
             x[GAMMA], x[DGAMMA] = _lag(x[GAMMA], x[DGAMMA], climb, dt, p[TAU_G], decay_g)
             x[COS_GAMMA], x[SIN_GAMMA] = cos(x[GAMMA]), sin(x[GAMMA])
             x[DEPTH_CALM] += 0.5 * dt * (sink - x[U] * x[SIN_GAMMA])
-        # Waves, with the encounter frequency of the speed through the water
-        x[COS_PSI], x[SIN_PSI] = cos(x[PSI]), sin(x[PSI])
-        ahead = x[U] * x[COS_GAMMA]
-        through_north, through_east = ahead * x[COS_PSI], ahead * x[SIN_PSI]
-        if p[HAS_HULL] > 0.0:
-            through_north -= x[HULL_STATE + SWAY] * x[SIN_PSI]
-            through_east += x[HULL_STATE + SWAY] * x[COS_PSI]
-        waves = _waves(phase, table, through_north, through_east, dt)
+        if x[PSI] != psi:
+            psi = x[PSI]
+            x[COS_PSI], x[SIN_PSI] = cos(psi), sin(psi)
+        (
+            block[COURSE, k], block[COURSE + 1, k], block[COURSE + 2, k], block[COURSE + 3, k], block[COURSE + 4, k],
+            block[COURSE + 5, k], block[COURSE + 6, k], block[COURSE + 7, k], block[DEPTHS, k], block[DEPTHS + 1, k],
+        ) = _course(x)  # fmt: skip
+
+
+@kernel(borrows=True)
+def _drift(
+    x: Array, time: int, p: Array, water: tuple[Array, Array, Array], by: Transitions, block: Array, first: int,
+    last: int,
+) -> None:  # fmt: skip
+    """Add waves and current to the course in intervals of a block: velocity, roll and pitch at their ends.
+
+    ``time`` is the number of the sample at the start of the block, ``by`` moves the oscillators by a step. The other
+    arguments are those of `_steer` and `advance`.
+    """
+    phase, table, eddies = water
+    dt = p[DT]
+    swell, own = x[ANSWERS:HULL_STATE], p[OSCILLATORS:HAS_HULL]
+    for k in range(first, last):
+        course = _course_at(block, k)
+        # The encounter frequency is that of the speed through the water.
+        north, east = _through_water(p, course)
+        waves = wave_responses(phase, table, north, east, dt)
         if p[OSCILLATORS] > 0.0:
-            waves = _answer(x, p, waves, phase, table, dt)
-        _water(x, p, eddies, t1)
-        composed = _compose(x, p, waves)
-        if p[HAS_HULL] > 0.0:
-            composed = _drifted(x, composed)
-        v, c, roll, pitch = composed
-        # Ideal instruments
-        u = (x[V], x[V + 1], x[V + 2])
-        b = (x[C], x[C + 1], x[C + 2], x[C + 3], x[C + 4], x[C + 5], x[C + 6], x[C + 7], x[C + 8])
-        out = sample_from_motion(x[LATITUDE], x[HEIGHT], u, v, b, c, memory, dt)
-        rate[k, 0], rate[k, 1], rate[k, 2] = out[0], out[1], out[2]
-        force[k, 0], force[k, 1], force[k, 2] = out[3], out[4], out[5]
-        # Taps between the old state, still in x, and the new one
-        while tap < tap_time.size and (tap_time[tap] <= t1 or k == rate.shape[0] - 1):
-            _tap(taps[tap], min((tap_time[tap] - t0) / dt, 1.0), x, p, composed, out)
-            tap += 1
+            waves = answers(swell, own, waves, course[3], course[4], phase, table, dt, by)
+        _water(x, p, eddies, (time + k + 1) * dt)
+        v, roll, pitch, ch, sh = _compose(course, (x[WATER_NORTH], x[WATER_EAST]), x[YAW_ANSWER], p, waves)
+        block[VELOCITY, k + 1], block[VELOCITY + 1, k + 1], block[VELOCITY + 2, k + 1] = v
+        block[ANGLES, k + 1], block[ANGLES + 1, k + 1] = roll, pitch
+        block[BOW, k], block[BOW + 1, k] = ch, sh
+        block[FLOW, k], block[FLOW + 1, k] = x[WATER_NORTH], x[WATER_EAST]
+        x[NORTH] += 0.5 * dt * (block[VELOCITY, k] + v[0])
+        x[EAST] += 0.5 * dt * (block[VELOCITY + 1, k] + v[1])
+
+
+@kernel(borrows=True)
+def _advance_one(
+    x: Array, index: Integers, p: Array, plan: tuple[Array, Array], water: tuple[Array, Array, Array],
+    tap_time: Array, taps: Array, imu: tuple[Array, Array], block: Array,
+) -> None:  # fmt: skip
+    """Advance one world by as many samples as ``imu`` has room for. The arguments are those of `advance`."""
+    rate, force = imu
+    dt, tap = p[DT], 0
+    memory = x[MEMORY : MEMORY + 6]
+    by = transitions(p[OSCILLATORS:HAS_HULL], dt)
+    # Guidance is ahead of the waves, unless waypoints or eddies make it depend on the position.
+    ahead = water[2].shape[0] == 0
+    for i in range(plan[0].shape[0]):
+        ahead = ahead and plan[0][i, 0] != WAYPOINTS
+    for k in range(BLOCK):
+        block[INTERVAL, k] = dt
+    for start in range(0, rate.shape[0], BLOCK):
+        n = min(BLOCK, rate.shape[0] - start)
+        first = index[0]
         for i in range(3):
-            x[BODY_RATE + i] = out[i] - c[i] * out[9] - c[6 + i] * out[10]
-        x[LATITUDE] += out[6]
-        x[LONGITUDE] += out[7]
-        x[HEIGHT] += out[8]
-        x[NORTH] += 0.5 * dt * (u[0] + v[0])
-        x[EAST] += 0.5 * dt * (u[1] + v[1])
-        x[V], x[V + 1], x[V + 2] = v
+            block[VELOCITY + i, 0], block[POSITION + i, 0] = x[V + i], x[LATITUDE + i]
         for i in range(9):
-            x[C + i] = c[i]
-        x[ROLL], x[PITCH] = roll, pitch
+            block[AXES + i, 0] = x[C + i]
+        block[ANGLES, 0], block[ANGLES + 1, 0] = x[ROLL], x[PITCH]
+        for k in range(0, n, n if ahead else 1):
+            upto = n if ahead else k + 1
+            _steer(x, index, p, plan, block, k, upto)
+            _drift(x, first, p, water, by, block, k, upto)
+        orient(block, n)
+        ideal_samples(block, n, memory, rate[start : start + n], force[start : start + n])
+        # Taps between the states at both ends of an interval
+        k, last = 0, rate.shape[0] - 1
+        while tap < tap_time.size:
+            while k < n and not (tap_time[tap] <= (first + k + 1) * dt or start + k == last):
+                k += 1
+            if k == n:
+                break
+            before = x[BODY_RATE], x[BODY_RATE + 1], x[BODY_RATE + 2]
+            if k > 0:
+                before = body_rate(block, k - 1, rate[start + k - 1])
+            turning = before, body_rate(block, k, rate[start + k])
+            tap_at(taps[tap], min((tap_time[tap] - (first + k) * dt) / dt, 1.0), block, k, turning, p[SHEAR])
+            tap += 1
+        x[BODY_RATE], x[BODY_RATE + 1], x[BODY_RATE + 2] = body_rate(block, n - 1, rate[start + n - 1])
+        for i in range(3):
+            x[V + i], x[LATITUDE + i] = block[VELOCITY + i, n], block[POSITION + i, n]
+        for i in range(9):
+            x[C + i] = block[AXES + i, n]
+        x[ROLL], x[PITCH] = block[ANGLES, n], block[ANGLES + 1, n]
 
 
 @kernel(
@@ -481,6 +475,7 @@ def advance(
     phase, table, eddies = water
     tap_time, first, last, taps = wanted
     samples, rate, force = imu
+    block = np.empty((BLOCK_ROWS, BLOCK_COLUMNS))
     for w in range(active.size):
         if not active[w]:
             continue
@@ -493,33 +488,8 @@ def advance(
                 phase[w, : PHASES * c].reshape((PHASES, c)), table[w, : ROWS * c].reshape((ROWS, c)),
                 eddies[w, : EDDY_COLUMNS * e].reshape((e, EDDY_COLUMNS)),
             ),
-            tap_time[w, first[w] : last[w]], taps[w, :m], (rate[w, :n], force[w, :n]),
+            tap_time[w, first[w] : last[w]], taps[w, :m], (rate[w, :n], force[w, :n]), block,
         )  # fmt: skip
-
-
-@kernel()
-def _tap(out: Array, a: float, x: Array, p: Array, composed: Composed, sample: tuple[float, ...]) -> None:
-    """State at the fraction a of a sample interval: velocity and angles are linear, position is their integral."""
-    v, c, roll, pitch = composed
-    yaw = atan2(x[C + 3], x[C])
-    new_yaw = atan2(c[3], c[0])
-    # The fraction of the position change that belongs to a linear velocity
-    for i in range(3):
-        mean = 0.5 * (x[V + i] + v[i])
-        gained = x[V + i] * a + 0.5 * (v[i] - x[V + i]) * a * a
-        scale = gained / mean if abs(mean) > 1e-9 else a
-        out[i] = x[LATITUDE + i] + sample[6 + i] * (1.0 if a >= 1.0 else scale)
-        out[3 + i] = x[V + i] + a * (v[i] - x[V + i])
-    out[6] = x[ROLL] + a * (roll - x[ROLL])
-    out[7] = x[PITCH] + a * (pitch - x[PITCH])
-    out[8] = _wrap(yaw + a * _wrap(new_yaw - yaw))
-    # Angular rate at the instant, extrapolated from the means over this interval and the one before
-    for i in range(3):
-        now = sample[i] - c[i] * sample[9] - c[6 + i] * sample[10]
-        out[9 + i] = now + (a - 0.5) * (now - x[BODY_RATE + i])
-    flow = max(0.0, 1.0 - p[SHEAR] * max(0.0, x[DEPTH_CALM]))
-    out[12] = flow * x[WATER_NORTH]
-    out[13] = flow * x[WATER_EAST]
 
 
 @kernel("void(b1[::1], f8[:, ::1], f8[::1], f8[::1], f8[::1])")

@@ -203,9 +203,8 @@ def components(sea: Sea | None, seed: int, depth: float | None = None) -> tuple[
     # Components of equal energy, with a random frequency within each quantile: the variance is exact in every run, and
     # the waves repeat neither from run to run nor from hour to hour.
     grid = peak * np.geomspace(0.4, 4.0, 4000)
-    cumulative = np.concatenate(
-        [[0.0], np.cumsum(np.diff(grid) * 0.5 * (spectrum(sea, grid)[1:] + spectrum(sea, grid)[:-1]))]
-    )
+    density = spectrum(sea, grid)
+    cumulative = np.concatenate([[0.0], np.cumsum(np.diff(grid) * 0.5 * (density[1:] + density[:-1]))])
     quantile = (np.arange(n) + rng.random(n)) / n
     omega = np.interp(quantile * cumulative[-1], cumulative, grid)
     amplitude = np.sqrt(2.0 * sea.significant_height**2 / 16.0 / n)

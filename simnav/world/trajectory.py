@@ -15,8 +15,8 @@ import numpy as np
 
 from simnav.geometry.earth import ROTATION_RATE
 from simnav.geometry.rotation import dcm_from_rpy, wrap_angle
+from simnav.inverse_strapdown import increments
 from simnav.spec import SpecError
-from simnav.strapdown import increments
 from simnav.types import Array, ImuSamples, NavigationStates, TapStates
 from simnav.world.manoeuvres import Manoeuvre
 from simnav.world.start import Start

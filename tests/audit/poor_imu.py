@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import os
 import warnings
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 from typing import Any
@@ -86,18 +87,21 @@ def block(first: int, windows: bool) -> dict[str, list[tuple[float, float] | Non
     """Horizontal RMSE [m] and NEES by degree of freedom of each row on the voyages of a part; None where it failed."""
     wanted = sorted({n for pair in PLAIN.items() if (pair[1] == "sw-fgo") is windows for n in pair})
     found: dict[str, list[tuple[float, float] | None]] = {name: [] for name in wanted}
+    refused: Counter[str] = Counter()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         for seed in range(first, first + (1 if windows else min(_BLOCK, FIRST + RUNS - first))):
             recording = record(load(FAMILY), seed)
             for name in dict.fromkeys(n.removesuffix(_SMOOTHED) for n in wanted):
                 trial = run_trial(make(name), recording)
+                refused[name] += trial.status == "unsuitable"
                 for label, asked in ((name, _SCORES), (name + _SMOOTHED, _SMOOTHED_SCORES)):
                     if label in found:
                         scores = score(trial, recording, asked) if trial.status == "ok" else {}
                         values = tuple(float(scores.get(s, np.nan)) for s in asked)
                         found[label].append((values[0], values[1]) if np.isfinite(values[0]) else None)
-    return found
+    # Rows that need what this family lacks, such as messages of another vessel, are not judged.
+    return {name: values for name, values in found.items() if refused[name.removesuffix(_SMOOTHED)] < len(values)}
 
 
 def parts() -> dict[str, Callable[[], Any]]:

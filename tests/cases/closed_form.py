@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from simnav import strapdown
+from simnav import inverse_strapdown
 from simnav.geometry import earth, rotation
 from simnav.recording import AidStream, Block, Recording
 from simnav.types import (
@@ -96,7 +96,7 @@ def make_recording(
     rate = 50.0
     t = np.arange(round(duration * rate) + 1) / rate
     velocity, rpy = voyage(t, turning, sea)
-    ideal, position = strapdown.increments(t, np.array([0.9, 0.1, 0.0]), velocity, rpy)
+    ideal, position = inverse_strapdown.increments(t, np.array([0.9, 0.1, 0.0]), velocity, rpy)
     dcm = rotation.dcm_from_rpy(rpy)
 
     samples = None

@@ -7,8 +7,8 @@ from types import SimpleNamespace
 
 import numpy as np
 
+from simnav.inverse_strapdown import increments
 from simnav.scenario import parse
-from simnav.strapdown import increments
 
 RATE, LENGTH, CLOCK = 50.0, 40.0, 5000.0
 

@@ -282,3 +282,48 @@ def test_a_kernel_calls_another_one_and_has_no_copy_of_it(tmp_path: Path, monkey
     env = surroundings(tmp_path, PYTHONPATH=os.pathsep.join([str(Path(__file__).parent), *sys.path]))
     loaded = subprocess.run(command, env=env, capture_output=True, text=True, check=True)
     assert loaded.stdout == "10.0\n"
+
+
+def _total(values: compiled.Array) -> float:
+    return values[0] + values[1]
+
+
+_helper = compiled.Kernel(_total, None, False, borrows=True)
+
+
+def _twice(values: compiled.Array) -> float:
+    return 2.0 * _helper(values)
+
+
+def test_how_helpers_are_compiled(monkeypatch: pytest.MonkeyPatch) -> None:
+    """They leave vector instructions to their callers."""
+    from numba.core import config
+    from numba.core.compiler import CompilerBase
+
+    allowed = []
+    compile_one = CompilerBase.compile_extra
+
+    def record(self, function):
+        allowed.append((function.__name__, bool(config.SLP_VECTORIZE)))
+        return compile_one(self, function)
+
+    monkeypatch.setattr(CompilerBase, "compile_extra", record)
+    monkeypatch.setattr(compiled, "cache_directory", lambda: None)
+    before = config.SLP_VECTORIZE
+    caller = compiled.Kernel(_twice, "f8(f8[::1])", False)
+    assert caller(np.array([1.0, 2.0])) == 6.0
+    # A helper is in the cache for all its callers, whichever of them compiled it first.
+    assert sorted(allowed) == [("_total", False), ("_twice", True)]
+    assert before == config.SLP_VECTORIZE
+
+
+def _room(n: int) -> compiled.Array:
+    return np.empty(n)
+
+
+def test_a_helper_that_borrows_its_arrays_makes_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    from numba.core.errors import NumbaError
+
+    monkeypatch.setattr(compiled, "cache_directory", lambda: None)
+    with pytest.raises(NumbaError, match="array passed into the function"):
+        compiled.Kernel(_room, "f8[::1](i8)", False, borrows=True).compile()

@@ -12,7 +12,8 @@ import pytest
 
 from simnav.geometry import earth
 from simnav.geometry.rotation import dcm_from_rpy, rotation_vector_from_dcm
-from simnav.strapdown import increments, integrate
+from simnav.inverse_strapdown import increments
+from simnav.strapdown import integrate
 from simnav.types import ImuSamples, NavigationStates
 
 POSITION = np.array([np.radians(58.0), np.radians(-5.0), 0.0])

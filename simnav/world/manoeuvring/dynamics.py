@@ -65,7 +65,7 @@ Three = tuple[float, float, float]
 Six = tuple[float, float, float, float, float, float]
 
 
-@kernel()
+@kernel(borrows=True)
 def _wind_force(h: Array, time: float, psi: float, north: float, east: float) -> Three:
     """Surge and sway force [N] and yaw moment [N m] of the wind on a hull that moves north and east over ground."""
     gust = 1.0
@@ -92,7 +92,7 @@ def _wind_force(h: Array, time: float, psi: float, north: float, east: float) ->
     return x, -side * y, -side * y * lever * h[A_LENGTH]
 
 
-@kernel()
+@kernel(borrows=True)
 def _hull_force(h: Array, u: float, v: float, r: float) -> Three:
     """Hydrodynamic surge and sway force [N] and yaw moment [N m]."""
     speed = sqrt(u * u + v * v)
@@ -117,14 +117,14 @@ def _hull_force(h: Array, u: float, v: float, r: float) -> Three:
     return x, y, n
 
 
-@kernel()
+@kernel(borrows=True)
 def _thrust(h: Array, n: float, u: float) -> float:
     """Thrust of the propeller [N]."""
     thrust: float = h[T_NN] * n * abs(n) + h[T_NU] * abs(n) * u
     return thrust
 
 
-@kernel()
+@kernel(borrows=True)
 def _change(h: Array, water: tuple[float, float], time: float, command: tuple[float, float], s: Six) -> Six:
     """Rates of change of u, v, r, heading, propeller and steering."""
     u, v, r, psi, n, steer = s
@@ -148,7 +148,7 @@ def _change(h: Array, water: tuple[float, float], time: float, command: tuple[fl
     )
 
 
-@kernel()
+@kernel(borrows=True)
 def _ahead(s: Six, change: Six, dt: float) -> Six:
     return (
         s[0] + dt * change[0], s[1] + dt * change[1], s[2] + dt * change[2],
@@ -156,7 +156,7 @@ def _ahead(s: Six, change: Six, dt: float) -> Six:
     )  # fmt: skip
 
 
-@kernel()
+@kernel(borrows=True)
 def propeller_for(h: Array, thrust: float, u: float) -> float:
     """Propeller rate that gives a thrust [N] at a speed [m/s], within its limits.
 
@@ -171,7 +171,7 @@ def propeller_for(h: Array, thrust: float, u: float) -> float:
     return rate
 
 
-@kernel()
+@kernel(borrows=True)
 def integrate_hull(
     h: Array, s: Six, command: tuple[float, float], water: tuple[float, float], time: float, dt: float
 ) -> Six:
@@ -203,7 +203,7 @@ def integrate_hull(
     return s
 
 
-@kernel()
+@kernel(borrows=True)
 def sail(
     h: Array, x: Array, state: tuple[float, float, float], constants: tuple[float, float],
     water: tuple[float, float], time: float, dt: float,

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from simnav import strapdown
+from simnav import inverse_strapdown
 from simnav.estimator import make
 from simnav.estimators.models.inertial import InertialModel
 from simnav.estimators.solvers.gtsam_graph import InertialGraph
@@ -54,7 +54,7 @@ def seaway(duration: float, rate: float = 100.0) -> tuple[np.ndarray, ImuSamples
     yaw = 0.7 + 0.3 * np.sin(t / 5.0)
     rpy = np.stack([0.2 * np.sin(0.7 * t), 0.1 * np.sin(0.9 * t + 1.0), yaw], axis=1)
     velocity = np.stack([8.0 * np.cos(yaw), 8.0 * np.sin(yaw), np.sin(0.8 * t)], axis=1)
-    samples, position = strapdown.increments(t, np.array([0.9, 0.1, 5.0]), velocity, rpy)
+    samples, position = inverse_strapdown.increments(t, np.array([0.9, 0.1, 5.0]), velocity, rpy)
     return t, samples, position, velocity, rpy
 
 

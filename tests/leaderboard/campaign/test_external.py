@@ -119,6 +119,8 @@ def test_a_file_that_ends_early_is_a_failed_run(tmp_path, recording):
         ("a.csv", "time_s,latitude_deg,longitude_deg,hight_m\n1,2,3,4\n", "no meaning to the column 'hight_m'"),
         ("a.csv", "time_s,latitude_deg,longitude_deg\n1,2,x\n", r"line 2, column 'longitude_deg': 'x' is not a number"),
         ("a.csv", "time_s,latitude_deg,longitude_deg\n2,2,3\n1,2,3\n", r"line 3, column 'time_s': the time is before"),
+        ("a.csv", "time_s,latitude_deg,longitude_deg\n1,54,8\n2,99,8\n", r"line 3: latitude_deg = 99 must be"),
+        ("a.csv", "time_s,latitude_deg,longitude_deg,sigma_north_m\n1,54,8,-2\n", "sigma_north_m = -2 must be 0 or"),
         ("a.tum", "1 0 0 0 0 0 0\n", "7 columns without a header; TUM has 8"),
         ("a.tum", "1 0 0 0 0 0 0 0\n", r"line 1: a number is missing, or the quaternion is zero"),
     ],

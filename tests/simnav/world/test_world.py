@@ -59,11 +59,22 @@ def test_hour_of_manoeuvring_in_a_seaway_returns_to_the_truth():
     assert np.abs(rotation_vector_from_dcm(turned)).max() < 1e-7
 
 
-@settings(max_examples=20)
-@given(st.lists(st.integers(1, 400), min_size=1, max_size=12), st.integers(0, 2**40))
-def test_blocks_of_any_length_give_the_same_bits(lengths, seed):
+#: Guidance that knows the position, or not; a variable current depends on it, too.
+VOYAGES = [
+    (Ship(), [ZigZag(angle=0.3, duration=30)], Current(speed=0.5)),
+    (Ship(), [ZigZag(angle=0.3, duration=30)], Current(speed=0.5, variation=0.2)),
+    (Uuv(), [Dive(depth=20.0), Waypoints(points=((40.0, 20.0), (0.0, 30.0)), acceptance_radius=5.0)], None),
+]
+
+
+@settings(max_examples=30)
+@given(
+    st.lists(st.integers(1, 400), min_size=1, max_size=12), st.integers(0, 2**40), st.sampled_from(VOYAGES)
+)  # fmt: skip
+def test_blocks_of_any_length_give_the_same_bits(lengths, seed, voyage):
     def world():
-        return World(START, Ship(), [ZigZag(angle=0.3, duration=30)], SEA, Current(speed=0.5), rate=50.0, seed=seed)
+        vessel, manoeuvres, current = voyage
+        return World(START, vessel, manoeuvres, SEA, current, rate=50.0, seed=seed)
 
     total = sum(lengths)
     taps = 0.013 + np.arange(total * 3 // 2 - 1) / 75.0
@@ -78,6 +89,21 @@ def test_blocks_of_any_length_give_the_same_bits(lengths, seed):
     for name in ("position", "velocity", "attitude", "angular_rate", "water_velocity"):
         joined = np.concatenate([getattr(p.taps["a"], name) for p in parts])
         np.testing.assert_array_equal(joined, getattr(whole.taps["a"], name))
+
+
+def test_a_voyage_is_the_same_up_to_waypoints_that_follow_it():
+    """With waypoints guidance and motion alternate sample by sample; without them guidance is ahead by a block."""
+    manoeuvres = [Turn(angle=1.0), ZigZag(angle=0.3, duration=60), Turn(radius=300, duration=40)]
+    sea = Sea(significant_height=9.0, peak_period=9.0, direction=1.0, roll_gain=1.5, response="encounter")
+    _, alone, tap, _ = run(130.0, manoeuvres, sea=sea, every=0.31)
+    _, followed, other, _ = run(
+        130.0, [*manoeuvres, Hold(duration=99), Waypoints(points=((0, 0),))], sea=sea, every=0.31
+    )
+    assert np.abs(tap.attitude[:, 0]).max() > 0.3  # beyond the series for small angles
+    for name in ("angular_rate", "specific_force"):
+        np.testing.assert_array_equal(getattr(followed.imu, name), getattr(alone.imu, name))
+    for name in ("position", "velocity", "attitude", "angular_rate"):
+        np.testing.assert_array_equal(getattr(other, name), getattr(tap, name))
 
 
 def test_taps_between_samples_lie_on_the_motion():

@@ -1,0 +1,460 @@
+"""The exact inverse of the strapdown mechanization: from a trajectory to the samples of ideal instruments.
+
+The equations and their symbols are those of `simnav.strapdown`. There are two forms with the same numbers, bit for bit:
+`sample_from_motion` computes one sample, and `ideal_samples` a block of up to `BLOCK` samples. Both consist of the same
+parts, which are short kernels. Only three things depend on the sample before: the latitude, and the angle and velocity
+increments, by the corrections for coning and sculling. All else is computed for each sample by itself. So the block
+form has the parts in loops of their own, over rows of one array, and the compiler uses vector instructions. Each sample
+keeps the order of its operations. The loops over increments depend on the sample before, and are short.
+"""
+
+from __future__ import annotations
+
+from math import cos, sin, sqrt
+from typing import TypeAlias
+
+import numpy as np
+
+from simnav.compiled import kernel
+from simnav.geometry.earth import ECCENTRICITY_SQUARED, radii_scalar
+from simnav.geometry.rotation import (
+    cross,
+    dcm_from_rpy,
+    rotated,
+    rotation_coefficients,
+    small_rotation_coefficients,
+)
+from simnav.strapdown import TWELFTH, Triple, local_rates, middle_latitude, per_north_scalar, rates_in_the_middle
+from simnav.types import Array, ImuSamples
+
+__all__ = [
+    "AXES",
+    "BLOCK",
+    "BLOCK_COLUMNS",
+    "EARTH",
+    "INTERVAL",
+    "PER_EAST",
+    "PER_NORTH",
+    "POSITION",
+    "SAMPLE_ROWS",
+    "VELOCITY",
+    "Nine",
+    "ideal_samples",
+    "increments",
+    "sample_from_motion",
+]
+
+Nine: TypeAlias = tuple[float, float, float, float, float, float, float, float, float]
+
+#: Most samples of a block. Its array is small enough for the fastest memory of a processor.
+BLOCK = 64
+#: Columns of the array of a block: a row has one value for each sample, or for each end of a sample interval.
+BLOCK_COLUMNS = BLOCK + 8
+# Its rows. Length of the interval; at each end velocity, direction cosine matrix and position.
+INTERVAL, VELOCITY, AXES, POSITION = 0, 1, 4, 13
+# In the middle: sine and cosine of the latitude, height, radius in the prime vertical, d(latitude)/d(north); distance
+# to the north in the interval.
+SINE, COSINE, HEIGHT, RADIUS, PER_NORTH, STEP = 16, 17, 18, 19, 20, 21
+# Earth rate north and down, transport rate, gravity, d(longitude)/d(east), zeta; square of an angle, and three
+# coefficients of its rotation.
+EARTH, TRANSPORT, GRAVITY, PER_EAST, ZETA, SQUARE, COEFFICIENTS = 22, 24, 27, 28, 29, 32, 33
+# Axis of the rotation times twice the sine of its angle; C' u of the velocity change u; phi.
+AXIS, CHANGE, PHI = 36, 39, 42
+# At each end: angle increment of the interval before.
+ALPHA = 45
+# The matrix of nu: nine cofactors, and the inverse of the determinant.
+COFACTORS, INVERSE = 48, 57
+SAMPLE_ROWS = 58
+
+
+@kernel(borrows=True)
+def _small_ratio(square: float) -> float:
+    """asin(s) / s for s^2 = ``square`` below 1e-3, exact to rounding."""
+    ratio: float = 1.0 + square * (
+        1.0 / 6.0 + square * (3.0 / 40.0 + square * (15.0 / 336.0 + square * (105.0 / 3456.0)))
+    )
+    return ratio
+
+
+@kernel(borrows=True)
+def _ratio(square: float) -> float:
+    """asin(s) / s for s^2 = ``square``. A sample turns by far less than a quarter turn."""
+    if square < 1e-3:
+        return _small_ratio(square)
+    ratio: float = np.arcsin(min(1.0, sqrt(square))) / sqrt(square)
+    return ratio
+
+
+@kernel(borrows=True)
+def _twice_sine(c: Nine, d: Nine, z: Triple, sz: float, bz: float) -> Triple:
+    """Twice the sine of the angle times the axis of the body rotation exp(phi x) = C' exp(zeta x) D."""
+    b00, b10, b20 = rotated(z[0], z[1], z[2], sz, bz, d[0], d[3], d[6])
+    b01, b11, b21 = rotated(z[0], z[1], z[2], sz, bz, d[1], d[4], d[7])
+    b02, b12, b22 = rotated(z[0], z[1], z[2], sz, bz, d[2], d[5], d[8])
+    # From the skew part
+    return (
+        (c[2] * b01 + c[5] * b11 + c[8] * b21) - (c[1] * b02 + c[4] * b12 + c[7] * b22),
+        (c[0] * b02 + c[3] * b12 + c[6] * b22) - (c[2] * b00 + c[5] * b10 + c[8] * b20),
+        (c[1] * b00 + c[4] * b10 + c[7] * b20) - (c[0] * b01 + c[3] * b11 + c[6] * b21),
+    )
+
+
+@kernel(borrows=True)
+def _square(x: Triple) -> float:
+    square: float = x[0] * x[0] + x[1] * x[1] + x[2] * x[2]
+    return square
+
+
+@kernel(borrows=True)
+def _solved(h: Triple, r: Triple) -> Triple:
+    """The solution a of ``r = (I + [h x]) a``."""
+    inverse = 1.0 / (1.0 + h[0] * h[0] + h[1] * h[1] + h[2] * h[2])
+    dot = h[0] * r[0] + h[1] * r[1] + h[2] * r[2]
+    q0, q1, q2 = cross(h[0], h[1], h[2], r[0], r[1], r[2])
+    return (r[0] - q0 + h[0] * dot) * inverse, (r[1] - q1 + h[1] * dot) * inverse, (r[2] - q2 + h[2] * dot) * inverse
+
+
+@kernel(borrows=True)
+def _velocity_change(
+    c: Nine, v: Triple, w: Triple, z: Triple, earth: tuple[float, float], k: Triple, g: float, dt: float
+) -> Triple:
+    """C' u for the velocity change u, from v+ - v = (I - zeta x / 2) u + gravity and Coriolis."""
+    m0, m1, m2 = 0.5 * (v[0] + w[0]), 0.5 * (v[1] + w[1]), 0.5 * (v[2] + w[2])
+    y0, y1, y2 = cross(2.0 * earth[0] + k[0], k[1], 2.0 * earth[1] + k[2], m0, m1, m2)
+    u = _solved(
+        (-0.5 * z[0], -0.5 * z[1], -0.5 * z[2]),
+        (w[0] - v[0] + dt * y0, w[1] - v[1] + dt * y1, w[2] - v[2] + dt * y2 - dt * g),
+    )
+    return (
+        c[0] * u[0] + c[3] * u[1] + c[6] * u[2],
+        c[1] * u[0] + c[4] * u[1] + c[7] * u[2],
+        c[2] * u[0] + c[5] * u[1] + c[8] * u[2],
+    )
+
+
+@kernel(borrows=True)
+def _cofactors(r: Triple, h: Triple, angle2: float, b: float, k: float) -> tuple[Nine, float]:
+    """Cofactors and inverse of the determinant of I + b phi x + c (phi x)^2 + alpha' / 12 x, which is diagonally
+    dominant; k is c.
+    """
+    g0, g1, g2 = b * r[0] + h[0], b * r[1] + h[1], b * r[2] + h[2]
+    m00, m11, m22 = (
+        1.0 + k * (r[0] * r[0] - angle2),
+        1.0 + k * (r[1] * r[1] - angle2),
+        1.0 + k * (r[2] * r[2] - angle2),
+    )
+    m01, m10 = k * r[0] * r[1] - g2, k * r[0] * r[1] + g2
+    m02, m20 = k * r[0] * r[2] + g1, k * r[0] * r[2] - g1
+    m12, m21 = k * r[1] * r[2] - g0, k * r[1] * r[2] + g0
+    x0, x1, x2 = cross(m01, m11, m21, m02, m12, m22)
+    inverse = 1.0 / (m00 * x0 + m10 * x1 + m20 * x2)
+    y0, y1, y2 = cross(m02, m12, m22, m00, m10, m20)
+    t0, t1, t2 = cross(m00, m10, m20, m01, m11, m21)
+    return (x0, x1, x2, y0, y1, y2, t0, t1, t2), inverse
+
+
+@kernel(borrows=True)
+def _nu(change: Triple, nu: Triple, a: Triple, m: Nine, inverse: float) -> Triple:
+    """The velocity increment, by Cramer's rule; ``nu`` is that of the interval before, ``a`` the angle increment."""
+    t0, t1, t2 = cross(nu[0], nu[1], nu[2], a[0], a[1], a[2])
+    d0, d1, d2 = change[0] - t0 * TWELFTH, change[1] - t1 * TWELFTH, change[2] - t2 * TWELFTH
+    return (
+        (d0 * m[0] + d1 * m[1] + d2 * m[2]) * inverse,
+        (d0 * m[3] + d1 * m[4] + d2 * m[5]) * inverse,
+        (d0 * m[6] + d1 * m[7] + d2 * m[8]) * inverse,
+    )
+
+
+@kernel(borrows=True)
+def sample_from_motion(
+    latitude: float, height: float, v: Triple, w: Triple, c: Nine, d: Nine, memory: Array, dt: float
+) -> tuple[float, ...]:
+    """The sample of ideal instruments over one interval: the exact inverse of `simnav.strapdown.mechanize_step`.
+
+    Parameters
+    ----------
+    latitude, height : float
+        Latitude [rad] and height [m] at the start of the interval.
+    v, w : tuples of 3 floats
+        Velocity at the start and at the end, north-east-down [m/s].
+    c, d : tuples of 9 floats
+        Direction cosine matrix from body axes to north-east-down at the start and at the end, row by row.
+    memory : (6,) array
+        Angle and velocity increments of the interval before; updated.
+    dt : float
+        Length of the interval [s].
+
+    Returns
+    -------
+    tuple of 11 floats
+        Mean angular rate [rad/s] and mean specific force [m/s^2], body axes; changes of latitude and longitude [rad]
+        and of height [m]; the Earth rate, north and down, at the middle of the interval [rad/s].
+    """
+    m0, m1, m2 = 0.5 * (v[0] + w[0]), 0.5 * (v[1] + w[1]), 0.5 * (v[2] + w[2])
+    e0, e2, k0, k1, k2, g, per_north, per_east, _ = local_rates(latitude, height, m0, m1, m2, dt)
+    z = (e0 + k0) * dt, k1 * dt, (e2 + k2) * dt
+    sz, bz = rotation_coefficients(_square(z))
+    x0, x1, x2 = _twice_sine(c, d, z, sz, bz)
+    ratio = _ratio(0.25 * _square((x0, x1, x2)))
+    r = 0.5 * ratio * x0, 0.5 * ratio * x1, 0.5 * ratio * x2
+    # alpha from phi = (I + [alpha'/12 x]) alpha
+    h = memory[0] * TWELFTH, memory[1] * TWELFTH, memory[2] * TWELFTH
+    a = _solved(h, r)
+    change = _velocity_change(c, v, w, z, (e0, e2), (k0, k1, k2), g, dt)
+    angle2 = _square(r)
+    sa, b = rotation_coefficients(angle2)
+    k = 1.0 / 6.0 - angle2 * (1.0 / 120.0) if angle2 < 1e-3 else (1.0 - sa) / angle2
+    m, inverse = _cofactors(r, h, angle2, b, k)
+    n = _nu(change, (memory[3], memory[4], memory[5]), a, m, inverse)
+    memory[0], memory[1], memory[2], memory[3], memory[4], memory[5] = a[0], a[1], a[2], n[0], n[1], n[2]
+    inverse = 1.0 / dt
+    return (
+        a[0] * inverse, a[1] * inverse, a[2] * inverse, n[0] * inverse, n[1] * inverse, n[2] * inverse,
+        dt * m0 * per_north, dt * m1 * per_east, -dt * m2, e0, e2,
+    )  # fmt: skip
+
+
+@kernel(borrows=True)
+def _three(block: Array, row: int, k: int) -> Triple:
+    return block[row, k], block[row + 1, k], block[row + 2, k]
+
+
+@kernel(borrows=True)
+def _nine(block: Array, row: int, k: int) -> Nine:
+    return (
+        block[row, k], block[row + 1, k], block[row + 2, k], block[row + 3, k], block[row + 4, k], block[row + 5, k],
+        block[row + 6, k], block[row + 7, k], block[row + 8, k],
+    )  # fmt: skip
+
+
+@kernel(borrows=True)
+def _coefficients(block: Array, n: int) -> None:
+    """The coefficients of n rotations by the squares of their angles, and (1 - sin(x)/x)/x^2 of each."""
+    large = 0
+    for k in range(n):
+        angle2 = block[SQUARE, k]
+        block[COEFFICIENTS, k], block[COEFFICIENTS + 1, k] = small_rotation_coefficients(angle2)
+        block[COEFFICIENTS + 2, k] = 1.0 / 6.0 - angle2 * (1.0 / 120.0)
+        large += not angle2 < 1e-3
+    if large > 0:
+        for k in range(n):
+            angle2 = block[SQUARE, k]
+            if not angle2 < 1e-3:
+                sa, b = rotation_coefficients(angle2)
+                block[COEFFICIENTS, k], block[COEFFICIENTS + 1, k] = sa, b
+                block[COEFFICIENTS + 2, k] = (1.0 - sa) / angle2
+
+
+@kernel(borrows=True)
+def _locate(block: Array, n: int) -> None:
+    """Latitudes and heights at the ends of n intervals, and what follows from those in their middle.
+
+    The latitude in the middle decides the step to the next latitude, by a sine, a root and two divisions. To wait for
+    each of these takes longer than all else. So the steps are guessed, computed at the latitudes that follow from
+    the guess, and the guess is right if the computed steps give the same latitudes, bit for bit. Otherwise the
+    computed steps are the next guess. Each guess is right for one more interval at least, and the first one is right
+    for nearly all blocks: an error of the latitude of 1e-12 rad changes no bit of a step.
+    """
+    height, north = block[POSITION + 2, 0], 0.0
+    s = sin(block[POSITION, 0])
+    meridian, _ = radii_scalar(s)
+    x = 1.0 - ECCENTRICITY_SQUARED * s * s
+    slope = 3.0 * ECCENTRICITY_SQUARED * s * cos(block[POSITION, 0]) / x * meridian / (meridian + height)
+    for k in range(n):
+        dt = block[INTERVAL, k]
+        m0, m2 = (
+            0.5 * (block[VELOCITY, k] + block[VELOCITY, k + 1]),
+            0.5 * (block[VELOCITY + 2, k] + block[VELOCITY + 2, k + 1]),
+        )
+        block[HEIGHT, k] = height - 0.5 * dt * m2
+        height += -dt * m2
+        block[POSITION + 2, k + 1] = height
+        block[STEP, k] = dt * m0
+        block[PER_NORTH, k] = north + 0.5 * dt * m0
+        north += dt * m0
+    for k in range(n):
+        block[PER_NORTH, k] = 1.0 / (meridian + slope * block[PER_NORTH, k] + block[HEIGHT, k])
+    for _ in range(n + 1):
+        latitude = block[POSITION, 0]
+        for k in range(n):
+            middle = middle_latitude(latitude, 0.5 * (block[VELOCITY, k] + block[VELOCITY, k + 1]), block[INTERVAL, k])
+            block[SINE, k], block[COSINE, k] = sin(middle), cos(middle)
+            latitude += block[STEP, k] * block[PER_NORTH, k]
+            block[POSITION, k + 1] = latitude
+        wrong = 0
+        for k in range(n):
+            block[PER_NORTH, k], block[RADIUS, k] = per_north_scalar(block[SINE, k], block[HEIGHT, k])
+            wrong += block[POSITION, k] + block[STEP, k] * block[PER_NORTH, k] != block[POSITION, k + 1]
+        if wrong == 0:
+            break
+
+
+@kernel(borrows=True)
+def ideal_samples(block: Array, n: int, memory: Array, rate: Array, force: Array) -> None:
+    """The samples of ideal instruments over n intervals: `sample_from_motion` for a block.
+
+    Parameters
+    ----------
+    block : (SAMPLE_ROWS or more, BLOCK_COLUMNS) array
+        Given are the n intervals, velocities and direction cosine matrices at their n + 1 ends, and the position at the
+        start. The positions at the other ends and all other rows are overwritten.
+    n : int
+        Number of intervals, at most `BLOCK`.
+    memory : (6,) array
+        Angle and velocity increments of the interval before; updated.
+    rate, force : (n, 3) arrays
+        Overwritten: mean angular rates [rad/s] and mean specific forces [m/s^2], body axes.
+    """
+    _locate(block, n)
+    for k in range(n):
+        dt = block[INTERVAL, k]
+        m0, m1 = (
+            0.5 * (block[VELOCITY, k] + block[VELOCITY, k + 1]),
+            0.5 * (block[VELOCITY + 1, k] + block[VELOCITY + 1, k + 1]),
+        )
+        e0, e2, k0, k1, k2, g, per_east = rates_in_the_middle(
+            block[SINE, k], block[COSINE, k], block[HEIGHT, k], block[RADIUS, k], block[PER_NORTH, k], m0, m1
+        )
+        z0, z1, z2 = (e0 + k0) * dt, k1 * dt, (e2 + k2) * dt
+        block[EARTH, k], block[EARTH + 1, k], block[GRAVITY, k], block[PER_EAST, k] = e0, e2, g, per_east
+        block[TRANSPORT, k], block[TRANSPORT + 1, k], block[TRANSPORT + 2, k] = k0, k1, k2
+        block[ZETA, k], block[ZETA + 1, k], block[ZETA + 2, k] = z0, z1, z2
+        block[SQUARE, k] = _square((z0, z1, z2))
+    _coefficients(block, n)
+    large = 0
+    for k in range(n):
+        c, z = _nine(block, AXES, k), _three(block, ZETA, k)
+        x0, x1, x2 = _twice_sine(c, _nine(block, AXES, k + 1), z, block[COEFFICIENTS, k], block[COEFFICIENTS + 1, k])
+        change = _velocity_change(
+            c, _three(block, VELOCITY, k), _three(block, VELOCITY, k + 1), z, (block[EARTH, k], block[EARTH + 1, k]),
+            _three(block, TRANSPORT, k), block[GRAVITY, k], block[INTERVAL, k],
+        )  # fmt: skip
+        block[AXIS, k], block[AXIS + 1, k], block[AXIS + 2, k] = x0, x1, x2
+        block[CHANGE, k], block[CHANGE + 1, k], block[CHANGE + 2, k] = change
+        square = 0.25 * _square((x0, x1, x2))
+        ratio = _small_ratio(square)
+        r0, r1, r2 = 0.5 * ratio * x0, 0.5 * ratio * x1, 0.5 * ratio * x2
+        block[PHI, k], block[PHI + 1, k], block[PHI + 2, k] = r0, r1, r2
+        large += not square < 1e-3
+    if large > 0:
+        for k in range(n):
+            x0, x1, x2 = _three(block, AXIS, k)
+            ratio = _ratio(0.25 * _square((x0, x1, x2)))
+            block[PHI, k], block[PHI + 1, k], block[PHI + 2, k] = 0.5 * ratio * x0, 0.5 * ratio * x1, 0.5 * ratio * x2
+    a = memory[0], memory[1], memory[2]
+    block[ALPHA, 0], block[ALPHA + 1, 0], block[ALPHA + 2, 0] = a
+    for k in range(n):
+        a = _solved((a[0] * TWELFTH, a[1] * TWELFTH, a[2] * TWELFTH), _three(block, PHI, k))
+        block[ALPHA, k + 1], block[ALPHA + 1, k + 1], block[ALPHA + 2, k + 1] = a
+        east = 0.5 * (block[VELOCITY + 1, k] + block[VELOCITY + 1, k + 1])
+        block[POSITION + 1, k + 1] = block[POSITION + 1, k] + block[INTERVAL, k] * east * block[PER_EAST, k]
+    memory[0], memory[1], memory[2] = a
+    for k in range(n):
+        block[SQUARE, k] = _square(_three(block, PHI, k))
+    _coefficients(block, n)
+    for k in range(n):
+        h = block[ALPHA, k] * TWELFTH, block[ALPHA + 1, k] * TWELFTH, block[ALPHA + 2, k] * TWELFTH
+        m, inverse = _cofactors(
+            _three(block, PHI, k), h, block[SQUARE, k], block[COEFFICIENTS + 1, k], block[COEFFICIENTS + 2, k]
+        )
+        (
+            block[COFACTORS, k], block[COFACTORS + 1, k], block[COFACTORS + 2, k], block[COFACTORS + 3, k],
+            block[COFACTORS + 4, k], block[COFACTORS + 5, k], block[COFACTORS + 6, k], block[COFACTORS + 7, k],
+            block[COFACTORS + 8, k],
+        ) = m  # fmt: skip
+        block[INVERSE, k] = inverse
+    nu = memory[3], memory[4], memory[5]
+    for k in range(n):
+        a = _three(block, ALPHA, k + 1)
+        nu = _nu(_three(block, CHANGE, k), nu, a, _nine(block, COFACTORS, k), block[INVERSE, k])
+        inverse = 1.0 / block[INTERVAL, k]
+        rate[k, 0], rate[k, 1], rate[k, 2] = a[0] * inverse, a[1] * inverse, a[2] * inverse
+        force[k, 0], force[k, 1], force[k, 2] = nu[0] * inverse, nu[1] * inverse, nu[2] * inverse
+    memory[3], memory[4], memory[5] = nu
+
+
+@kernel("void(f8[::1], f8[:, ::1], f8[:, :, ::1], f8[::1], f8[:, ::1], f8[:, ::1], f8[:, ::1])")
+def _increments(
+    time: Array, velocity: Array, dcm: Array, memory: Array, position: Array, angular_rate: Array, specific_force: Array
+) -> None:
+    """The samples of ideal instruments between k + 1 states; see `increments`.
+
+    Parameters
+    ----------
+    time : (k + 1,) array
+        Times of the states [s].
+    velocity, dcm : (k + 1, 3), (k + 1, 3, 3) arrays
+        Velocities north-east-down [m/s], and direction cosine matrices from body axes to north-east-down.
+    memory : (6,) array
+        Angle and velocity increments of the interval before, for coning and sculling; updated.
+    position : (k + 1, 3) array
+        Geodetic positions. The first one is given; the others are overwritten by the integral of the mechanization.
+    angular_rate, specific_force : (k, 3) arrays
+        Overwritten: means over the intervals [rad/s], [m/s^2].
+    """
+    block = np.empty((SAMPLE_ROWS, BLOCK_COLUMNS))
+    for start in range(0, time.size - 1, BLOCK):
+        n = min(BLOCK, time.size - 1 - start)
+        for k in range(n + 1):
+            for i in range(3):
+                block[VELOCITY + i, k] = velocity[start + k, i]
+                for j in range(3):
+                    block[AXES + 3 * i + j, k] = dcm[start + k, i, j]
+        for i in range(3):
+            block[POSITION + i, 0] = position[start, i]
+        for k in range(n):
+            block[INTERVAL, k] = time[start + k + 1] - time[start + k]
+        ideal_samples(block, n, memory, angular_rate[start : start + n], specific_force[start : start + n])
+        for k in range(1, n + 1):
+            position[start + k] = _three(block, POSITION, k)
+
+
+def increments(
+    time: Array, position: Array, velocity: Array, attitude: Array, *, memory: Array | None = None
+) -> tuple[ImuSamples, Array]:
+    """The samples of ideal instruments on a trajectory: the exact inverse of `integrate`.
+
+    Parameters
+    ----------
+    time : (n + 1,) array
+        Times of the states, ascending [s].
+    position : (3,) array
+        Geodetic position at the first time. The other positions follow from the velocity by the mechanization.
+    velocity : (n + 1, 3) array
+        Velocities of the states, north-east-down [m/s].
+    attitude : (n + 1, 3) array
+        Roll, pitch, yaw [rad]. The rotation between two times is less than 90 degrees.
+    memory : (6,) array, optional
+        Angle and velocity increments of the interval before, for a trajectory in several blocks; updated. Default:
+        zeros.
+
+    Returns
+    -------
+    samples : ImuSamples
+        n samples, at ``time[1:]``.
+    positions : (n + 1, 3) array
+        Latitude, longitude [rad] and height [m] at the times.
+
+    Raises
+    ------
+    ValueError
+        If the times do not ascend.
+    """
+    time = np.ascontiguousarray(time, dtype=np.float64)
+    interval = np.diff(time)
+    if not np.all(interval > 0.0):
+        raise ValueError(f"times must ascend; they do not at index {int(np.argmin(interval > 0.0)) + 1}")
+    n = len(interval)
+    positions = np.empty((n + 1, 3))
+    positions[0] = position
+    rate, force = np.empty((n, 3)), np.empty((n, 3))
+    _increments(
+        time,
+        np.ascontiguousarray(velocity, dtype=np.float64),
+        dcm_from_rpy(attitude),
+        np.zeros(6) if memory is None else memory,
+        positions,
+        rate,
+        force,
+    )
+    return ImuSamples(time[1:], interval, rate, force), positions

@@ -1,0 +1,127 @@
+"""The motion of a vessel in waves, one sample after the other: phases of the components, and what they cause.
+
+See `simnav.world.sea` for the model and for the arrays of components. `simnav.world.motion` calls these kernels.
+"""
+
+from __future__ import annotations
+
+from simnav.compiled import Array, kernel
+from simnav.declared_process import oscillation
+from simnav.world.sea import YAW
+
+__all__ = ["Responses", "Transitions", "answers", "transitions", "wave_responses"]
+
+#: What waves cause at the surface: velocity north, east, down [m/s]; slopes that roll and pitch follow from [rad].
+Responses = tuple[float, float, float, float, float, float, float]
+Transition = tuple[float, float, float, float]
+#: Of heave, roll, pitch and yaw.
+Transitions = tuple[Transition, Transition, Transition, Transition]
+_UNCHANGED: Transition = (1.0, 0.0, 0.0, 1.0)
+_STILL: Transitions = (_UNCHANGED, _UNCHANGED, _UNCHANGED, _UNCHANGED)
+
+
+@kernel(borrows=True, fastmath={"reassoc", "contract", "nsz", "arcp"})
+def wave_responses(phase: Array, table: Array, north: float, east: float, dt: float) -> Responses:
+    """Advance the phases of the wave components by one step, and sum the seven responses.
+
+    ``north`` and ``east`` are the velocity of the vessel through the water [m/s], ``dt`` is the length of the step [s].
+    """
+    # Two loops: the second only reads the rows that the first writes. So the compiler can vectorise both without a
+    # check at run time whether the rows overlap.
+    for i in range(phase.shape[1]):
+        rate = table[0, i] - table[1, i] * north - table[2, i] * east
+        d = rate * dt
+        d2 = d * d
+        # Encounter phases advance by less than 0.2 rad a sample; the series are exact to rounding there.
+        sd = d * (1.0 - d2 / 6.0 * (1.0 - d2 / 20.0 * (1.0 - d2 / 42.0 * (1.0 - d2 / 72.0))))
+        cd = 1.0 - d2 / 2.0 * (1.0 - d2 / 12.0 * (1.0 - d2 / 30.0 * (1.0 - d2 / 56.0 * (1.0 - d2 / 90.0))))
+        c, s = phase[0, i], phase[1, i]
+        phase[0, i] = c * cd - s * sd
+        phase[1, i] = s * cd + c * sd
+        phase[2, i] = rate
+    s0 = s1 = s2 = s3 = s4 = s5 = s6 = 0.0
+    for i in range(phase.shape[1]):
+        c, s, rate = phase[0, i], phase[1, i], phase[2, i]
+        s0 += rate * (table[4, i] * c - table[3, i] * s)
+        s1 += rate * (table[6, i] * c - table[5, i] * s)
+        s2 += rate * (table[8, i] * c - table[7, i] * s)
+        s3 += table[9, i] * c + table[10, i] * s
+        s4 += table[11, i] * c + table[12, i] * s
+        s5 += table[13, i] * c + table[14, i] * s
+        s6 += table[15, i] * c + table[16, i] * s
+    return s0, s1, s2, s3, s4, s5, s6
+
+
+@kernel(borrows=True)
+def transitions(p: Array, dt: float) -> Transitions:
+    """Transition matrices of the oscillators over a step.
+
+    Parameters
+    ----------
+    p : (8,) array
+        Natural angular frequency [rad/s] and damping ratio of each; zeros if there are none.
+    dt : float
+        Length of the step [s].
+    """
+    if p[0] == 0.0:
+        return _STILL
+    return (
+        oscillation(dt, p[0], p[1]), oscillation(dt, p[2], p[3]), oscillation(dt, p[4], p[5]),
+        oscillation(dt, p[6], p[7]),
+    )  # fmt: skip
+
+
+@kernel(borrows=True)
+def _oscillate(x: Array, p: Array, force: float, dt: float, transition: Transition) -> float:
+    """Exact step of an oscillator under a force that is linear within the step. Return its new value.
+
+    With the force a + b t the equation y'' + 2 z w y' + w^2 y = w^2 (a + b t) has the solution a + b t - 2 z b / w, to
+    which the free oscillation is added. x are the (3,) states, and p w and z.
+    """
+    slope = (force - x[2]) / dt if dt > 0.0 else 0.0
+    lag = 2.0 * p[1] * slope / p[0]
+    y, rate = x[0] - (x[2] - lag), x[1] - slope
+    a, b, c, d = transition
+    x[0], x[1], x[2] = a * y + b * rate + force - lag, c * y + d * rate + slope, force
+    value: float = x[0]
+    return value
+
+
+@kernel(borrows=True)
+def answers(
+    x: Array, p: Array, waves: Responses, cp: float, sp: float, phase: Array, table: Array, dt: float, by: Transitions
+) -> Responses:
+    """The responses of the oscillators to the waves at the vessel.
+
+    Parameters
+    ----------
+    x : (12,) array
+        Value, rate and force of each oscillator; updated.
+    p : (8,) array
+        See `transitions`.
+    waves : Responses
+        Those of `wave_responses`, which drive heave, roll and pitch.
+    cp, sp : float
+        Cosine and sine of the heading.
+    phase, table : (3, n) and (19, n) arrays
+        The waves at this time (`simnav.world.sea.components`).
+    dt : float
+        Length of the step [s].
+    by : Transitions
+        Of that step.
+
+    Returns
+    -------
+    Responses
+        In the form of ``waves``.
+    """
+    w0, w1, w2, w3, w4, w5, w6 = waves
+    first = second = 0.0
+    for i in range(phase.shape[1]):
+        first += table[YAW, i] * phase[0, i]
+        second += table[YAW + 1, i] * phase[0, i]
+    heave = _oscillate(x[0:3], p[0:2], w2, dt, by[0])
+    roll = _oscillate(x[3:6], p[2:4], w3 * sp - w4 * cp, dt, by[1])
+    pitch = _oscillate(x[6:9], p[4:6], w5 * cp + w6 * sp, dt, by[2])
+    _oscillate(x[9:12], p[6:8], first * (cp * cp - sp * sp) - second * 2.0 * cp * sp, dt, by[3])
+    return w0, w1, heave, roll * sp, -roll * cp, pitch * cp, pitch * sp
