@@ -10,7 +10,7 @@ from simnav.compiled import kernel
 from simnav.estimators.algebra.chi_square import chi_square_limits
 from simnav.estimators.algebra.direct_update import normalised_square
 from simnav.estimators.models.channels import ChannelDatasheet
-from simnav.types import Array, Instruments
+from simnav.types import Array, Instruments, Measurement
 
 from .base import Innovation
 from .noise import REJECT, RULE, TIME, NoiseAdaptation, copied
@@ -27,17 +27,17 @@ HEARD, FAILING = range(2)
 def gate_noise(
     settings: Array, memory: Array, shared: Array, innovation: Array, predicted: Array, nominal: Array, noise: Array
 ) -> float:
-    """Make the test of `ChiSquareGate`, without the witnesses among channels; the noise is the nominal one; 0."""
+    """Make the test of `ChiSquareGate`, without the witnesses among channels; 1 if it fails, else 0."""
     copied(nominal, noise)
     time = memory[HEARD] = shared[TIME]
     if normalised_square(innovation, predicted, nominal) <= settings[LIMITS + innovation.size]:
         memory[FAILING] = nan
-    else:
-        if isnan(memory[FAILING]):
-            memory[FAILING] = time
-        if not time - memory[FAILING] >= settings[PATIENCE]:
-            shared[REJECT] = 1.0
-    return 0.0
+        return 0.0
+    if isnan(memory[FAILING]):
+        memory[FAILING] = time
+    if not time - memory[FAILING] >= settings[PATIENCE]:
+        shared[REJECT] = 1.0
+    return 1.0
 
 
 class ChiSquareGate(NoiseAdaptation):
@@ -72,6 +72,11 @@ class ChiSquareGate(NoiseAdaptation):
         owner = {s.name: s.instrument for s in instruments.values() if isinstance(s, ChannelDatasheet)}
         self._siblings = {name: [n for n in owner if owner[n] == of] for name, of in owner.items()}
 
+    @property
+    def ruled(self) -> bool:
+        """As `NoiseAdaptation.ruled`; the channels of an instrument are counted in Python."""
+        return super().ruled and not self._siblings
+
     def settings_of(self, longer: float) -> list[float]:
         """As `NoiseAdaptation.settings_of`."""
         return [self.patience, *chi_square_limits(self.probability)]
@@ -82,21 +87,19 @@ class ChiSquareGate(NoiseAdaptation):
 
     def choose(self, innovation: Innovation) -> Array | None:
         """The nominal noise, or None."""
-        self.ask(gate_noise, innovation, np.empty_like(innovation.noise))
-        name, time = innovation.measurement.instrument, innovation.measurement.time
-        rejected = self.rule_shared[REJECT] > 0.0
-        if not rejected and self._fails(name):
-            rejected = not self._doubtful(name, time)
-        return None if rejected else innovation.noise
+        if self.ask(gate_noise, innovation, np.empty_like(innovation.noise)) == 0.0:
+            return innovation.noise
+        doubted = self.rule_shared[REJECT] == 0.0 and self._doubtful(innovation.measurement)
+        return innovation.noise if doubted else None
 
     def _fails(self, name: str) -> bool:
         since: float = self.memory_of(name)[1][FAILING]
         return since == since
 
-    def _doubtful(self, name: str, time: float) -> bool:
+    def _doubtful(self, measurement: Measurement) -> bool:
         """Whether the filter is doubted, and not a channel: most channels of the instrument fail."""
-        siblings = self._siblings.get(name)
+        siblings = self._siblings.get(measurement.instrument)
         if siblings is None:
             return True
-        heard = [n for n in siblings if time - self.memory_of(n)[1][HEARD] <= self.patience]
+        heard = [n for n in siblings if measurement.time - self.memory_of(n)[1][HEARD] <= self.patience]
         return 2 * sum(map(self._fails, heard)) > len(heard)

@@ -24,7 +24,7 @@ __all__ = [
 
 #: Signature of a kernel that chooses a noise, from settings and memory of an instrument (which it updates), what is
 #: shared by all instruments, innovation (m,), H P H' (m, m) and the nominal R (m, m). It overwrites the last array
-#: (m, m), and returns a number to be reported, or 0.
+#: (m, m), and returns a number to be reported (`NoiseAdaptation.reported`), or 0.
 RULE = "f8(f8[::1], f8[::1], f8[::1], f8[::1], f8[:, ::1], f8[:, ::1], f8[:, ::1])"
 #: Places in what is shared: time of the measurement [s]; what a rule may overwrite, the factor on P (before it is 1)
 #: and whether the measurement is rejected (0); and a number of its own, at first NaN.

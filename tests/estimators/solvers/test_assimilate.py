@@ -11,12 +11,16 @@ from simnav.estimator import make
 from simnav.estimators.adaptations.adaptive_step import step_rule
 from simnav.estimators.adaptations.adkf import AdaptiveFactor
 from simnav.estimators.adaptations.base import Adaptation
+from simnav.estimators.adaptations.gating import ChiSquareGate
 from simnav.estimators.adaptations.sage_husa import SageHusa
 from simnav.estimators.algebra.joseph import project
 from simnav.estimators.composition import Row
+from simnav.estimators.models.channels import by_channel, instrument_of
 from simnav.estimators.models.inertial import InertialModel
 from simnav.estimators.rows.kalman import Ekf, Ekf23
 from simnav.estimators.solvers.kalman import KalmanEstimator
+from simnav.scenario import load
+from simnav.source import record
 from simnav.types import Measurement
 
 
@@ -129,6 +133,16 @@ def test_an_adaptation_that_chooses_in_its_own_way_is_asked(recording_of, run_ov
         adaptation.reset(instruments)
         rule = step_rule(adaptation, list(instruments), np.ones(15))
         assert (rule is None) == full  # NumPy bounds a full matrix
+
+
+def test_a_gate_counts_channels_in_python():
+    recording = record(load("dive-to-the-bottom").with_values({"duration_s": 2.0}), 0)
+    for instruments in (recording.instruments, by_channel(recording.instruments)):
+        gate = ChiSquareGate()
+        gate.reset(instruments)
+        channels = any(sheet.name != instrument_of(sheet) for sheet in instruments.values())
+        assert (step_rule(gate, list(instruments), np.ones(15)) is None) == channels
+    assert channels
 
 
 @pytest.mark.parametrize("own", [{"statistic": "ratio"}, {"target": "P"}])
