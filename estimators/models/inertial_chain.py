@@ -17,20 +17,26 @@ outside of the integral). Curvature and rotation of the Earth are in y' and in F
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import atan2, cos, sqrt
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from simnav.compiled import kernel
-from simnav.estimators.algebra.block_tridiagonal import error_after_step
+from simnav.estimators.algebra.block_tridiagonal import ROWS, Rows, error_after_step, whiten_one
+from simnav.estimators.algebra.whitening import whitening
 from simnav.geometry.rotation import cross, rotated, rotation_coefficients
-from simnav.types import Array, InitialState, Instruments, Integers
+from simnav.types import Array, InitialState, Instruments, Integers, Measurement
 
 from .chain import Chain, chain_of
 from .columns import Columns
+from .folds import add_noise, through_one
 from .inertial import InertialModel
-from .measurements import State, observe_inertial
+from .inertial_step import Packet
+from .inertial_take import AID_COLUMNS, FOLD_COLUMNS, KEPT, MOTION_COLUMNS, take_inertial
+from .measurements import OWN, observe_inertial
 from .propagation import correct_inertial
 
 __all__ = ["InertialChain"]
@@ -157,6 +163,15 @@ def _add(step: Array, shift: Array, out: Array) -> None:
     out[6], out[7], out[8] = _compose(step[6], step[7], step[8], shift[6], shift[7], shift[8])
 
 
+@kernel()
+def _add_to(shift: Array, step: Array) -> None:
+    """Add a step to a shift."""
+    r0, r1, r2 = _compose(step[6], step[7], step[8], shift[6], shift[7], shift[8])
+    for j in range(shift.size):
+        shift[j] += step[j]
+    shift[6], shift[7], shift[8] = r0, r1, r2
+
+
 @kernel("void(f8[:, ::1], f8[::1], f8[:, ::1])")
 def _turn_covariance(P: Array, shift: Array, out: Array) -> None:
     p0, p1, p2 = shift[6], shift[7], shift[8]
@@ -173,32 +188,6 @@ def _turn_covariance(P: Array, shift: Array, out: Array) -> None:
                 out[6, i], out[7, i], out[8, i] = v0, v1, v2
             else:
                 out[i, 6], out[i, 7], out[i, 8] = v0, v1, v2
-
-
-@kernel("void(i8, f8[:, :, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, :, ::1])")
-def _linearise_motion(
-    first: int, transition: Array, begin_shift: Array, end_shift: Array, residual: Array, jacobian: Array
-) -> None:
-    """Residual and derivative of the motion factors from a row on.
-
-    Parameters
-    ----------
-    first : int
-        Index of the first factor that is computed.
-    transition : (K, n, n) array
-        Transition matrix F of each motion, along the predicted trajectory.
-    begin_shift, end_shift : (K, n) arrays
-        Shifts of the nodes at both ends since the prediction.
-    residual : (K, n) array
-        Overwritten with the newer node minus its prediction from the older one.
-    jacobian : (K, n, n) array
-        Overwritten with the derivative of the prediction with respect to the older node.
-    """
-    count, n = begin_shift.shape
-    moved = np.empty(n)
-    for k in range(first, count):
-        _move(transition[k], begin_shift[k], moved, jacobian[k])
-        _relative_shift(end_shift[k], moved, residual[k])
 
 
 @kernel("void(f8[:, :, ::1], f8[:, :, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1])")
@@ -227,118 +216,228 @@ def _along_motion(
         _relative_shift(shift, end_shift[k], along[k + 1])
 
 
-@kernel(
-    "void(i8, Tuple((i8[::1], i8[::1], f8[:, ::1])), Tuple((i8[::1], f8[:, ::1], i8[::1], i8[::1])), "
-    "Tuple((f8[:, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1])), f8[:, ::1], f8[:, :, ::1], "
-    "i8[::1])"
-)
-def _linearise_aids(
-    first: int, measured: tuple[Integers, Integers, Array], aids: tuple[Integers, Array, Integers, Integers],
-    states: State, residual: Array, jacobian: Array, components: Integers,
+@kernel()
+def _linearise_motion(
+    first: int, begin_shift: Array, transition: Array, end_shift: Array, residual: Array, jacobian: Array,
+    whitener: Array, whitened: Array, norm: Array,
 ) -> None:  # fmt: skip
-    """Residuals and derivatives of M measurements at the K states that they are attached to.
-
-    Parameters
-    ----------
-    first : int
-        Index of the first measurement that is computed.
-    measured : (M,) int, (M,) int and (M, 3) arrays
-        Number of the state of each measurement (-1: none of these states); number of its instrument; its value.
-    aids : tuple of arrays
-        Parameters of each instrument, see `simnav.estimators.models.measurements.Aid`.
-    states : tuple of (K, ...) arrays
-        The states, see `simnav.estimators.models.measurements.State`.
-    residual : (M, 3) array
-        Overwritten: measured minus predicted.
-    jacobian : (M, 3, n) array
-        Overwritten: derivative of the prediction with respect to the state's error.
-    components : (M,) int array
-        Overwritten: components that count; 0 where the state has no such measurement.
-    """
-    row, instrument, value = measured
-    codes, arms, bias_at, scale_at = aids
-    position, velocity, dcm, rate, bias, calibration = states
-    innovation = np.empty(3)
-    for i in range(first, row.size):
-        k, s = row[i], instrument[i]
-        if k < 0:
-            continue
-        components[i] = observe_inertial(
-            (codes[s], arms[s], bias_at[s], scale_at[s]), value[i],
-            (position[k], velocity[k], dcm[k], rate[k], bias[k], calibration[k]), innovation, jacobian[i],
-        )  # fmt: skip
-        for r in range(3):
-            residual[i, r] = innovation[r] if r < components[i] else 0.0
+    """Residual and derivative of the motion factors from a row on; see `_linearise`."""
+    moved = np.empty(begin_shift.shape[1])
+    for k in range(first, begin_shift.shape[0]):
+        _move(transition[k], begin_shift[k], moved, jacobian[k])
+        _relative_shift(end_shift[k], moved, residual[k])
+        norm[k] = whiten_one(residual[k], whitener[k], whitened[k])
 
 
-@kernel(
-    "void(i8, f8[:, :, ::1], f8[:, ::1], Tuple((f8[:, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[:, ::1])), "
-    "f8[:, :, ::1])"
-)
+@kernel()
 def _move_folds(
-    first: int, transition: Array, shift: Array, states: tuple[Array, Array, Array, Array, Array], jacobian: Array
+    first: int,
+    transition: Array,
+    shift: Array,
+    predicted: tuple[Array, ...],
+    now: tuple[Array, ...],
+    jacobian: Array,
+    dx: Array,
 ) -> None:
-    """Correct the states of folds by where their nodes' shifts lead, in place.
-
-    Parameters
-    ----------
-    first : int
-        Fold to begin with.
-    transition : (K, n, n) array
-        Phi from each node to the time of its fold.
-    shift : (K, n) array
-        By how much the node has been moved since the fold was predicted.
-    states : tuple of (K, ...) arrays
-        Position, velocity, rotation, biases and calibration at the folds; updated.
-    jacobian : (K, n, n) array
-        Overwritten: derivative of the fold's state with respect to the node.
-    """
-    position, velocity, dcm, bias, calibration = states
-    count, n = shift.shape
-    moved, dx = np.empty(n), np.zeros(15 + calibration.shape[1])
-    for k in range(first, count):
+    """States of folds from a row on, where their nodes' shifts lead, and their derivatives; ``dx`` is work space."""
+    position, velocity, dcm, bias, calibration = now
+    moved = np.empty(shift.shape[1])
+    for k in range(first, shift.shape[0]):
+        for i in range(3):
+            position[k, i], velocity[k, i] = predicted[0][k, i], predicted[1][k, i]
+            for j in range(3):
+                dcm[k, i, j] = predicted[2][k, i, j]
+        for i in range(6):
+            bias[k, i] = predicted[3][k, i]
+        for i in range(calibration.shape[1]):
+            calibration[k, i] = predicted[4][k, i]
         _move(transition[k], shift[k], moved, jacobian[k])
-        for j in range(n):
+        for j in range(moved.size):
             dx[j] = moved[j]
         correct_inertial(position[k], velocity[k], dcm[k], bias[k], calibration[k], dx)
 
 
-@kernel("void(f8[:, ::1], i8[::1], i8, f8[:, ::1])")
-def _retract_folds(step: Array, node: Integers, base: int, shift: Array) -> None:
-    for i in range(node.size):
-        _add(step[node[i] - base], shift[i].copy(), shift[i])
+#: What `_linearise` is to do: motion factors; readings that it predicts itself; what follows for all readings.
+MOTION, READINGS, REST = 1, 2, 4
+EVERYTHING = MOTION | READINGS | REST
+
+_STATES = "Tuple((f8[:, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[:, ::1]))"
+_NODE_STATES = "Tuple((f8[:, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1]))"
+NODE_STATES = ("position", "velocity", "dcm", "raw_rate", "bias", "calibration")
+STATE = ("position", "velocity", "dcm", "bias", "calibration")
+NOW = tuple(f"now_{name}" for name in STATE)
+MOTIONS = ("begin_shift", "transition", "end_shift", "residual", "jacobian", "whitener", "whitened", "norm")
+AIDS = (
+    "node", "fold", "instrument", "components", "bare", "value", "noise", "residual", "jacobian", "whitener",
+    "whitened", "norm",
+)  # fmt: skip
+FOLDS = ("node", "transition", "noise", "shift", "jacobian", "raw_rate")
+SHIFTS, FOLD_SHIFT = ("begin_shift", "end_shift"), ("node", "shift")
+MARGINAL = ("predicted", "predicted_shift", "step")
 
 
-@kernel("void(f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1])")
+@kernel(
+    f"void(i8, i8, {ROWS}, UniTuple(i8, 3), {_NODE_STATES}, "
+    "Tuple((f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, :, ::1], f8[:, ::1], f8[::1])), "
+    "Tuple((i8[::1], i8[::1], i8[::1], i8[::1], i8[::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[:, :, ::1], "
+    "f8[:, :, ::1], f8[:, ::1], f8[::1])), "
+    "Tuple((i8[::1], f8[:, :, ::1], f8[:, :, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1])), "
+    f"{_STATES}, {_STATES}, Tuple((i8[::1], f8[:, ::1], i8[::1], i8[::1])))"
+)
+def _linearise(
+    what: int, first: int, rows: Rows, fold_rows: tuple[int, int, int], nodes: tuple[Array, ...],
+    motions: tuple[Array, ...], aids: tuple[Any, ...], folds: tuple[Any, ...], predicted: tuple[Array, ...],
+    now: tuple[Array, ...], known: tuple[Integers, Array, Integers, Integers],
+) -> None:  # fmt: skip
+    """Linearise and whiten the factors that have to do with a node or later ones.
+
+    Parameters
+    ----------
+    what : int
+        Sum of `MOTION`, `READINGS` and `REST`: the error of each motion and its derivative; the readings whose equation
+        is compiled; for all readings, what a fold adds to their noise, and their derivatives by its node.
+    first : int
+        The node, counted from the first of the window.
+    rows : tuple of int
+        Where nodes and factors are in the arrays below, see `simnav.estimators.algebra.block_tridiagonal.Rows`.
+    fold_rows : tuple of int
+        Row of the first fold, their number, and the number of the first fold, from which factors count theirs.
+    nodes, motions, aids, folds, predicted, now : tuples of arrays
+        Whole columns of `Chain`: `NODE_STATES`; `MOTIONS`; `AIDS`; `FOLDS`; and of the folds the state as predicted and
+        as moved by the shift of its node.
+    known : tuple of arrays
+        Parameters of each instrument, see `simnav.estimators.models.measurements.Aid`.
+    """
+    k0, count, m0, i0, total, base = rows
+    n = motions[4].shape[1]
+    if what & MOTION:
+        m1 = m0 + count - 1
+        _linearise_motion(
+            max(first - 1, 0), motions[0][m0:m1], motions[1][m0:m1], motions[2][m0:m1], motions[3][m0:m1],
+            motions[4][m0:m1], motions[5][m0:m1], motions[6][m0:m1], motions[7][m0:m1],
+        )  # fmt: skip
+    node, fold, instrument, components, bare, value, noise, residual, jacobian, whitener, whitened, norm = aids
+    codes, arms, bias_at, scale_at = known
+    fold0, folds_count, fold_base = fold_rows
+    i1 = i0 + total
+    begin = i1
+    while begin > i0 and node[begin - 1] - base >= first:
+        begin -= 1
+    if what & READINGS and folds_count and begin < i1:
+        f1 = fold0 + folds_count
+        at = f1
+        while at > fold0 and folds[0][at - 1] >= node[begin]:
+            at -= 1
+        dx = np.zeros(15 + now[4].shape[1])
+        _move_folds(
+            at - fold0,
+            folds[1][fold0:f1],
+            folds[3][fold0:f1],
+            (
+                predicted[0][fold0:f1],
+                predicted[1][fold0:f1],
+                predicted[2][fold0:f1],
+                predicted[3][fold0:f1],
+                predicted[4][fold0:f1],
+            ),
+            (now[0][fold0:f1], now[1][fold0:f1], now[2][fold0:f1], now[3][fold0:f1], now[4][fold0:f1]),
+            folds[4][fold0:f1],
+            dx,
+        )
+    innovation, wide, work = np.empty(3), np.zeros((3, 15)), np.empty(n)
+    for i in range(begin, i1):
+        s, at_fold = instrument[i], fold[i] >= 0
+        f = fold0 + fold[i] - fold_base
+        if what & READINGS and codes[s] != OWN:
+            J = jacobian[i] if n >= 15 else wide
+            aid = codes[s], arms[s], bias_at[s], scale_at[s]
+            if at_fold:
+                d = observe_inertial(
+                    aid, value[i], (now[0][f], now[1][f], now[2][f], folds[5][f], now[3][f], now[4][f]), innovation, J
+                )
+            else:
+                k = k0 + node[i] - base
+                d = observe_inertial(
+                    aid, value[i], (nodes[0][k], nodes[1][k], nodes[2][k], nodes[3][k], nodes[4][k], nodes[5][k]),
+                    innovation, J,
+                )  # fmt: skip
+            components[i] = d
+            for r in range(3):
+                residual[i, r] = innovation[r] if r < d else 0.0
+            if n < 15:
+                for r in range(3):
+                    for c in range(n):
+                        jacobian[i, r, c] = wide[r, c]
+                        wide[r, c] = 0.0
+        if what & REST:
+            if at_fold:
+                if bare[i] != 0:
+                    bare[i] = 0
+                    add_noise(jacobian[i], components[i], folds[2][f], noise[i], whitener[i], work)
+                through_one(folds[4][f], min(15, n), jacobian[i], work)
+            norm[i] = whiten_one(residual[i], whitener[i], whitened[i])
+
+
+@kernel(
+    f"void({ROWS}, UniTuple(i8, 2), f8[:, ::1], {_STATES}, UniTuple(f8[:, ::1], 2), Tuple((i8[::1], f8[:, ::1])), "
+    "f8[::1])"
+)
 def _retract(
-    step: Array, position: Array, velocity: Array, dcm: Array, bias: Array, calibration: Array, begin_shift: Array,
-    end_shift: Array,
+    rows: Rows, fold_rows: tuple[int, int], step: Array, states: tuple[Array, ...], shifts: tuple[Array, Array],
+    folds: tuple[Integers, Array], prior_shift: Array,
 ) -> None:  # fmt: skip
     """Move the nodes by a step, in place.
 
     Parameters
     ----------
+    rows, fold_rows : tuples of int
+        Where nodes and motion factors are in the arrays below, see
+        `simnav.estimators.algebra.block_tridiagonal.Rows`; row of the first fold, and number of folds.
     step : (K, n) array
-        Corrections, with a rotation vector at 6:9 that turns the attitude from the left.
-    position, velocity, dcm, bias, calibration : (K, ...) arrays
-        States of the nodes; updated.
-    begin_shift, end_shift : (K - 1, n) arrays
-        By how much the nodes at both ends of each motion have been moved; updated.
+        Corrections, with a rotation vector at 6:9 that turns the attitude from the left; its first row is that of the
+        first node.
+    states : tuple of arrays
+        Whole columns: position, velocity, rotation, biases and calibration of the nodes; updated.
+    shifts : two arrays
+        Whole columns: by how much the nodes at both ends of each motion have been moved; updated.
+    folds : tuple of arrays
+        Whole columns: numbers of the nodes of the folds, and by how much these have been moved, which is updated.
+    prior_shift : (n,) array
+        Mean of the prior minus the first node; updated.
     """
-    count, n = step.shape
-    dx = np.zeros(max(n, 15))
+    k0, count, m0, _, _, base = rows
+    position, velocity, dcm, bias, calibration = states
+    begin_shift, end_shift = shifts
+    of_fold, fold_shift = folds
+    n = step.shape[1]
+    dx, before = np.zeros(max(n, 15)), np.empty(n)
     for k in range(count):
+        row, m = k0 + k, m0 + k
         for j in range(n):
             dx[j] = step[k, j]
-        correct_inertial(position[k], velocity[k], dcm[k], bias[k], calibration[k], dx)
-        for side in range(2):
-            if (side == 0 and k == count - 1) or (side == 1 and k == 0):
-                continue
-            shift = begin_shift[k] if side == 0 else end_shift[k - 1]
-            r0, r1, r2 = _compose(dx[6], dx[7], dx[8], shift[6], shift[7], shift[8])
-            for j in range(n):
-                shift[j] += dx[j]
-            shift[6], shift[7], shift[8] = r0, r1, r2
+        correct_inertial(position[row], velocity[row], dcm[row], bias[row], calibration[row], dx)
+        if k < count - 1:
+            _add_to(begin_shift[m], step[k])
+        if k > 0:
+            _add_to(end_shift[m - 1], step[k])
+    for i in range(fold_rows[0], fold_rows[0] + fold_rows[1]):
+        _add_to(fold_shift[i], step[of_fold[i] - base])
+    before[:] = prior_shift
+    _relative_shift(before, step[0], prior_shift)
+
+
+@kernel("void(f8[:, ::1], f8[::1], f8[::1], f8[:, ::1], f8[::1], f8[:, ::1])")
+def _marginalise(
+    covariance: Array, shift: Array, step: Array, prior: Array, prior_shift: Array, whitener: Array
+) -> None:
+    """Make the prior of a node from what was predicted for it: covariance, and shift before its last step.
+
+    ``prior`` (n, n), ``prior_shift`` (n,) and ``whitener`` (n, n) are overwritten.
+    """
+    mean = shift + step
+    _turn_covariance(covariance, mean, prior)
+    _relative_shift(mean, step, prior_shift)
+    whitening(prior, whitener)
 
 
 class InertialChain(Chain):
@@ -363,62 +462,105 @@ class InertialChain(Chain):
         covariance = super().begin(start, instruments)
         front = self.front
         nothing = (0, np.zeros(3), -1, -1)
-        # The compiled loop leaves out what has an equation of its own.
-        self._own = np.array([name in front.own for name in self.names], dtype=bool)
-        known = [nothing if name in front.own else front.aid_parameters.get(name, nothing) for name in self.names]
+        known = [front.aid_parameters.get(name, nothing) for name in self.names]
         self._known = (
-            np.array([code for code, *_ in known], dtype=np.int64),
+            np.array([OWN if name in front.own else code for name, (code, *_) in zip(self.names, known)], np.int64),
             np.array([arm for _, arm, _, _ in known], dtype=np.float64).reshape(-1, 3),
             np.array([at for *_, at, _ in known], dtype=np.int64),
             np.array([at for *_, at in known], dtype=np.int64),
         )
+        table = front.step_table(self.names)
+        self._packet = None if table is None else Packet(self.names, table)
         return covariance
 
-    def linearise_motion(self, first: int = 0) -> None:
-        """As `Chain.linearise_motion` (equations in the module)."""
-        m = self.motions
-        _linearise_motion.unchecked(
-            first, m["transition"], m["begin_shift"], m["end_shift"], m["residual"], m["jacobian"]
-        )
+    def take(self, measurements: Sequence[Measurement], until: float, spacing: float) -> tuple[int, int] | None:
+        """As `Chain.take`, if no instrument has an equation or a clock of its own."""
+        nodes, motions, aids, folds = self.nodes, self.motions, self.aids, self.folds
+        count, packet, front = len(measurements), self._packet, self.front
+        if packet is None or count > aids.free:
+            return None
+        for columns in (nodes, motions, folds):
+            columns.reserve(count)
+        state, samples, first, noise, others = front.carried()
+        first, self.ahead, (new, attached, folded, unused) = take_inertial.unchecked(
+            state, samples, first, (until, spacing, self.ahead), noise,
+            (front.transition, front.process_noise, self._transition, self._noise), others,
+            (packet.aids, packet.fill(measurements)),
+            (
+                nodes.last, motions.last, aids.last, folds.last, self.base + len(nodes) - 1,
+                self.fold_base + len(folds), len(folds),
+            ),
+            (
+                nodes.whole(KEPT), motions.whole(MOTION_COLUMNS), aids.whole(AID_COLUMNS), folds.whole(FOLD_COLUMNS),
+                folds.whole(KEPT),
+            ),
+        )  # fmt: skip
+        front.arrived(first)
+        for columns, rows in ((nodes, new), (motions, new), (aids, attached), (folds, folded)):
+            if rows:
+                columns.grow(rows)
+        return attached, unused
+
+    def linearise_from(self, node: int = 0) -> None:
+        """As `Chain.linearise_from` (equations in the module)."""
+        if not self.front.own:
+            self._compute(EVERYTHING, node)
+            return
+        self._compute(MOTION | READINGS, node)
+        self._observe_own(self.first_aid(node))
+        self._compute(REST, node)
+
+    def linearise_motion(self, node: int = 0) -> None:
+        """As `Chain.linearise_motion`."""
+        self._compute(MOTION, node)
+
+    def linearise_aids(self, node: int = 0) -> None:
+        """As `Chain.linearise_aids`."""
+        self._compute(READINGS, node)
+        if self.front.own:
+            self._observe_own(self.first_aid(node))
+        self._compute(REST, node)
+
+    def _compute(self, what: int, node: int) -> None:
+        folds = self.folds
+        _linearise.unchecked(
+            what, node, self.rows, (folds.first, len(folds), self.fold_base), self.nodes.whole(NODE_STATES),
+            self.motions.whole(MOTIONS), self.aids.whole(AIDS), folds.whole(FOLDS), folds.whole(STATE),
+            folds.whole(NOW), self._known,
+        )  # fmt: skip
+
+    def _observe_own(self, first: int) -> None:
+        """The readings from an index on whose kind has a measurement equation of its own."""
+        aids = self.aids
+        for row, states, prefix in self.places(first):
+            self.observe(first, row, states, prefix, aids["jacobian"])
 
     def observe(self, first: int, row: NDArray[np.int64], states: Columns, prefix: str, jacobian: Array) -> None:
-        """As `Chain.observe`."""
-        aids = self.aids
-        wide = jacobian if self.size >= 15 else np.zeros((len(aids), 3, 15))
+        """As `Chain.observe`, for readings whose kind has a measurement equation of its own."""
+        wide = jacobian if self.size >= 15 else np.zeros((len(jacobian), 3, 15))
         position, velocity, dcm, bias, calibration = (states[prefix + name] for name in self.front.state)
-        compiled = np.where(self._own[aids["instrument"]], -1, row) if self.front.own else row
-        _linearise_aids.unchecked(
-            first, (compiled, aids["instrument"], aids["value"]), self._known,
-            (position, velocity, dcm, states["raw_rate"], bias, calibration), aids["residual"], wide,
-            aids["components"],
-        )  # fmt: skip
-        if self.front.own:
-            arrays = [states[name] for name in self.node_arrays]
-            inertial = arrays[0] if len(arrays) == 1 else np.hstack(arrays)
-            self.observe_own(first, row, wide, position, velocity, dcm, inertial, bias, calibration)
+        arrays = [states[name] for name in self.node_arrays]
+        inertial = arrays[0] if len(arrays) == 1 else np.hstack(arrays)
+        self.observe_own(first, row, wide, position, velocity, dcm, inertial, bias, calibration)
         if wide is not jacobian:
-            here = np.flatnonzero(row[first:] >= 0) + first
+            own = self._known[0][self.aids["instrument"][first:]] == OWN
+            here = np.flatnonzero((row[first:] >= 0) & own) + first
             jacobian[here] = wide[here, :, : self.size]
-
-    def move_folds(self, first: int) -> None:
-        """As `Chain.move_folds`."""
-        folds, names = self.folds, self.front.state
-        for name in names:
-            folds[f"now_{name}"][first:] = folds[name][first:]
-        position, velocity, dcm, bias, calibration = (folds[f"now_{name}"] for name in names)
-        states = position, velocity, dcm, bias, calibration
-        _move_folds.unchecked(first, folds["transition"], folds["shift"], states, folds["jacobian"])
 
     def retract(self, step: Array) -> None:
         """As `Chain.retract`."""
-        nodes, m = self.nodes, self.motions
+        folds = self.folds
         _retract.unchecked(
-            step, nodes["position"], nodes["velocity"], nodes["dcm"], nodes["bias"], nodes["calibration"],
-            m["begin_shift"], m["end_shift"],
+            self.rows, (folds.first, len(folds)), step, self.nodes.whole(STATE), self.motions.whole(SHIFTS),
+            folds.whole(FOLD_SHIFT), self.prior_shift,
         )  # fmt: skip
-        if len(self.folds):
-            _retract_folds.unchecked(step, self.folds["node"], self.base, self.folds["shift"])
-        self.prior_shift = self.relative_shift(self.prior_shift, step[0])
+
+    def marginalise(self, count: int) -> None:
+        """As `Chain.marginalise`."""
+        row = self.nodes.first + count
+        covariance, shift, step = (column[row] for column in self.nodes.whole(MARGINAL))
+        _marginalise.unchecked(covariance, shift, step, self.prior, self.prior_shift, self.prior_whitener)
+        self.drop(count)
 
     def along_motion(self, step: Array) -> Array:
         """As `Chain.along_motion`."""

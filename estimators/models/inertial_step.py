@@ -10,15 +10,12 @@ import numpy as np
 from simnav.compiled import kernel
 from simnav.types import Array, Integers, Measurement
 
-from .base import RESULTS, StepRule
+from .base import RESULTS, AidTable, StepRule
 from .inertial_update import assimilate_inertial
 from .propagation import MOVING, SAMPLES, Moving, Samples, propagate_inertial
 
 __all__ = ["PLAIN", "STEP", "AidTable", "Measured", "Packet", "filter_inertial"]
 
-#: The instruments of a filter: their codes, numbers of components, and places of bias and scale factor (i, 4); lever
-#: arms (i, 3) [m]; and the elements of their noise (i, 9).
-AidTable: TypeAlias = tuple[Integers, Array, Array]
 #: The k measurements of a step in order of their times: rows of their instruments (k,), times (k,) [s], values (k, 3);
 #: overwritten, for each what `assimilate_inertial` returns, in a row of results (k, 8).
 Measured: TypeAlias = tuple[Integers, Array, Array, Array]
@@ -91,7 +88,7 @@ class Packet:
         How they are used.
     """
 
-    def __init__(self, names: Sequence[str], aids: AidTable, rule: StepRule):
+    def __init__(self, names: Sequence[str], aids: AidTable, rule: StepRule = PLAIN):
         self.aids, self.rule = aids, rule
         self._row = {name: i for i, name in enumerate(names)}
         self._make_room(8)

@@ -40,6 +40,7 @@ __all__ = [
     "Samples",
     "accumulate_error",
     "advance_inertial",
+    "carry_errors",
     "correct_inertial",
     "next_stretch",
     "propagate_covariance",
@@ -433,6 +434,24 @@ def propagate_covariance(
         for j in range(m, n):
             covariance[i, j] *= decay[i - m] * decay[j - m]
         covariance[i, i] += noise[i - m]
+
+
+@kernel("void(f8[:, ::1], f8[::1], f8, f8[:, ::1])")
+def carry_errors(transition: Array, rate: Array, elapsed: float, error: Array) -> None:
+    """Propagate errors, the columns of an (n, k) array, in place; for the arguments see `propagate_covariance`."""
+    m, columns = transition.shape[0], error.shape[1]
+    X = np.zeros((m, columns))
+    for i in range(m):
+        for k in range(m):
+            x = transition[i, k]
+            if x != 0.0:
+                for j in range(columns):
+                    X[i, j] += x * error[k, j]
+    error[:m] = X
+    for i in range(m, error.shape[0]):
+        decay = exp(-rate[i - m] * elapsed)
+        for j in range(columns):
+            error[i, j] *= decay
 
 
 @kernel(f"i8({MOVING}, {SAMPLES}, i8, f8, f8[::1], UniTuple(f8[:, ::1], 3), UniTuple(f8[::1], 3), f8)")

@@ -51,7 +51,7 @@ from typing import ClassVar
 import numpy as np
 
 from simnav.estimators.adaptations.base import Adaptation, Innovation
-from simnav.estimators.algebra.block_tridiagonal import after_step, half_squares, keep_weights, solve_chain, whiten
+from simnav.estimators.algebra.block_tridiagonal import after_step, half_squares, keep_weights, solve_chain
 from simnav.estimators.composition import Solver
 from simnav.estimators.models.base import ErrorModel
 from simnav.estimators.models.chains import Chain, chain_of
@@ -74,6 +74,16 @@ CHECKED_STEP = 1.0
 FIRST_DAMPING, DAMPING_FACTOR = 1e-2, 10.0
 #: A measurement with a weight up to this is reported as faulty.
 FAULTY_WEIGHT = 0.5
+#: The columns of the chain that the kernels of `simnav.estimators.algebra.block_tridiagonal` take.
+SOLVED_MOTIONS = ("jacobian", "noise", "residual", "weight")
+SOLVED_AIDS = ("node", "instrument", "components", "jacobian", "residual", "noise", "weight")
+ELIMINATED_NODES = ("predicted", "predicted_shift", "filtered", "filtered_shift")
+ELIMINATED_AIDS = ("cross", "white", "innovation", "used")
+STEP = ("step", "size")
+STEPPED_NODES = ("step", "predicted_shift", "filtered_shift")
+STEPPED_MOTIONS = ("jacobian", "residual", "whitener", "whitened", "norm", "weight")
+STEPPED_AIDS = ("node", *STEPPED_MOTIONS)
+SQUARES = ("norm", "weight")
 
 
 class WindowEstimator(LooksBack, Solver):
@@ -187,6 +197,7 @@ class WindowEstimator(LooksBack, Solver):
         self._epochs: deque[int] = deque()  # nodes of each epoch in the window
         self._counted = self._eliminated = 0
         self._contraction = 1.0
+        self._plain = self.adaptation is None and not self._owners and not self.every_sample
         self._cost_test = CostTest()
         n = self.chain.size
         self.chain.nodes.add(predicted=(n, n), predicted_shift=(n,), filtered=(n, n), filtered_shift=(n,), step=(n,))
@@ -203,18 +214,14 @@ class WindowEstimator(LooksBack, Solver):
         chain.load(measurements.imu)
         diagnostics: dict[str, float | Array] = dict(self._blank)
         flagged: list[tuple[str, float]] = []
-        attached = 0
         samples = measurements.imu.time if self.every_sample and measurements.imu is not None else np.empty(0)
         admitted = self._admission.admit(measurements, chain.time)
-        plain = self.adaptation is None and bool(self._owners)
-        for group in together(admitted, self._owners) if plain else [[m] for m in admitted]:
-            self._advance(min(group[0].time, measurements.time), samples)
-            last = group[0].time == admitted[-1].time
-            if len(group) > 1 and self._take_together(group, last):
-                attached += len(group)
-                continue
-            for m in group:
-                attached += self._take(m, last, diagnostics, flagged)
+        taken = chain.take(admitted, measurements.time, self.spacing) if self._plain and admitted else None
+        if taken is None:
+            attached = self._take_each(admitted, measurements.time, samples, diagnostics, flagged)
+        else:
+            attached, unused = taken
+            self._admission.skipped += unused
         if attached:
             self._optimise(attached, diagnostics, flagged)
             self._marginalise()
@@ -233,6 +240,22 @@ class WindowEstimator(LooksBack, Solver):
             estimate.states = {name: (value, wider * sigma) for name, (value, sigma) in estimate.states.items()}
         estimate.diagnostics, estimate.flagged = diagnostics, flagged
         return estimate
+
+    def _take_each(
+        self, admitted: Sequence[Measurement], until: float, samples: Array, diagnostics: dict[str, float | Array],
+        flagged: list[tuple[str, float]],
+    ) -> int:  # fmt: skip
+        """Make the measurements of a step factors, one by one; their number."""
+        attached, by_group = 0, self.adaptation is None and bool(self._owners)
+        for group in together(admitted, self._owners) if by_group else [[m] for m in admitted]:
+            self._advance(min(group[0].time, until), samples)
+            last = group[0].time == admitted[-1].time
+            if len(group) > 1 and self._take_together(group, last):
+                attached += len(group)
+                continue
+            for m in group:
+                attached += self._take(m, last, diagnostics, flagged)
+        return attached
 
     def _advance(self, until: float, samples: Array) -> None:
         """Advance the front, leaving a node at each of the samples on the way."""
@@ -277,7 +300,10 @@ class WindowEstimator(LooksBack, Solver):
         """Make the front a node for a measurement, unless that can be folded onto the newest one."""
         chain = self.chain
         if chain.ahead > 0.0 and (last or self.every_sample or chain.ahead >= self.spacing):
-            self._extend()
+            if self.adaptation is None:
+                chain.extend()  # the measurement is going to change the covariance, and nothing asks for it before
+            else:
+                self._extend()
 
     def _adapted_noise(
         self,
@@ -345,7 +371,7 @@ class WindowEstimator(LooksBack, Solver):
         chain, nodes = self.chain, self.chain.nodes
         now = _Progress(np.zeros(chain.size), self._first_new(attached), min(1.0, 2.0 * self._contraction))
         self._contraction = now.contraction
-        self._linearise(now.first)
+        self.chain.linearise_from(now.first)
         while True:
             reweighted = len(nodes)
             if now.accepted and self.weighting is not None:
@@ -379,7 +405,7 @@ class WindowEstimator(LooksBack, Solver):
                     self._keep()
                     now.first = len(nodes)
                     continue
-                self._linearise()
+                self.chain.linearise_from()
             now.first, now.before, now.since = 0, now.since, 0.0
             if now.accepted:
                 now.moved += nodes["step"][-1]
@@ -390,25 +416,25 @@ class WindowEstimator(LooksBack, Solver):
                 now.damping = max(now.damping, FIRST_DAMPING)  # linearised since, so what was solved for is not kept
                 break
         if now.damping > 0.0:  # the covariances and the prior are those without it
-            self._linearise()
+            self.chain.linearise_from()
             self._solve(0.0)
             nodes["step"][:] = 0.0
-        self._keep()
-        self.covariance = nodes["filtered"][-1].copy()
+        cost = self._keep()
+        self.covariance = nodes.newest("filtered").copy()
         self._eliminated = len(nodes)
-        return now.solved, self._cost(), now.moved, attached
+        return now.solved, cost, now.moved, attached
 
     def _step(self, damping: float, first: int, attached: int) -> tuple[float, int]:
         """Solve for a step; its size, and the new factors left: none if there is no finite step with them."""
         size, older = self._solve(damping, first)
         if not older <= CHECKED_STEP:  # too far from where the older nodes were linearised
-            self._linearise()
+            self.chain.linearise_from()
             size, _ = self._solve(damping)
         if not isfinite(size):
             self.chain.detach(attached)
             self._admission.skipped += attached
             attached = 0
-            self._linearise()
+            self.chain.linearise_from()
             size, _ = self._solve(0.0)
             if not isfinite(size):
                 raise FloatingPointError(f"the window at {self.chain.time:g} s has no finite solution")
@@ -423,11 +449,11 @@ class WindowEstimator(LooksBack, Solver):
             if along:
                 step[:] = chain.along_motion(step)
             chain.retract(step)
-            self._linearise()
+            self.chain.linearise_from()
             if self._cost() <= limit:
                 return True
             chain.restore_states(before)
-            self._linearise()
+            self.chain.linearise_from()
         return False
 
     def _first_new(self, attached: int) -> int:
@@ -436,26 +462,14 @@ class WindowEstimator(LooksBack, Solver):
             return 0
         return min(self._eliminated, int(self.chain.aids["node"][-attached]) - self.chain.base)
 
-    def _keep(self) -> None:
-        """Refer what the elimination left, and the residuals, to the nodes as they are after the step."""
-        chain, nodes, motions, aids = self.chain, self.chain.nodes, self.chain.motions, self.chain.aids
-        after_step.unchecked(
-            nodes["step"], (nodes["predicted_shift"], nodes["filtered_shift"]),
-            (motions["jacobian"], motions["residual"], motions["whitener"], motions["whitened"], motions["norm"]),
-            (
-                aids["node"], chain.base, aids["jacobian"], aids["residual"], aids["whitener"], aids["whitened"],
-                aids["norm"],
-            ),
+    def _keep(self) -> float:
+        """Refer what the elimination left, and the residuals, to the nodes as they are after the step; the cost."""
+        chain = self.chain
+        cost: float = after_step.unchecked(
+            chain.rows, (chain.prior_whitener, chain.prior_shift), chain.nodes.whole(STEPPED_NODES),
+            chain.motions.whole(STEPPED_MOTIONS), chain.aids.whole(STEPPED_AIDS),
         )  # fmt: skip
-
-    def _linearise(self, node: int = 0) -> None:
-        """Linearise and whiten the factors that have to do with a node or later ones."""
-        motions, aids = self.chain.motions, self.chain.aids
-        motion, aid = self.chain.factors_from(node)
-        self.chain.linearise_motion(motion)
-        self.chain.linearise_aids(aid)
-        whiten.unchecked(motion, motions["residual"], motions["whitener"], motions["whitened"], motions["norm"])
-        whiten.unchecked(aid, aids["residual"], aids["whitener"], aids["whitened"], aids["norm"])
+        return cost
 
     def _weigh(self, iteration: int) -> tuple[bool, int]:
         """Ask the weighting; whether it has settled, and the first node that has to do with a weight that is new."""
@@ -474,29 +488,20 @@ class WindowEstimator(LooksBack, Solver):
 
     def _cost(self) -> float:
         """Half the sum of squares of all factors, with the weights that they have."""
-        chain, motions, aids = self.chain, self.chain.motions, self.chain.aids
+        chain = self.chain
         cost: float = half_squares.unchecked(
-            chain.prior_whitener, chain.prior_shift, motions["weight"], motions["norm"], aids["weight"], aids["norm"]
-        )
+            chain.rows, (chain.prior_whitener, chain.prior_shift), chain.motions.whole(SQUARES),
+            chain.aids.whole(SQUARES),
+        )  # fmt: skip
         return cost
 
     def _solve(self, damping: float, first: int = 0) -> tuple[float, float]:
         """One step of all nodes; its largest component in sigmas, of all nodes and of those before ``first``."""
-        chain, nodes = self.chain, self.chain.nodes
-        motions, aids = chain.motions, chain.aids
+        chain, nodes, aids = self.chain, self.chain.nodes, self.chain.aids
         sizes: tuple[float, float] = solve_chain.unchecked(
-            (chain.prior if first else chain.turned(chain.prior, -chain.prior_shift), chain.prior_shift),
-            (motions["jacobian"], motions["noise"], motions["residual"], motions["weight"]),
-            (
-                aids["node"], chain.base, aids["instrument"], aids["components"], aids["jacobian"], aids["residual"],
-                aids["noise"], aids["weight"],
-            ),
-            damping, first,
-            (
-                nodes["predicted"], nodes["predicted_shift"], nodes["filtered"], nodes["filtered_shift"],
-                aids["cross"], aids["white"], aids["innovation"], aids["used"],
-            ),
-            nodes["step"], nodes["size"],
+            (chain.prior if first else chain.turned(chain.prior, -chain.prior_shift), chain.prior_shift), chain.rows,
+            chain.motions.whole(SOLVED_MOTIONS), aids.whole(SOLVED_AIDS), damping, first,
+            nodes.whole(ELIMINATED_NODES), aids.whole(ELIMINATED_AIDS), *nodes.whole(STEP),
         )  # fmt: skip
         return sizes
 
@@ -518,10 +523,7 @@ class WindowEstimator(LooksBack, Solver):
         while self.window is not None and len(self._epochs) > self.window:
             leaving += self._epochs.popleft()
         if leaving:
-            step = chain.nodes["step"][leaving].copy()
-            mean = chain.nodes["predicted_shift"][leaving] + step
-            chain.set_prior(chain.turned(chain.nodes["predicted"][leaving], mean), chain.relative_shift(mean, step))
-            chain.drop(leaving)
+            chain.marginalise(leaving)
             self._eliminated -= leaving
 
 
