@@ -49,8 +49,8 @@ from .cholesky import factorise
 from .products import Places, add_product, list_elements, padded, sparse_product
 
 __all__ = [
-    "ROWS", "Aids", "Elimination", "Rows", "Whitened", "after_step", "error_after_step", "half_squares", "keep_weights",
-    "solve_chain", "whiten", "whiten_one",
+    "ROWS", "STEPPED_TYPES", "Aids", "Elimination", "Rows", "Whitened", "after_step", "error_after_step",
+    "half_squares", "keep_weights", "solve_chain", "whiten", "whiten_one",
 ]  # fmt: skip
 
 #: A factor with a smaller weight than this is left out.
@@ -403,11 +403,14 @@ def error_after_step(error: Array, F: Array, older: Array, newer: Array, after: 
         after[r] = x
 
 
-@kernel(
-    f"f8({ROWS}, Tuple((f8[:, ::1], f8[::1])), UniTuple(f8[:, ::1], 3), "
-    "Tuple((f8[:, :, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[::1], f8[::1])), "
-    "Tuple((i8[::1], f8[:, :, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[::1], f8[::1])))"
+#: Types of the last three arguments of `after_step`.
+STEPPED_TYPES = (
+    "UniTuple(f8[:, ::1], 3), Tuple((f8[:, :, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[::1], f8[::1])), "
+    "Tuple((i8[::1], f8[:, :, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[::1], f8[::1]))"
 )
+
+
+@kernel(f"f8({ROWS}, Tuple((f8[:, ::1], f8[::1])), {STEPPED_TYPES})")
 def after_step(
     rows: Rows, prior: tuple[Array, Array], nodes: tuple[Array, Array, Array],
     motion: tuple[Array, Array, Array, Array, Array, Array],

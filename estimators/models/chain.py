@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 
 from simnav.compiled import kernel, ready
 from simnav.estimator.needs import Needs
-from simnav.estimators.algebra.block_tridiagonal import Rows, whiten
+from simnav.estimators.algebra.block_tridiagonal import Rows, after_step, whiten
 from simnav.estimators.algebra.whitening import whitening
 from simnav.types import (
     NO_SIDE,
@@ -44,10 +44,18 @@ from simnav.types import (
 )
 
 from .base import ErrorModel, Linearised
-from .columns import Columns
+from .columns import Columns, Selection
 from .many_readings import ManyReadings
 
-__all__ = ["Chain", "attach_one", "begin_motion", "chain_of"]
+__all__ = ["STEPPED", "Chain", "attach_one", "begin_motion", "chain_of"]
+
+
+#: The whole columns that `after_step` takes.
+STEPPED = Selection(
+    ("nodes", ("step", "predicted_shift", "filtered_shift")),
+    ("motions", ("jacobian", "residual", "whitener", "whitened", "norm", "weight")),
+    ("aids", ("node", "jacobian", "residual", "whitener", "whitened", "norm", "weight")),
+)
 
 
 @kernel("void(f8[:, ::1], f8[::1], f8[:, ::1], f8[:, ::1], f8[::1])")
@@ -94,7 +102,9 @@ class Chain(ABC):
     size : int
         Number n of components of the model's error.
     nodes : Columns
-        The nodes: ``time`` and the arrays of the model that `node_arrays` names.
+        The nodes: ``time`` and the arrays of the model that `node_arrays` names; of the last solution ``predicted``,
+        ``filtered`` (n, n), ``predicted_shift``, ``filtered_shift`` (n,)
+        (`simnav.estimators.algebra.block_tridiagonal.Elimination`), ``step`` (n,), and its ``size``.
     motions : Columns
         The motion factors, each from the previous node to a node: ``transition``, ``noise``, ``whitener`` (n, n);
         ``begin_shift``, ``end_shift`` (n,); of the last linearisation, ``jacobian`` (n, n) and ``residual`` (n,);
@@ -104,7 +114,8 @@ class Chain(ABC):
         (number since the start of the run, or -1), ``instrument`` (index into ``names``), ``components``, ``time``,
         ``value`` (3,), ``noise`` and ``whitener`` (3, 3), ``bare`` (1 if the noise of the motion has not been added to
         the noise yet); ``side`` if readings have side information; of the last linearisation ``residual`` (3,),
-        ``jacobian`` (3, n); ``weight``.
+        ``jacobian`` (3, n); ``weight``; of the last solution ``cross``, ``white`` (3, n), ``innovation`` (3,), ``used``
+        (`simnav.estimators.algebra.block_tridiagonal.Whitened`).
     folds : Columns
         Times between nodes with measurements: ``node`` (number of the previous node), ``time``, ``transition`` and
         ``noise`` (n, n) from the node, ``shift`` (n,) by which the node has moved since the prediction, the predicted
@@ -143,14 +154,17 @@ class Chain(ABC):
         self.names = tuple(instruments)
         self._index = {name: i for i, name in enumerate(self.names)}
         self._kept = (*front.state, *self.node_arrays)
-        self.nodes = Columns(time=(), **{name: getattr(front, name).shape for name in self._kept})
+        self._made: dict[Selection, Any] = {}
+        self.nodes = Columns(self._made, time=(), **{name: getattr(front, name).shape for name in self._kept})
+        self.nodes.add(predicted=(n, n), predicted_shift=(n,), filtered=(n, n), filtered_shift=(n,), step=(n,), size=())
         self.motions = Columns(
-            transition=(n, n), noise=(n, n), whitener=(n, n), begin_shift=(n,), end_shift=(n,), time=(),
+            self._made, transition=(n, n), noise=(n, n), whitener=(n, n), begin_shift=(n,), end_shift=(n,), time=(),
             residual=(n,), jacobian=(n, n), whitened=(n,), norm=(), weight=(),
         )  # fmt: skip
         self.aids = Columns(
-            node=np.int64, fold=np.int64, instrument=np.int64, components=np.int64, time=(), value=(3,), noise=(3, 3),
-            bare=np.int64, whitener=(3, 3), residual=(3,), jacobian=(3, n), whitened=(3,), norm=(), weight=(),
+            self._made, node=np.int64, fold=np.int64, instrument=np.int64, components=np.int64, time=(), value=(3,),
+            noise=(3, 3), bare=np.int64, whitener=(3, 3), residual=(3,), jacobian=(3, n), whitened=(3,), norm=(),
+            weight=(), cross=(3, n), white=(3, n), innovation=(3,), used=np.int64,
         )  # fmt: skip
         self._sides = max((len(own.kind.side) for own in front.own.values()), default=0)
         if self._sides:
@@ -159,7 +173,9 @@ class Chain(ABC):
         together = {name for many in front.many for name in many.sources}
         #: Of each instrument: whether it has an equation of its own, and one reading is predicted at a time.
         self._one_by_one = np.array([name in front.own and name not in together for name in self.names], dtype=bool)
-        self.folds = Columns(node=np.int64, time=(), transition=(n, n), noise=(n, n), shift=(n,), jacobian=(n, n))
+        self.folds = Columns(
+            self._made, node=np.int64, time=(), transition=(n, n), noise=(n, n), shift=(n,), jacobian=(n, n)
+        )
         self.folds.add(**{name: getattr(front, name).shape for name in self._kept})
         self.folds.add(**{f"now_{name}": getattr(front, name).shape for name in front.state})
         self.base = self.fold_base = 0
@@ -182,7 +198,16 @@ class Chain(ABC):
     def rows(self) -> Rows:
         """Where nodes, motion factors and aiding factors are in whole columns."""
         nodes, aids = self.nodes, self.aids
-        return nodes.first, len(nodes), self.motions.first, aids.first, len(aids), self.base
+        return nodes.first, nodes.last - nodes.first, self.motions.first, aids.first, aids.last - aids.first, self.base
+
+    def whole(self, selection: Selection) -> Any:
+        """The groups of whole columns that a kernel takes, a tuple of tuples of (capacity, ...) arrays."""
+        found = self._made.get(selection)
+        if found is None:
+            found = self._made[selection] = tuple(
+                [getattr(self, table).whole(names) for table, names in selection.groups]
+            )
+        return found
 
     @property
     def needs(self) -> Needs:
@@ -334,13 +359,15 @@ class Chain(ABC):
 
     def drop(self, count: int) -> None:
         """Remove the oldest nodes and their factors from the window."""
-        self.base += count
-        self.nodes.drop(count)
-        self.motions.drop(count)
-        self.aids.drop(int(self.aids["node"].searchsorted(self.base)))
-        folds = int(self.folds["node"].searchsorted(self.base))
+        first = self.base + count
+        self._leave(count, *(int(table["node"].searchsorted(first)) for table in (self.aids, self.folds)))
+
+    def _leave(self, nodes: int, aids: int, folds: int) -> None:
+        """Remove the oldest rows."""
+        self.base += nodes
         self.fold_base += folds
-        self.folds.drop(folds)
+        for table, count in ((self.nodes, nodes), (self.motions, nodes), (self.aids, aids), (self.folds, folds)):
+            table.drop(count)
 
     def copy_states(self) -> list[Array]:
         """Copies of the arrays that `retract` changes, for `restore_states`."""
@@ -480,6 +507,16 @@ class Chain(ABC):
     @abstractmethod
     def retract(self, step: Array) -> None:
         """Add a (K, n) step to the nodes and to the shifts of the motion factors; subtract it from the prior shift."""
+
+    def take_step(self) -> float:
+        """Retract the nodes by their ``step``, and do `keep`."""
+        self.retract(self.nodes["step"])
+        return self.keep()
+
+    def keep(self) -> float:
+        """Refer what the elimination left, and the residuals, to the nodes as they are after the step; the cost."""
+        cost: float = after_step.unchecked(self.rows, (self.prior_whitener, self.prior_shift), *self.whole(STEPPED))
+        return cost
 
     @abstractmethod
     def along_motion(self, step: Array) -> Array:

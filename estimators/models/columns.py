@@ -6,7 +6,14 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["Columns"]
+__all__ = ["Columns", "Selection"]
+
+
+class Selection:
+    """Which whole columns a kernel takes: groups, each with the name of a table and the names of its columns."""
+
+    def __init__(self, *groups: tuple[str, tuple[str, ...]]):
+        self.groups = groups
 
 
 class Columns(dict[str, Any]):
@@ -17,6 +24,8 @@ class Columns(dict[str, Any]):
 
     Parameters
     ----------
+    made : dict, optional
+        What others make of whole columns, by any key; it is emptied when an array is replaced.
     **columns : tuple of int, or dtype
         Shape of a row's float64 entry, or the type of a scalar.
 
@@ -35,10 +44,10 @@ class Columns(dict[str, Any]):
     ([1.0, 2.0], [1.0, -1.0])
     """
 
-    def __init__(self, **columns: Any):
+    def __init__(self, made: dict[Any, Any] | None = None, /, **columns: Any):
         self._capacity = 64
         self._columns: dict[str, Any] = {}
-        self._whole: dict[tuple[str, ...], tuple[Any, ...]] = {}
+        self._made: dict[Any, Any] = {} if made is None else made
         self.first = self.last = 0
         self.add(**columns)
 
@@ -47,7 +56,7 @@ class Columns(dict[str, Any]):
         for name, what in columns.items():
             shape, dtype = ((self._capacity, *what), float) if isinstance(what, tuple) else ((self._capacity,), what)
             self._columns[name] = np.zeros(shape, dtype)
-        self._whole.clear()
+        self._made.clear()
 
     def __len__(self) -> int:
         return self.last - self.first
@@ -65,10 +74,7 @@ class Columns(dict[str, Any]):
 
     def whole(self, names: tuple[str, ...]) -> tuple[Any, ...]:
         """Columns with the rows that are free: (capacity, ...) arrays."""
-        found = self._whole.get(names)
-        if found is None:
-            found = self._whole[names] = tuple([self._columns[name] for name in names])
-        return found
+        return tuple([self._columns[name] for name in names])
 
     @property
     def free(self) -> int:
@@ -127,7 +133,7 @@ class Columns(dict[str, Any]):
             else:
                 column[:rows] = column[self.first : self.last].copy()
         self._capacity, self.first, self.last = grown, 0, rows
-        self._whole.clear()
+        self._made.clear()
 
 
 def _restored(state: dict[str, Any]) -> Columns:

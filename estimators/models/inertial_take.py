@@ -8,33 +8,36 @@ from simnav.compiled import kernel
 from simnav.types import Array, Integers
 
 from .chain import attach_one, begin_motion
+from .columns import Selection
 from .inertial_step import AidTable, Measured
 from .measurements import HEADING, has_heading
 from .propagation import MOVING, SAMPLES, Moving, Samples, carry_errors, propagate_inertial
 
-__all__ = ["AID_COLUMNS", "FOLD_COLUMNS", "KEPT", "MOTION_COLUMNS", "take_inertial"]
+__all__ = ["TAKEN", "take_inertial"]
 
 #: A state as a node and a fold keep it: time (K,); position, velocity (K, 3); rotation (K, 3, 3); biases (K, 6);
 #: calibration states; angular rate (K, 3).
 Kept: TypeAlias = tuple[Array, Array, Array, Array, Array, Array, Array]
 _KEPT = "Tuple((f8[::1], f8[:, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1]))"
-KEPT = ("time", "position", "velocity", "dcm", "bias", "calibration", "raw_rate")
-#: The columns of `simnav.estimators.models.chain.Chain` that a new row of each kind is written to.
+_STATE = ("time", "position", "velocity", "dcm", "bias", "calibration", "raw_rate")
 Motions: TypeAlias = tuple[Array, Array, Array, Array, Array, Array, Array, Array]
 _MOTIONS = (
     "Tuple((f8[:, :, ::1], f8[:, :, ::1], f8[:, :, ::1], f8[:, :, ::1], f8[:, ::1], f8[:, ::1], f8[::1], f8[::1]))"
 )
-MOTION_COLUMNS = ("transition", "jacobian", "noise", "whitener", "begin_shift", "end_shift", "time", "weight")
 Attached: TypeAlias = tuple[Integers, Integers, Integers, Integers, Integers, Array, Array, Array, Array, Array]
 _ATTACHED = (
     "Tuple((i8[::1], i8[::1], i8[::1], i8[::1], i8[::1], f8[::1], f8[::1], f8[:, ::1], f8[:, :, ::1], f8[:, :, ::1]))"
 )
-AID_COLUMNS = (
-    "node", "fold", "instrument", "components", "bare", "time", "weight", "value", "noise", "whitener",
-)  # fmt: skip
 Folded: TypeAlias = tuple[Integers, Array, Array, Array, Array]
 _FOLDED = "Tuple((i8[::1], f8[:, :, ::1], f8[:, :, ::1], f8[:, :, ::1], f8[:, ::1]))"
-FOLD_COLUMNS = ("node", "transition", "noise", "jacobian", "shift")
+#: The columns of `simnav.estimators.models.chain.Chain` that new rows are written to.
+TAKEN = Selection(
+    ("nodes", _STATE),
+    ("motions", ("transition", "jacobian", "noise", "whitener", "begin_shift", "end_shift", "time", "weight")),
+    ("aids", ("node", "fold", "instrument", "components", "bare", "time", "weight", "value", "noise", "whitener")),
+    ("folds", ("node", "transition", "noise", "jacobian", "shift")),
+    ("folds", _STATE),
+)
 
 
 @kernel()
@@ -79,7 +82,7 @@ def take_inertial(
         Row of the next node, motion, aiding factor and fold; number of the newest node, of the next fold, and of the
         folds in the window.
     columns : tuple of tuples of arrays
-        Whole columns of nodes, motion factors, aiding factors and folds; of the folds without and with their states.
+        Whole columns, see `TAKEN`.
 
     Returns
     -------

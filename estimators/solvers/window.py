@@ -51,11 +51,12 @@ from typing import ClassVar
 import numpy as np
 
 from simnav.estimators.adaptations.base import Adaptation, Innovation
-from simnav.estimators.algebra.block_tridiagonal import after_step, half_squares, keep_weights, solve_chain
+from simnav.estimators.algebra.block_tridiagonal import half_squares, keep_weights, solve_chain
 from simnav.estimators.composition import Solver
 from simnav.estimators.models.base import ErrorModel
 from simnav.estimators.models.chains import Chain, chain_of
 from simnav.estimators.models.channels import owners, summary
+from simnav.estimators.models.columns import Selection
 from simnav.estimators.models.coupling import by_source
 from simnav.estimators.models.stated_sigmas import with_stated_sigmas
 from simnav.estimators.models.suitable import ModelChoice
@@ -74,16 +75,15 @@ CHECKED_STEP = 1.0
 FIRST_DAMPING, DAMPING_FACTOR = 1e-2, 10.0
 #: A measurement with a weight up to this is reported as faulty.
 FAULTY_WEIGHT = 0.5
-#: The columns of the chain that the kernels of `simnav.estimators.algebra.block_tridiagonal` take.
-SOLVED_MOTIONS = ("jacobian", "noise", "residual", "weight")
-SOLVED_AIDS = ("node", "instrument", "components", "jacobian", "residual", "noise", "weight")
-ELIMINATED_NODES = ("predicted", "predicted_shift", "filtered", "filtered_shift")
-ELIMINATED_AIDS = ("cross", "white", "innovation", "used")
-STEP = ("step", "size")
-STEPPED_NODES = ("step", "predicted_shift", "filtered_shift")
-STEPPED_MOTIONS = ("jacobian", "residual", "whitener", "whitened", "norm", "weight")
-STEPPED_AIDS = ("node", *STEPPED_MOTIONS)
-SQUARES = ("norm", "weight")
+#: The whole columns of the chain that `solve_chain` and `half_squares` take.
+SOLVED = Selection(
+    ("motions", ("jacobian", "noise", "residual", "weight")),
+    ("aids", ("node", "instrument", "components", "jacobian", "residual", "noise", "weight")),
+    ("nodes", ("predicted", "predicted_shift", "filtered", "filtered_shift")),
+    ("aids", ("cross", "white", "innovation", "used")),
+    ("nodes", ("step", "size")),
+)
+SQUARES = Selection(("motions", ("norm", "weight")), ("aids", ("norm", "weight")))
 
 
 class WindowEstimator(LooksBack, Solver):
@@ -197,15 +197,13 @@ class WindowEstimator(LooksBack, Solver):
         self._epochs: deque[int] = deque()  # nodes of each epoch in the window
         self._counted = self._eliminated = 0
         self._contraction = 1.0
+        self._factors: Factors | None = None
         self._plain = self.adaptation is None and not self._owners and not self.every_sample
         self._cost_test = CostTest()
-        n = self.chain.size
-        self.chain.nodes.add(predicted=(n, n), predicted_shift=(n,), filtered=(n, n), filtered_shift=(n,), step=(n,))
-        self.chain.nodes.add(size=())
-        self.chain.aids.add(cross=(3, n), white=(3, n), innovation=(3,), used=np.int64)
         quantities = ["residual", "weight", *(["innovation", "nis"] if self.adaptation else [])]
         names = [*observed, "motion"]
         self._blank = {f"{q}.{n}": np.nan for q in quantities for n in names if n != "motion" or q in quantities[:2]}
+        self._labels = [(f"residual.{name}", f"weight.{name}") for name in self.chain.names]
         self._blank |= {"iterations": 0.0, "cost": np.nan, "variance_factor": np.nan, "inconsistent": 0.0}
 
     def update(self, measurements: Measurements) -> Estimate:
@@ -341,13 +339,13 @@ class WindowEstimator(LooksBack, Solver):
         if attached:
             newest = [chain.aids[column][-attached:].tolist() for column in ("instrument", "time", "norm", "weight")]
             for index, time, norm, weight in zip(*newest):
-                name = chain.names[index]
-                diagnostics[f"residual.{name}"], diagnostics[f"weight.{name}"] = norm, weight
+                of_residual, of_weight = self._labels[index]
+                diagnostics[of_residual], diagnostics[of_weight] = norm, weight
                 if weight <= FAULTY_WEIGHT:
-                    flagged.append((name, time))
+                    flagged.append((chain.names[index], time))
         if len(chain.motions):
-            diagnostics["residual.motion"] = float(chain.motions["norm"][-1])
-            diagnostics["weight.motion"] = float(chain.motions["weight"][-1])
+            diagnostics["residual.motion"] = float(chain.motions.newest("norm"))
+            diagnostics["weight.motion"] = float(chain.motions.newest("weight"))
 
     def _converge(self, attached: int) -> tuple[int, float, Array, int]:
         """Move the nodes to the minimum of the cost.
@@ -370,8 +368,8 @@ class WindowEstimator(LooksBack, Solver):
         """
         chain, nodes = self.chain, self.chain.nodes
         now = _Progress(np.zeros(chain.size), self._first_new(attached), min(1.0, 2.0 * self._contraction))
-        self._contraction = now.contraction
-        self.chain.linearise_from(now.first)
+        self._contraction, self._factors = now.contraction, None
+        chain.linearise_from(now.first)
         while True:
             reweighted = len(nodes)
             if now.accepted and self.weighting is not None:
@@ -396,19 +394,19 @@ class WindowEstimator(LooksBack, Solver):
                 now.accepted = self._checked_step()
             else:
                 now.accepted = True
-                chain.retract(nodes["step"])
-                if (weighed and now.linear) or now.solved == self.iterations:
-                    now.moved += nodes["step"][-1]
-                    break
-                if not weighed and now.damping == 0.0 and self.incremental:
-                    now.moved += nodes["step"][-1]
-                    self._keep()
+                now.done = (weighed and now.linear) or now.solved == self.iterations
+                if now.done or (not weighed and now.damping == 0.0 and self.incremental):
+                    now.cost = chain.take_step()
+                    now.moved += nodes.newest("step")
+                    if now.done:
+                        break
                     now.first = len(nodes)
                     continue
-                self.chain.linearise_from()
+                chain.retract(nodes["step"])
+                chain.linearise_from()
             now.first, now.before, now.since = 0, now.since, 0.0
             if now.accepted:
-                now.moved += nodes["step"][-1]
+                now.moved += nodes.newest("step")
                 now.damping = now.damping / DAMPING_FACTOR if now.damping > FIRST_DAMPING else 0.0
             else:
                 now.damping = max(FIRST_DAMPING, DAMPING_FACTOR * now.damping)
@@ -416,13 +414,14 @@ class WindowEstimator(LooksBack, Solver):
                 now.damping = max(now.damping, FIRST_DAMPING)  # linearised since, so what was solved for is not kept
                 break
         if now.damping > 0.0:  # the covariances and the prior are those without it
-            self.chain.linearise_from()
+            chain.linearise_from()
             self._solve(0.0)
             nodes["step"][:] = 0.0
-        cost = self._keep()
+        if now.damping > 0.0 or not now.done:
+            now.cost = chain.keep()
         self.covariance = nodes.newest("filtered").copy()
         self._eliminated = len(nodes)
-        return now.solved, cost, now.moved, attached
+        return now.solved, now.cost, now.moved, attached
 
     def _step(self, damping: float, first: int, attached: int) -> tuple[float, int]:
         """Solve for a step; its size, and the new factors left: none if there is no finite step with them."""
@@ -432,6 +431,7 @@ class WindowEstimator(LooksBack, Solver):
             size, _ = self._solve(damping)
         if not isfinite(size):
             self.chain.detach(attached)
+            self._factors = None
             self._admission.skipped += attached
             attached = 0
             self.chain.linearise_from()
@@ -462,21 +462,13 @@ class WindowEstimator(LooksBack, Solver):
             return 0
         return min(self._eliminated, int(self.chain.aids["node"][-attached]) - self.chain.base)
 
-    def _keep(self) -> float:
-        """Refer what the elimination left, and the residuals, to the nodes as they are after the step; the cost."""
-        chain = self.chain
-        cost: float = after_step.unchecked(
-            chain.rows, (chain.prior_whitener, chain.prior_shift), chain.nodes.whole(STEPPED_NODES),
-            chain.motions.whole(STEPPED_MOTIONS), chain.aids.whole(STEPPED_AIDS),
-        )  # fmt: skip
-        return cost
-
     def _weigh(self, iteration: int) -> tuple[bool, int]:
         """Ask the weighting; whether it has settled, and the first node that has to do with a weight that is new."""
         assert self.weighting is not None
         motions, aids = self.chain.motions, self.chain.aids
         before = motions["weight"].copy(), aids["weight"].copy()
-        factors = self._factors(iteration)
+        factors = self._factors = self._factors or self._all_factors()
+        factors.iteration = iteration
         settled = self.weighting.weigh(factors)
         if self.isolation is not None:
             settled = self.isolation.judge(factors) and settled
@@ -490,27 +482,27 @@ class WindowEstimator(LooksBack, Solver):
         """Half the sum of squares of all factors, with the weights that they have."""
         chain = self.chain
         cost: float = half_squares.unchecked(
-            chain.rows, (chain.prior_whitener, chain.prior_shift), chain.motions.whole(SQUARES),
-            chain.aids.whole(SQUARES),
+            chain.rows, (chain.prior_whitener, chain.prior_shift), *chain.whole(SQUARES)
         )  # fmt: skip
         return cost
 
     def _solve(self, damping: float, first: int = 0) -> tuple[float, float]:
         """One step of all nodes; its largest component in sigmas, of all nodes and of those before ``first``."""
-        chain, nodes, aids = self.chain, self.chain.nodes, self.chain.aids
+        chain = self.chain
+        motions, aids, left, left_aids, (step, size) = chain.whole(SOLVED)
         sizes: tuple[float, float] = solve_chain.unchecked(
             (chain.prior if first else chain.turned(chain.prior, -chain.prior_shift), chain.prior_shift), chain.rows,
-            chain.motions.whole(SOLVED_MOTIONS), aids.whole(SOLVED_AIDS), damping, first,
-            nodes.whole(ELIMINATED_NODES), aids.whole(ELIMINATED_AIDS), *nodes.whole(STEP),
+            motions, aids, damping, first, left, left_aids, step, size,
         )  # fmt: skip
         return sizes
 
-    def _factors(self, iteration: int) -> Factors:
+    def _all_factors(self) -> Factors:
+        """Views of the factors, which hold until their number changes."""
         motions, aids = self.chain.motions, self.chain.aids
         return Factors(
             self.chain.names, aids["instrument"], aids["components"], aids["time"], aids["residual"], aids["noise"],
             aids["whitened"], aids["norm"], motions["time"], motions["residual"], motions["norm"],
-            aids["weight"], motions["weight"], iteration,
+            aids["weight"], motions["weight"], 0,
         )  # fmt: skip
 
     def _marginalise(self) -> None:
@@ -555,6 +547,10 @@ class _Progress:
         Whether linearising anew would move no node by more than the tolerance.
     accepted : bool
         Whether the last step was taken.
+    done : bool
+        Whether it was the last step.
+    cost : float
+        Half the weighted sum of squares, where the last step led without a new linearisation.
     """
 
     moved: Array
@@ -568,6 +564,8 @@ class _Progress:
     settled: bool = True
     linear: bool = False
     accepted: bool = True
+    done: bool = False
+    cost: float = 0.0
 
 
 def _ratio(size: float, before: float, damping: float) -> float:
