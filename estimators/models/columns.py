@@ -77,6 +77,11 @@ class Columns(dict[str, Any]):
         return tuple([self._columns[name] for name in names])
 
     @property
+    def names(self) -> set[str]:
+        """Names of the columns."""
+        return set(self._columns)
+
+    @property
     def free(self) -> int:
         """Number of rows that can be appended before the rows have to be moved."""
         return self._capacity - self.last
@@ -132,8 +137,9 @@ class Columns(dict[str, Any]):
                 self._columns[name] = new
             else:
                 column[:rows] = column[self.first : self.last].copy()
+        if grown > self._capacity:
+            self._made.clear()
         self._capacity, self.first, self.last = grown, 0, rows
-        self._made.clear()
 
 
 def _restored(state: dict[str, Any]) -> Columns:
