@@ -82,6 +82,15 @@ _WHITENED = "Tuple((f8[:, :, ::1], f8[:, :, ::1], f8[:, ::1], i8[::1]))"
 
 
 @kernel()
+def _copy_node(P: Array, d: Array, to_P: Array, to_d: Array) -> None:
+    """Copy a covariance and a mean, element by element: a kernel with assignments of arrays takes long to compile."""
+    for i in range(d.size):
+        to_d[i] = d[i]
+        for j in range(d.size):
+            to_P[i, j] = P[i, j]
+
+
+@kernel()
 def _predict(P: Array, F: Array, Q: Array, weight: float, lists: Lists, room: Room, out: Array) -> None:
     """Compute ``out = F P F' + Q / weight``, for a sparse F."""
     n = P.shape[0]
@@ -195,9 +204,12 @@ def _mean_of(i: int, end: int, aids: Aids, used: Integers, mean_H: Array, mean_r
         return count
     m, n = components[i], mean_H.shape[1]
     total = 0.0
-    mean_H[:] = 0.0
-    mean_r[:] = 0.0
-    mean_R[:] = 0.0
+    for a in range(3):
+        mean_r[a] = 0.0
+        for b in range(3):
+            mean_R[a, b] = 0.0
+        for c in range(n):
+            mean_H[a, c] = 0.0
     for k in range(i, end):
         if used[k] == 0 or instrument[k] != instrument[i] or components[k] != m:
             continue
@@ -319,8 +331,7 @@ def solve_chain(
     for k in range(first, count):
         P, d = predicted[k], predicted_shift[k]
         if k == 0:
-            P[:] = prior_covariance
-            d[:] = prior_shift
+            _copy_node(prior_covariance, prior_shift, P, d)
         else:
             _predict(filtered[k - 1], transition[k - 1], noise[k - 1], motion_weight[k - 1], lists, room, P)
             for r in range(n):
@@ -328,9 +339,8 @@ def solve_chain(
                 for c in range(n):
                     x += transition[k - 1, r, c] * filtered_shift[k - 1, c]
                 d[r] = x
+        _copy_node(P, d, filtered[k], filtered_shift[k])
         P, d = filtered[k], filtered_shift[k]
-        P[:] = predicted[k]
-        d[:] = predicted_shift[k]
         if damps:
             for r in range(n):
                 damped[r, 0, 0] = P[r, r]
@@ -363,9 +373,11 @@ def solve_chain(
     i = total - 1
     for k in range(count - 1, -1, -1):
         if k < count - 1:
-            after[:] = 0.0
+            for r in range(n):
+                after[r] = 0.0
             add_product(transition[k], adjoint, after)
-            adjoint[:] = after
+            for r in range(n):
+                adjoint[r] = after[r]
         for r in range(n):
             step[k, r] = filtered_shift[k, r]
         add_product(filtered[k], adjoint, step[k])

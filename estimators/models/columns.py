@@ -90,7 +90,6 @@ class Columns(dict[str, Any]):
         """Move the rows to the front, or make more space, unless ``count`` rows are free."""
         if self.last + count > self._capacity:
             self._make_room(count)
-            self.clear()
 
     def grow(self, count: int) -> None:
         """Count rows that a kernel has written from index ``last`` on; ``count`` is at most ``free``."""
@@ -130,6 +129,9 @@ class Columns(dict[str, Any]):
         rows, grown = len(self), self._capacity
         while 2 * rows > grown or rows + count > grown:
             grown *= 2
+        self.clear()
+        if grown > self._capacity:  # before the arrays are replaced, so that none is held longer
+            self._made.clear()
         for name, column in self._columns.items():
             if grown > self._capacity:
                 new = np.zeros((grown, *column.shape[1:]), column.dtype)
@@ -137,8 +139,6 @@ class Columns(dict[str, Any]):
                 self._columns[name] = new
             else:
                 column[:rows] = column[self.first : self.last].copy()
-        if grown > self._capacity:
-            self._made.clear()
         self._capacity, self.first, self.last = grown, 0, rows
 
 

@@ -19,7 +19,8 @@ def through_one(transition: Array, coupled: int, jacobian: Array, at_node: Array
     """Do `through_motion` for the (3, n) Jacobian of one measurement; ``at_node`` (n,) is work space."""
     n = transition.shape[0]
     for r in range(3):
-        at_node[:] = 0.0
+        for c in range(n):
+            at_node[c] = 0.0
         for j in range(n):
             x = jacobian[r, j]
             if x != 0.0:
@@ -62,7 +63,8 @@ def add_noise(H: Array, components: int, Q: Array, noise: Array, whitener: Array
     """Do `add_motion_noise` for one measurement; ``cross`` (n,) is work space."""
     n = H.shape[1]
     for a in range(components):
-        cross[:] = 0.0
+        for c in range(n):
+            cross[c] = 0.0
         for j in range(n):
             x = H[a, j]
             if x != 0.0:

@@ -31,7 +31,7 @@ from .folds import add_noise, through_one
 from .inertial import InertialModel
 from .inertial_step import Packet
 from .inertial_take import TAKEN, take_inertial
-from .measurements import OWN, State, observe_inertial
+from .measurements import OWN, observe_inertial
 from .preintegrated import add_shift, move_shift, relative_shift, turn_covariance
 from .propagation import correct_inertial
 
@@ -65,17 +65,6 @@ def _along_motion(
 
 
 @kernel()
-def _linearise_motion(first: int, end: int, motions: tuple[Array, ...]) -> None:
-    """Residuals and derivatives of the motion factors in these rows, whitened; see `_linearise`."""
-    begin_shift, transition, end_shift, residual, jacobian, whitener, whitened, norm = motions
-    moved = np.empty(begin_shift.shape[1])
-    for k in range(first, end):
-        move_shift(transition[k], begin_shift[k], moved, jacobian[k])
-        relative_shift(end_shift[k], moved, residual[k])
-        norm[k] = whiten_one(residual[k], whitener[k], whitened[k])
-
-
-@kernel()
 def _move_folds(
     first: int, end: int, transition: Array, shift: Array, jacobian: Array, predicted: tuple[Array, ...],
     now: tuple[Array, ...],
@@ -96,13 +85,6 @@ def _move_folds(
         for j in range(moved.size):
             dx[j] = moved[j]
         correct_inertial(position[k], velocity[k], dcm[k], bias[k], calibration[k], dx)
-
-
-@kernel()
-def _state_in(row: int, states: tuple[Array, ...]) -> State:
-    """The state in a row of position, velocity, rotation, angular rate, biases and calibration."""
-    position, velocity, dcm, rate, bias, calibration = states
-    return position[row], velocity[row], dcm[row], rate[row], bias[row], calibration[row]
 
 
 #: What `_linearise` is to do: motion factors; readings that it predicts itself; what follows for all readings.
@@ -170,22 +152,29 @@ def _linearise(
     node, fold, instrument, components, bare, value, noise, residual, jacobian, whitener, whitened, norm = aids
     fold_node, fold_transition, fold_noise, fold_shift, fold_jacobian, fold_rate = folds
     codes, arms, bias_at, scale_at = known
-    at_folds = now[0], now[1], now[2], fold_rate, now[3], now[4]
+    begin_shift, transition, end_shift, error, motion_jacobian, motion_whitener, whitened_error, motion_norm = motions
+    position, velocity, dcm, rate, bias, calibration = nodes
     n, begin, end = jacobian.shape[2], i0 + total, i0 + total
+    innovation, wide, moved, work = np.empty(3), np.zeros((3, 15)), np.empty(n), np.empty(n)
     while begin > i0 and node[begin - 1] - base >= first:
         begin -= 1
     if what & MOTION:
-        _linearise_motion(m0 + max(first - 1, 0), m0 + count - 1, motions)
+        for m in range(m0 + max(first - 1, 0), m0 + count - 1):
+            move_shift(transition[m], begin_shift[m], moved, motion_jacobian[m])
+            relative_shift(end_shift[m], moved, error[m])
+            motion_norm[m] = whiten_one(error[m], motion_whitener[m], whitened_error[m])
     if what & READINGS and folded and begin < end:
         at = fold0 + folded
         while at > fold0 and fold_node[at - 1] >= node[begin]:
             at -= 1
         _move_folds(at, fold0 + folded, fold_transition, fold_shift, fold_jacobian, predicted, now)
-    innovation, wide, work = np.empty(3), np.zeros((3, 15)), np.empty(n)
     for i in range(begin, end):
         s, f = instrument[i], fold0 + fold[i] - fold_base
         if what & READINGS and codes[s] != OWN:
-            state = _state_in(f, at_folds) if fold[i] >= 0 else _state_in(k0 + node[i] - base, nodes)
+            k = k0 + node[i] - base
+            state = position[k], velocity[k], dcm[k], rate[k], bias[k], calibration[k]
+            if fold[i] >= 0:
+                state = now[0][f], now[1][f], now[2][f], fold_rate[f], now[3][f], now[4][f]
             d = observe_inertial(
                 (codes[s], arms[s], bias_at[s], scale_at[s]), value[i], state, innovation,
                 jacobian[i] if n >= 15 else wide,
@@ -257,7 +246,8 @@ def _retract(
             add_shift(step[k], end_shift[m - 1], end_shift[m - 1])
     for i in range(fold_rows[0], fold_rows[0] + fold_rows[1]):
         add_shift(step[of_fold[i] - base], fold_shift[i], fold_shift[i])
-    before[:] = prior[1]
+    for j in range(n):
+        before[j] = prior[1][j]
     relative_shift(before, step[0], prior[1])
     return after_step(rows, prior, stepped_nodes, stepped_motions, stepped_aids) if keep else 0.0
 
@@ -291,7 +281,9 @@ def _marginalise(
         Numbers of aiding factors and of folds that leave with their nodes.
     """
     k0, _, _, i0, total, base = rows
-    step, mean = nodes[2][k0 + leaving], nodes[1][k0 + leaving] + nodes[2][k0 + leaving]
+    step, mean = nodes[2][k0 + leaving], np.empty(nodes[2].shape[1])
+    for j in range(mean.size):
+        mean[j] = nodes[1][k0 + leaving, j] + step[j]
     turn_covariance(nodes[0][k0 + leaving], mean, prior[0])
     relative_shift(mean, step, prior[1])
     whitening(prior[0], prior[2])

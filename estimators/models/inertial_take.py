@@ -116,8 +116,8 @@ def take_inertial(
         if ahead > 0.0 and (stamps[k] == stamps[which.size - 1] or ahead >= spacing):
             row = motion_at + nodes
             begin_motion(motion, motion_noise, motions[0][row], motions[1][row], motions[2][row], motions[3][row])
-            motions[4][row, :] = 0.0
-            motions[5][row, :] = 0.0
+            for i in range(n):
+                motions[4][row, i], motions[5][row, i] = 0.0, 0.0
             motions[6][row], motions[7][row] = clock[0], 1.0
             _keep(moving, calibration, kept, node_at + nodes)
             nodes += 1

@@ -156,7 +156,9 @@ def turn_covariance(P: Array, shift: Array, out: Array) -> None:
     sine, a = rotation_coefficients(angle2)
     b = 1.0 / 6.0 - angle2 * (1.0 / 120.0 - angle2 / 5040.0) if angle2 < 1e-3 else (1.0 - sine) / angle2
     n = P.shape[0]
-    out[:] = P
+    for i in range(n):
+        for j in range(n):
+            out[i, j] = P[i, j]
     for side in range(2):
         for i in range(n):
             v0, v1, v2 = (out[6, i], out[7, i], out[8, i]) if side == 0 else (out[i, 6], out[i, 7], out[i, 8])

@@ -447,7 +447,9 @@ def carry_errors(transition: Array, rate: Array, elapsed: float, error: Array) -
             if x != 0.0:
                 for j in range(columns):
                     X[i, j] += x * error[k, j]
-    error[:m] = X
+    for i in range(m):
+        for j in range(columns):
+            error[i, j] = X[i, j]
     for i in range(m, error.shape[0]):
         decay = exp(-rate[i - m] * elapsed)
         for j in range(columns):
