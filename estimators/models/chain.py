@@ -155,6 +155,7 @@ class Chain(ABC):
         self._index = {name: i for i, name in enumerate(self.names)}
         self._kept = (*front.state, *self.node_arrays)
         self._made: dict[Selection, Any] = {}
+        self._states = Selection(("nodes", front.state))
         self.nodes = Columns(self._made, time=(), **{name: getattr(front, name).shape for name in self._kept})
         self.nodes.add(predicted=(n, n), predicted_shift=(n,), filtered=(n, n), filtered_shift=(n,), step=(n,), size=())
         self.motions = Columns(
@@ -342,7 +343,8 @@ class Chain(ABC):
     def settle(self, moved: Array) -> None:
         """Set the front to the newest node. If it is later than the node, correct it by ``moved``, the node's shift."""
         if self.ahead == 0.0:
-            self.front.restore([self.nodes.newest(name) for name in self.front.state])
+            (states,), newest = self.whole(self._states), self.nodes.last - 1
+            self.front.restore([column[newest] for column in states])
         else:
             self.front.correct(self._transition @ moved)
 

@@ -84,6 +84,8 @@ SOLVED = Selection(
     ("nodes", ("step", "size")),
 )
 SQUARES = Selection(("motions", ("norm", "weight")), ("aids", ("norm", "weight")))
+#: Of new aiding factors, what becomes diagnostics and flags.
+REPORTED = Selection(("aids", ("instrument", "time", "norm", "weight")))
 
 
 class WindowEstimator(LooksBack, Solver):
@@ -337,7 +339,8 @@ class WindowEstimator(LooksBack, Solver):
         diagnostics["iterations"], diagnostics["cost"] = float(solved), cost
         diagnostics["variance_factor"] = self._cost_test.variance_factor
         if attached:
-            newest = [chain.aids[column][-attached:].tolist() for column in ("instrument", "time", "norm", "weight")]
+            (columns,), last = chain.whole(REPORTED), chain.aids.last
+            newest = [column[last - attached : last].tolist() for column in columns]
             for index, time, norm, weight in zip(*newest):
                 of_residual, of_weight = self._labels[index]
                 diagnostics[of_residual], diagnostics[of_weight] = norm, weight
