@@ -263,11 +263,11 @@ def _return(adjoint: Array, U: Array, G: Array, y: Array, m: int, z: Array) -> N
 
 @kernel(
     f"UniTuple(f8, 2)(Tuple((f8[:, ::1], f8[::1])), {ROWS}, Tuple((f8[:, :, ::1], f8[:, :, ::1], f8[:, ::1], f8[::1])),"
-    f"{_AIDS}, f8, i8, {_ELIMINATION}, {_WHITENED}, f8[:, ::1], f8[::1])"
+    f"{_AIDS}, f8, i8, {_ELIMINATION}, {_WHITENED}, Tuple((f8[:, ::1], f8[::1])))"
 )
 def solve_chain(
     prior: tuple[Array, Array], rows: Rows, motion: tuple[Array, Array, Array, Array], aids: Aids, damping: float,
-    first: int, left: Elimination, left_aids: Whitened, step: Array, size: Array,
+    first: int, left: Elimination, left_aids: Whitened, steps: tuple[Array, Array],
 ) -> tuple[float, float]:  # fmt: skip
     """Compute one step of K nodes of n states with K - 1 motion factors and M aiding factors (equations in the module).
 
@@ -287,11 +287,9 @@ def solve_chain(
         Nodes before this one have been eliminated already, without damping; ``left`` holds their results.
     left, left_aids : tuples of arrays
         Results of the elimination, see `Elimination` and `Whitened`; overwritten from node ``first`` on.
-    step : (K, n) array
-        Overwritten with the corrections dx.
-    size : (K,) array
-        Overwritten with the largest component of each node's step, in units of its filtered sigmas; NaN or infinite if
-        the step cannot be used.
+    steps : (K, n) and (K,) arrays
+        Overwritten with the corrections dx; with the largest component of each node's step, in units of its filtered
+        sigmas, NaN or infinite if the step cannot be used.
 
     Returns
     -------
@@ -309,7 +307,7 @@ def solve_chain(
     filtered, filtered_shift = left[2][k0:k1], left[3][k0:k1]
     cross, white = left_aids[0][i0:i1], left_aids[1][i0:i1]
     innovation, used = left_aids[2][i0:i1], left_aids[3][i0:i1]
-    step, size = step[k0:k1], size[k0:k1]
+    step, size = steps[0][k0:k1], steps[1][k0:k1]
     n = step.shape[1]
     L, lists = np.empty((4, 3)), (np.empty((n, n)), np.empty((n, n), np.uint64), np.empty(n, np.uint64))
     room = np.zeros((n, padded(n))), np.zeros((n, padded(n))), np.zeros((n, padded(n)))

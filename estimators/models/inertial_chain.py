@@ -117,17 +117,16 @@ LEFT = Selection(("nodes", ("predicted", "predicted_shift", "step")), ("aids", (
 
 
 @kernel(
-    f"void(i8, i8, {ROWS}, UniTuple(i8, 3), {_NODE_STATES}, "
+    f"void(i8, i8, {ROWS}, UniTuple(i8, 3), Tuple(({_NODE_STATES}, "
     "Tuple((f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, :, ::1], f8[:, ::1], f8[::1])), "
     "Tuple((i8[::1], i8[::1], i8[::1], i8[::1], i8[::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[:, :, ::1], "
     "f8[:, :, ::1], f8[:, ::1], f8[::1])), "
     "Tuple((i8[::1], f8[:, :, ::1], f8[:, :, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1])), "
-    f"{_STATES}, {_STATES}, Tuple((i8[::1], f8[:, ::1], i8[::1], i8[::1])))"
+    f"{_STATES}, {_STATES})), Tuple((i8[::1], f8[:, ::1], i8[::1], i8[::1])))"
 )
 def _linearise(
-    what: int, first: int, rows: Rows, fold_rows: tuple[int, int, int], nodes: tuple[Array, ...],
-    motions: tuple[Array, ...], aids: tuple[Any, ...], folds: tuple[Any, ...], predicted: tuple[Array, ...],
-    now: tuple[Array, ...], known: tuple[Integers, Array, Integers, Integers],
+    what: int, first: int, rows: Rows, fold_rows: tuple[int, int, int], columns: tuple[Any, ...],
+    known: tuple[Integers, Array, Integers, Integers],
 ) -> None:  # fmt: skip
     """Linearise and whiten the factors that have to do with a node or later ones.
 
@@ -139,14 +138,15 @@ def _linearise(
     first : int
         The node, counted from the first of the window.
     rows : tuple of int
-        Where nodes and factors are in the arrays below, see `simnav.estimators.algebra.block_tridiagonal.Rows`.
+        Where nodes and factors are in the columns, see `simnav.estimators.algebra.block_tridiagonal.Rows`.
     fold_rows : tuple of int
         Row of the first fold, their number, and the number of the first fold, from which factors count theirs.
-    nodes, motions, aids, folds, predicted, now : tuples of arrays
+    columns : tuple of tuples of arrays
         Whole columns, see `LINEARISED`; of the folds the state as predicted, and as moved by the shift of its node.
     known : tuple of arrays
         Parameters of each instrument, see `simnav.estimators.models.measurements.Aid`.
     """
+    nodes, motions, aids, folds, predicted, now = columns
     k0, count, m0, i0, total, base = rows
     fold0, folded, fold_base = fold_rows
     node, fold, instrument, components, bare, value, noise, residual, jacobian, whitener, whitened, norm = aids
@@ -197,13 +197,13 @@ def _linearise(
 
 
 @kernel(
-    f"f8(b1, {ROWS}, UniTuple(i8, 2), f8[:, ::1], {_STATES}, UniTuple(f8[:, ::1], 2), Tuple((i8[::1], f8[:, ::1])), "
-    f"Tuple((f8[:, ::1], f8[::1])), {STEPPED_TYPES})"
+    f"f8(b1, {ROWS}, UniTuple(i8, 2), f8[:, ::1], "
+    f"Tuple(({_STATES}, UniTuple(f8[:, ::1], 2), Tuple((i8[::1], f8[:, ::1])))), "
+    f"Tuple((f8[:, ::1], f8[::1])), Tuple(({STEPPED_TYPES})))"
 )
 def _retract(
-    keep: bool, rows: Rows, fold_rows: tuple[int, int], step: Array, states: tuple[Array, ...],
-    shifts: tuple[Array, Array], folds: tuple[Integers, Array], prior: tuple[Array, Array],
-    stepped_nodes: Any, stepped_motions: Any, stepped_aids: Any,
+    keep: bool, rows: Rows, fold_rows: tuple[int, int], step: Array, moved: tuple[Any, Any, Any],
+    prior: tuple[Array, Array], stepped: tuple[Any, Any, Any],
 ) -> float:  # fmt: skip
     """Move the nodes by a step, in place.
 
@@ -217,12 +217,12 @@ def _retract(
     step : (K, n) array
         Corrections, with a rotation vector at 6:9 that turns the attitude from the left; its first row is that of the
         first node.
-    states, shifts, folds : tuples of arrays
+    moved : tuple of tuples of arrays
         Whole columns, see `MOVED`; all but the numbers of the nodes of folds are updated.
     prior : (n, n) and (n,) arrays
         Whitener of the prior; its mean minus the first node, which is updated.
-    stepped_nodes, stepped_motions, stepped_aids
-        As of `after_step`.
+    stepped : tuple of tuples of arrays
+        Whole columns, the last three arguments of `after_step`.
 
     Returns
     -------
@@ -230,9 +230,7 @@ def _retract(
         The cost, or 0 if it is not computed.
     """
     k0, count, m0, _, _, base = rows
-    position, velocity, dcm, bias, calibration = states
-    begin_shift, end_shift = shifts
-    of_fold, fold_shift = folds
+    (position, velocity, dcm, bias, calibration), (begin_shift, end_shift), (of_fold, fold_shift) = moved
     n = step.shape[1]
     dx, before = np.zeros(max(n, 15)), np.empty(n)
     for k in range(count):
@@ -249,16 +247,17 @@ def _retract(
     for j in range(n):
         before[j] = prior[1][j]
     relative_shift(before, step[0], prior[1])
-    return after_step(rows, prior, stepped_nodes, stepped_motions, stepped_aids) if keep else 0.0
+    return after_step(rows, prior, stepped[0], stepped[1], stepped[2]) if keep else 0.0
 
 
 @kernel(
-    f"UniTuple(i8, 2)(i8, {ROWS}, UniTuple(i8, 2), Tuple((f8[:, :, ::1], f8[:, ::1], f8[:, ::1])), i8[::1], i8[::1], "
+    f"UniTuple(i8, 2)(i8, {ROWS}, UniTuple(i8, 2), "
+    "Tuple((Tuple((f8[:, :, ::1], f8[:, ::1], f8[:, ::1])), Tuple((i8[::1],)), Tuple((i8[::1],)))), "
     "Tuple((f8[:, ::1], f8[::1], f8[:, ::1])))"
 )
 def _marginalise(
-    leaving: int, rows: Rows, fold_rows: tuple[int, int], nodes: tuple[Array, Array, Array], of_aid: Integers,
-    of_fold: Integers, prior: tuple[Array, Array, Array],
+    leaving: int, rows: Rows, fold_rows: tuple[int, int], columns: tuple[Any, Any, Any],
+    prior: tuple[Array, Array, Array],
 ) -> tuple[int, int]:  # fmt: skip
     """Make the prior of the first node that stays from what was predicted for it.
 
@@ -268,10 +267,8 @@ def _marginalise(
         Number of nodes that leave.
     rows, fold_rows : tuples of int
         As of `_retract`.
-    nodes : tuple of arrays
-        Whole columns: predicted covariance, predicted shift before the last step, and the step.
-    of_aid, of_fold : int arrays
-        Whole columns: numbers of the nodes of aiding factors and of folds.
+    columns : tuple of tuples of arrays
+        Whole columns, see `LEFT`.
     prior : (n, n), (n,) and (n, n) arrays
         Covariance, shift, and whitener of the prior; overwritten.
 
@@ -280,6 +277,7 @@ def _marginalise(
     int, int
         Numbers of aiding factors and of folds that leave with their nodes.
     """
+    nodes, (of_aid,), (of_fold,) = columns
     k0, _, _, i0, total, base = rows
     step, mean = nodes[2][k0 + leaving], np.empty(nodes[2].shape[1])
     for j in range(mean.size):
@@ -338,11 +336,11 @@ class InertialChain(Chain):
             columns.reserve(count)
         state, samples, first, noise, others = front.carried()
         first, self.ahead, (new, attached, folded, unused) = take_inertial.unchecked(
-            state, samples, first, (until, spacing, self.ahead), noise,
+            state, samples, (until, spacing, self.ahead), noise,
             (front.transition, front.process_noise, self._transition, self._noise), others,
             (packet.aids, packet.fill(measurements)),
             (
-                nodes.last, motions.last, aids.last, folds.last, self.base + len(nodes) - 1,
+                first, nodes.last, motions.last, aids.last, folds.last, self.base + len(nodes) - 1,
                 self.fold_base + len(folds), len(folds),
             ),
             self.whole(TAKEN),
@@ -375,10 +373,9 @@ class InertialChain(Chain):
 
     def _compute(self, what: int, node: int) -> None:
         folds = self.folds
-        nodes, motions, aids, of_folds, predicted, now = self.whole(LINEARISED)
         _linearise.unchecked(
-            what, node, self.rows, (folds.first, folds.last - folds.first, self.fold_base), nodes, motions, aids,
-            of_folds, predicted, now, self._known,
+            what, node, self.rows, (folds.first, folds.last - folds.first, self.fold_base), self.whole(LINEARISED),
+            self._known,
         )  # fmt: skip
 
     def _observe_own(self, first: int) -> None:
@@ -409,19 +406,16 @@ class InertialChain(Chain):
 
     def _move(self, keep: bool, step: Array) -> float:
         folds = self.folds
-        states, shifts, of_folds = self.whole(MOVED)
-        nodes, motions, aids = self.whole(STEPPED)
         cost: float = _retract.unchecked(
-            keep, self.rows, (folds.first, folds.last - folds.first), step, states, shifts, of_folds,
-            (self.prior_whitener, self.prior_shift), nodes, motions, aids,
+            keep, self.rows, (folds.first, folds.last - folds.first), step, self.whole(MOVED),
+            (self.prior_whitener, self.prior_shift), self.whole(STEPPED),
         )  # fmt: skip
         return cost
 
     def marginalise(self, count: int) -> None:
         """As `Chain.marginalise`."""
-        nodes, (of_aid,), (of_fold,) = self.whole(LEFT)
         aids, folds = _marginalise.unchecked(
-            count, self.rows, (self.folds.first, len(self.folds)), nodes, of_aid, of_fold,
+            count, self.rows, (self.folds.first, len(self.folds)), self.whole(LEFT),
             (self.prior, self.prior_shift, self.prior_whitener),
         )  # fmt: skip
         self._leave(count, aids, folds)

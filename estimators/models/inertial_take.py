@@ -56,21 +56,21 @@ def _keep(moving: Moving, calibration: Array, kept: Kept, row: int) -> None:
 
 
 @kernel(
-    f"Tuple((i8, f8, UniTuple(i8, 4)))({MOVING}, {SAMPLES}, i8, UniTuple(f8, 3), f8[::1], UniTuple(f8[:, ::1], 4), "
+    f"Tuple((i8, f8, UniTuple(i8, 4)))({MOVING}, {SAMPLES}, UniTuple(f8, 3), f8[::1], UniTuple(f8[:, ::1], 4), "
     "UniTuple(f8[::1], 3), Tuple((Tuple((i8[:, ::1], f8[:, ::1], f8[:, ::1])), "
-    "Tuple((i8[::1], f8[::1], f8[:, ::1], f8[:, ::1])))), UniTuple(i8, 7), "
+    "Tuple((i8[::1], f8[::1], f8[:, ::1], f8[:, ::1])))), UniTuple(i8, 8), "
     f"Tuple(({_KEPT}, {_MOTIONS}, {_ATTACHED}, {_FOLDED}, {_KEPT})))"
 )
 def take_inertial(
-    moving: Moving, samples: Samples, first: int, times: tuple[float, float, float], noise: Array,
+    moving: Moving, samples: Samples, times: tuple[float, float, float], noise: Array,
     matrices: tuple[Array, Array, Array, Array], others: tuple[Array, Array, Array], packet: tuple[AidTable, Measured],
-    numbers: tuple[int, int, int, int, int, int, int], columns: tuple[Kept, Motions, Attached, Folded, Kept],
+    numbers: tuple[int, int, int, int, int, int, int, int], columns: tuple[Kept, Motions, Attached, Folded, Kept],
 ) -> tuple[int, float, tuple[int, int, int, int]]:  # fmt: skip
     """Do `Chain.take` for the chain of an inertial model.
 
     Parameters
     ----------
-    moving, samples, first, noise, others
+    moving, samples, noise, others
         As of `simnav.estimators.models.propagation.propagate_inertial`.
     times : tuple of float
         End of the step, spacing of the nodes, and time from the newest node to the state [s].
@@ -79,8 +79,8 @@ def take_inertial(
     packet : tuple of tuples
         The instruments and the measurements, see `simnav.estimators.models.inertial_step`.
     numbers : tuple of int
-        Row of the next node, motion, aiding factor and fold; number of the newest node, of the next fold, and of the
-        folds in the window.
+        Index of the first sample that is not completely used; row of the next node, motion, aiding factor and fold;
+        number of the newest node, of the next fold, and of the folds in the window.
     columns : tuple of tuples of arrays
         Whole columns, see `TAKEN`.
 
@@ -99,15 +99,18 @@ def take_inertial(
     dcm, clock = moving[2], moving[6]
     transition, process_noise, motion, motion_noise = matrices
     propagated = transition, process_noise, motion_noise
-    node_at, motion_at, aid_at, fold_at, newest, fold, folds = numbers
+    first, node_at, motion_at, aid_at, fold_at, newest, next_fold, folds = numbers
     kept, motions, aids, folded, fold_kept = columns
+    factor, jacobian, factor_noise, whitener, begin_shift, end_shift, motion_time, motion_weight = motions
+    node, fold, instrument, components, bare, time, weight, value, aid_noise, aid_whitener = aids
+    fold_node, fold_transition, fold_noise, fold_jacobian, fold_shift = folded
     n, nodes, attached, added, unused = motion.shape[0], 0, 0, 0, 0
     for k in range(which.size):
-        time, begin = min(stamps[k], until), clock[0]
-        if time > begin:
-            first = propagate_inertial(moving, samples, first, time, noise, propagated, others, time - begin)
-            carry_errors(transition, decay, time - begin, motion)
-            ahead += time - begin
+        begin, end = clock[0], min(stamps[k], until)
+        if end > begin:
+            first = propagate_inertial(moving, samples, first, end, noise, propagated, others, end - begin)
+            carry_errors(transition, decay, end - begin, motion)
+            ahead += end - begin
         s = which[k]
         d = codes[s, 1]
         if codes[s, 0] == HEADING and not has_heading(dcm):
@@ -115,30 +118,27 @@ def take_inertial(
             continue
         if ahead > 0.0 and (stamps[k] == stamps[which.size - 1] or ahead >= spacing):
             row = motion_at + nodes
-            begin_motion(motion, motion_noise, motions[0][row], motions[1][row], motions[2][row], motions[3][row])
+            begin_motion(motion, motion_noise, factor[row], jacobian[row], factor_noise[row], whitener[row])
             for i in range(n):
-                motions[4][row, i], motions[5][row, i] = 0.0, 0.0
-            motions[6][row], motions[7][row] = clock[0], 1.0
+                begin_shift[row, i], end_shift[row, i] = 0.0, 0.0
+            motion_time[row], motion_weight[row] = clock[0], 1.0
             _keep(moving, calibration, kept, node_at + nodes)
             nodes += 1
             newest += 1
             ahead = 0.0
-        of_fold = -1
-        if ahead > 0.0:
-            row = fold_at + added
-            if folds + added == 0 or folded[0][row - 1] != newest or fold_kept[0][row - 1] != clock[0]:
-                folded[0][row] = newest
-                for i in range(n):
-                    folded[4][row, i] = 0.0
-                    for j in range(n):
-                        folded[1][row, i, j] = folded[3][row, i, j] = motion[i, j]
-                        folded[2][row, i, j] = motion_noise[i, j]
-                _keep(moving, calibration, fold_kept, row)
-                added += 1
-            of_fold = fold + added - 1
+        row = fold_at + added
+        if ahead > 0.0 and (folds + added == 0 or fold_node[row - 1] != newest or fold_kept[0][row - 1] != clock[0]):
+            fold_node[row] = newest
+            for i in range(n):
+                fold_shift[row, i] = 0.0
+                for j in range(n):
+                    fold_transition[row, i, j] = fold_jacobian[row, i, j] = motion[i, j]
+                    fold_noise[row, i, j] = motion_noise[i, j]
+            _keep(moving, calibration, fold_kept, row)
+            added += 1
         row = aid_at + attached
-        aids[0][row], aids[1][row], aids[2][row], aids[3][row] = newest, of_fold, s, d
-        aids[4][row], aids[5][row], aids[6][row] = of_fold >= 0, stamps[k], 1.0
-        attach_one(noises[s, : d * d].reshape((d, d)), values[k, :d], aids[8][row], aids[9][row], aids[7][row])
+        node[row], instrument[row], components[row], time[row], weight[row] = newest, s, d, stamps[k], 1.0
+        fold[row], bare[row] = next_fold + added - 1 if ahead > 0.0 else -1, ahead > 0.0
+        attach_one(noises[s, : d * d].reshape((d, d)), values[k, :d], aid_noise[row], aid_whitener[row], value[row])
         attached += 1
     return first, ahead, (nodes, attached, added, unused)

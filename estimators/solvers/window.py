@@ -492,10 +492,10 @@ class WindowEstimator(LooksBack, Solver):
     def _solve(self, damping: float, first: int = 0) -> tuple[float, float]:
         """One step of all nodes; its largest component in sigmas, of all nodes and of those before ``first``."""
         chain = self.chain
-        motions, aids, left, left_aids, (step, size) = chain.whole(SOLVED)
+        motions, aids, left, left_aids, steps = chain.whole(SOLVED)
         sizes: tuple[float, float] = solve_chain.unchecked(
             (chain.prior if first else chain.turned(chain.prior, -chain.prior_shift), chain.prior_shift), chain.rows,
-            motions, aids, damping, first, left, left_aids, step, size,
+            motions, aids, damping, first, left, left_aids, steps,
         )  # fmt: skip
         return sizes
 

@@ -56,7 +56,7 @@ class Problem:
         size = solve_chain(
             (self.prior, self.shift), self.rows, (self.F, self.Q, self.e, self.w),
             (self.node + 7, self.instrument, self.m, self.H, self.r, self.R, self.v), damping, first,
-            nodes, aids, step, np.empty(COUNT),
+            nodes, aids, (step, np.empty(COUNT)),
         )  # fmt: skip
         self.left = *nodes, *aids
         return size, (*nodes, step)
@@ -183,7 +183,7 @@ def test_rows_before_and_after_do_not_count():
         column[2:-1] = 0.0
     again = solve_chain(
         (p.prior, p.shift), (2, COUNT, 2, 2, len(p.node), 0), tuple(motions), tuple(aids), 0.0, 0, tuple(nodes[:4]),
-        tuple(left), nodes[4], np.empty(COUNT + 3),
+        tuple(left), (nodes[4], np.empty(COUNT + 3)),
     )  # fmt: skip
     assert again == size
     for ours, theirs in zip((*nodes, *left), (*alone, *p.left[4:])):
