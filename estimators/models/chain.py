@@ -44,7 +44,7 @@ from simnav.types import (
 )
 
 from .base import ErrorModel, Linearised
-from .columns import Columns, Selection
+from .columns import Columns, Made, Selection
 from .many_readings import ManyReadings
 
 __all__ = ["STEPPED", "Chain", "attach_one", "begin_motion", "chain_of"]
@@ -154,7 +154,7 @@ class Chain(ABC):
         self.names = tuple(instruments)
         self._index = {name: i for i, name in enumerate(self.names)}
         self._kept = (*front.state, *self.node_arrays)
-        self._made: dict[Selection, Any] = {}
+        self._made = Made()
         self._states = Selection(("nodes", front.state))
         self.nodes = Columns(self._made, time=(), **{name: getattr(front, name).shape for name in self._kept})
         self.nodes.add(predicted=(n, n), predicted_shift=(n,), filtered=(n, n), filtered_shift=(n,), step=(n,), size=())

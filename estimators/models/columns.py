@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["Columns", "Selection"]
+__all__ = ["Columns", "Made", "Selection"]
 
 
 class Selection:
@@ -14,6 +14,13 @@ class Selection:
 
     def __init__(self, *groups: tuple[str, tuple[str, ...]]):
         self.groups = groups
+
+
+class Made(dict[Any, Any]):
+    """What is made of whole columns, by any key. A copy is empty, because it would refer to the arrays of the other."""
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Made, ()
 
 
 class Columns(dict[str, Any]):
@@ -24,7 +31,7 @@ class Columns(dict[str, Any]):
 
     Parameters
     ----------
-    made : dict, optional
+    made : Made, optional
         What others make of whole columns, by any key; it is emptied when an array is replaced.
     **columns : tuple of int, or dtype
         Shape of a row's float64 entry, or the type of a scalar.
@@ -44,10 +51,10 @@ class Columns(dict[str, Any]):
     ([1.0, 2.0], [1.0, -1.0])
     """
 
-    def __init__(self, made: dict[Any, Any] | None = None, /, **columns: Any):
+    def __init__(self, made: Made | None = None, /, **columns: Any):
         self._capacity = 64
         self._columns: dict[str, Any] = {}
-        self._made: dict[Any, Any] = {} if made is None else made
+        self._made = Made() if made is None else made
         self.first = self.last = 0
         self.add(**columns)
 

@@ -8,10 +8,10 @@ import pickle
 import numpy as np
 import pytest
 
-from simnav.estimators.models.columns import Columns
+from simnav.estimators.models.columns import Columns, Made
 
 
-def filled(rows: int, made: dict | None = None) -> Columns:
+def filled(rows: int, made: Made | None = None) -> Columns:
     columns = Columns(made, time=(), value=(2,), node=np.int64)
     for k in range(rows):
         columns.append(time=float(k), value=(k, -k), node=k)
@@ -50,7 +50,7 @@ def test_rows_are_not_moved_without_need():
 
 
 def test_what_was_made_of_whole_columns_goes_when_an_array_is_replaced():
-    made: dict = {}
+    made = Made()
     columns = filled(10, made)
     made["key"] = columns.whole(("time",))
     columns.drop(3)
@@ -71,3 +71,14 @@ def test_a_copy_has_rows_of_its_own(copied):
     assert other["time"].tolist() == [0.0, 1.0, 2.0, 3.0, 4.0, 9.0]
     assert columns["time"].tolist() == [0.0, 1.0, 2.0, 3.0, 4.0]
     assert columns["value"][0].tolist() == [0.0, 0.0]
+
+
+def test_copies_of_two_tables_share_what_is_made_of_them_and_begin_without():
+    made = Made()
+    first, second = filled(3, made), filled(4, made)
+    made["key"] = first.whole(("time",))
+    one, other = copy.deepcopy((first, second))
+    assert made["key"][0] is first.whole(("time",))[0]
+    assert one._made is other._made
+    assert one._made is not made
+    assert not one._made
