@@ -15,8 +15,8 @@ import numpy as np
 from simnav.compiled import kernel
 from simnav.estimators.algebra.inflation import inflate_motion
 from simnav.estimators.algebra.mixture import mixture_update
-from simnav.estimators.models.base import INNOVATION, NIS, REJECTED, REPORT, RESULTS, SIGMA, SIZE, StepRule
-from simnav.estimators.models.inertial_step import STEP, AidTable, Matrices, Measured, Others
+from simnav.estimators.models.base import INNOVATION, NIS, REJECTED, REPORT, RESULTS, SIGMA, SIZE, AidTable, StepRule
+from simnav.estimators.models.inertial_step import STEP, Matrices, Measured, Others
 from simnav.estimators.models.inertial_update import absorb_inertial, assimilate_inertial, innovate_inertial
 from simnav.estimators.models.propagation import Moving, Samples, correct_inertial, propagate_inertial
 from simnav.types import Array, Flags, Integers

@@ -49,7 +49,8 @@ from .cholesky import factorise
 from .products import Places, add_product, list_elements, padded, sparse_product
 
 __all__ = [
-    "Aids", "Elimination", "after_step", "error_after_step", "half_squares", "keep_weights", "solve_chain", "whiten",
+    "ROWS", "STEPPED_TYPES", "Aids", "Elimination", "Rows", "Whitened", "after_step", "error_after_step",
+    "half_squares", "keep_weights", "solve_chain", "whiten", "whiten_one",
 ]  # fmt: skip
 
 #: A factor with a smaller weight than this is left out.
@@ -59,20 +60,34 @@ LEAST_WEIGHT = 1e-9
 Lists: TypeAlias = tuple[Array, Places, Places]
 #: Work space (n, w), where w is a multiple of eight.
 Room: TypeAlias = tuple[Array, Array, Array]
-#: The M aiding factors: their nodes (M,), in ascending order, and the number of the first node of all; which instrument
-#: each comes from (M,), measurements of one instrument on one node are taken as their mean; components (M,), 0 for a
-#: factor that says nothing; Jacobians with respect to the nodes (M, 3, n); residuals, measured less predicted (M, 3);
-#: covariances (M, 3, 3), and the weights that divide them (M,).
-Aids: TypeAlias = tuple[Integers, int, Integers, Integers, Array, Array, Array, Array]
-_AIDS = "Tuple((i8[::1], i8, i8[::1], i8[::1], f8[:, :, ::1], f8[:, ::1], f8[:, :, ::1], f8[::1]))"
+#: Where the K nodes, the K - 1 motion factors and the M aiding factors are in arrays that may have more rows before and
+#: after them: index of the first node, and K; index of the first motion factor; index of the first aiding factor, and
+#: M; and the number of the first node, from which the aiding factors count theirs.
+Rows: TypeAlias = tuple[int, int, int, int, int, int]
+ROWS = "UniTuple(i8, 6)"
+#: The M aiding factors: their nodes (M,), in ascending order; which instrument each comes from (M,), measurements of
+#: one instrument on one node are taken as their mean; components (M,), 0 for a factor that says nothing; Jacobians with
+#: respect to the nodes (M, 3, n); residuals, measured less predicted (M, 3); covariances (M, 3, 3), and the weights
+#: that divide them (M,).
+Aids: TypeAlias = tuple[Integers, Integers, Integers, Array, Array, Array, Array]
+_AIDS = "Tuple((i8[::1], i8[::1], i8[::1], f8[:, :, ::1], f8[:, ::1], f8[:, :, ::1], f8[::1]))"
 #: The stored results of an elimination: covariance of each node without its own measurements, with all older ones
-#: (K, n, n), and its mean minus the node (K, n); the same two with its own measurements; ``L^-1 H P`` and ``L^-1 H`` of
-#: each measurement (M, 3, n) with ``L L' = S``, and ``L^-1 (r - H d)`` (M, 3); 1 if a measurement is used, by itself or
-#: as a mean, otherwise 0 (M,).
-Elimination: TypeAlias = tuple[Array, Array, Array, Array, Array, Array, Array, Integers]
-_ELIMINATION = (
-    "Tuple((f8[:, :, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, :, ::1], f8[:, ::1], i8[::1]))"
-)
+#: (K, n, n), and its mean minus the node (K, n); the same two with its own measurements.
+Elimination: TypeAlias = tuple[Array, Array, Array, Array]
+_ELIMINATION = "Tuple((f8[:, :, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1]))"
+#: The same of measurements: ``L^-1 H P`` and ``L^-1 H`` (M, 3, n) with ``L L' = S``, and ``L^-1 (r - H d)`` (M, 3); 1
+#: if a measurement is used, by itself or as a mean, otherwise 0 (M,).
+Whitened: TypeAlias = tuple[Array, Array, Array, Integers]
+_WHITENED = "Tuple((f8[:, :, ::1], f8[:, :, ::1], f8[:, ::1], i8[::1]))"
+
+
+@kernel()
+def _copy_node(P: Array, d: Array, to_P: Array, to_d: Array) -> None:
+    """Copy a covariance and a mean, element by element: a kernel with assignments of arrays takes long to compile."""
+    for i in range(d.size):
+        to_d[i] = d[i]
+        for j in range(d.size):
+            to_P[i, j] = P[i, j]
 
 
 @kernel()
@@ -180,7 +195,7 @@ def _mean_of(i: int, end: int, aids: Aids, used: Integers, mean_H: Array, mean_r
     int
         Number of measurements in the mean. If it is 1, nothing is written.
     """
-    _, _, instrument, components, H, r, R, weight = aids
+    _, instrument, components, H, r, R, weight = aids
     count = 1
     for k in range(i + 1, end):
         if used[k] == 1 and instrument[k] == instrument[i] and components[k] == components[i]:
@@ -189,9 +204,12 @@ def _mean_of(i: int, end: int, aids: Aids, used: Integers, mean_H: Array, mean_r
         return count
     m, n = components[i], mean_H.shape[1]
     total = 0.0
-    mean_H[:] = 0.0
-    mean_r[:] = 0.0
-    mean_R[:] = 0.0
+    for a in range(3):
+        mean_r[a] = 0.0
+        for b in range(3):
+            mean_R[a, b] = 0.0
+        for c in range(n):
+            mean_H[a, c] = 0.0
     for k in range(i, end):
         if used[k] == 0 or instrument[k] != instrument[i] or components[k] != m:
             continue
@@ -218,7 +236,8 @@ def _mean_of(i: int, end: int, aids: Aids, used: Integers, mean_H: Array, mean_r
 
 
 @kernel()
-def _whiten(error: Array, whitener: Array, whitened: Array) -> float:
+def whiten_one(error: Array, whitener: Array, whitened: Array) -> float:
+    """Whiten an error with an inverse Cholesky factor; the result is the norm of the whitened error."""
     square = 0.0
     for i in range(error.size):
         x = 0.0
@@ -243,12 +262,12 @@ def _return(adjoint: Array, U: Array, G: Array, y: Array, m: int, z: Array) -> N
 
 
 @kernel(
-    "UniTuple(f8, 2)(Tuple((f8[:, ::1], f8[::1])), Tuple((f8[:, :, ::1], f8[:, :, ::1], f8[:, ::1], f8[::1])), "
-    f"{_AIDS}, f8, i8, {_ELIMINATION}, f8[:, ::1], f8[::1])"
+    f"UniTuple(f8, 2)(Tuple((f8[:, ::1], f8[::1])), {ROWS}, Tuple((f8[:, :, ::1], f8[:, :, ::1], f8[:, ::1], f8[::1])),"
+    f"{_AIDS}, f8, i8, {_ELIMINATION}, {_WHITENED}, Tuple((f8[:, ::1], f8[::1])))"
 )
 def solve_chain(
-    prior: tuple[Array, Array], motion: tuple[Array, Array, Array, Array], aids: Aids, damping: float, first: int,
-    left: Elimination, step: Array, size: Array,
+    prior: tuple[Array, Array], rows: Rows, motion: tuple[Array, Array, Array, Array], aids: Aids, damping: float,
+    first: int, left: Elimination, left_aids: Whitened, steps: tuple[Array, Array],
 ) -> tuple[float, float]:  # fmt: skip
     """Compute one step of K nodes of n states with K - 1 motion factors and M aiding factors (equations in the module).
 
@@ -256,6 +275,8 @@ def solve_chain(
     ----------
     prior : (n, n) and (n,) arrays
         Covariance of the first node before its measurements; d, the mean of the prior minus the first node.
+    rows : tuple of int
+        Which rows of the arrays below are meant, see `Rows`.
     motion : (K - 1, n, n), (K - 1, n, n), (K - 1, n) and (K - 1,) arrays
         F and Q; e, the newer node minus the prediction from the older one; the weights that divide Q.
     aids : tuple
@@ -264,25 +285,30 @@ def solve_chain(
         The damping lambda, 0 for a Gauss-Newton step.
     first : int
         Nodes before this one have been eliminated already, without damping; ``left`` holds their results.
-    left : tuple of arrays
-        Results of the elimination, see `Elimination`; overwritten from node ``first`` on.
-    step : (K, n) array
-        Overwritten with the corrections dx.
-    size : (K,) array
-        Overwritten with the largest component of each node's step, in units of its filtered sigmas; NaN or infinite if
-        the step cannot be used.
+    left, left_aids : tuples of arrays
+        Results of the elimination, see `Elimination` and `Whitened`; overwritten from node ``first`` on.
+    steps : (K, n) and (K,) arrays
+        Overwritten with the corrections dx; with the largest component of each node's step, in units of its filtered
+        sigmas, NaN or infinite if the step cannot be used.
 
     Returns
     -------
     float, float
         Largest ``size`` of all nodes, and of the nodes before ``first``.
     """
+    k0, count, m0, i0, total, base = rows
+    k1, m1, i1 = k0 + count, m0 + count - 1, i0 + total
     prior_covariance, prior_shift = prior
-    transition, noise, error, motion_weight = motion
-    node, base, instrument, components, jacobian, residual, aid_noise, aid_weight = aids
-    predicted, predicted_shift, filtered, filtered_shift, cross, white, innovation, used = left
-    count, n = step.shape
-    total = node.size
+    transition, noise, error, motion_weight = motion[0][m0:m1], motion[1][m0:m1], motion[2][m0:m1], motion[3][m0:m1]
+    node, instrument, components, jacobian = aids[0][i0:i1], aids[1][i0:i1], aids[2][i0:i1], aids[3][i0:i1]
+    residual, aid_noise, aid_weight = aids[4][i0:i1], aids[5][i0:i1], aids[6][i0:i1]
+    aids = node, instrument, components, jacobian, residual, aid_noise, aid_weight
+    predicted, predicted_shift = left[0][k0:k1], left[1][k0:k1]
+    filtered, filtered_shift = left[2][k0:k1], left[3][k0:k1]
+    cross, white = left_aids[0][i0:i1], left_aids[1][i0:i1]
+    innovation, used = left_aids[2][i0:i1], left_aids[3][i0:i1]
+    step, size = steps[0][k0:k1], steps[1][k0:k1]
+    n = step.shape[1]
     L, lists = np.empty((4, 3)), (np.empty((n, n)), np.empty((n, n), np.uint64), np.empty(n, np.uint64))
     room = np.zeros((n, padded(n))), np.zeros((n, padded(n))), np.zeros((n, padded(n)))
     damps = count if damping > 0.0 else 0
@@ -303,8 +329,7 @@ def solve_chain(
     for k in range(first, count):
         P, d = predicted[k], predicted_shift[k]
         if k == 0:
-            P[:] = prior_covariance
-            d[:] = prior_shift
+            _copy_node(prior_covariance, prior_shift, P, d)
         else:
             _predict(filtered[k - 1], transition[k - 1], noise[k - 1], motion_weight[k - 1], lists, room, P)
             for r in range(n):
@@ -312,9 +337,8 @@ def solve_chain(
                 for c in range(n):
                     x += transition[k - 1, r, c] * filtered_shift[k - 1, c]
                 d[r] = x
+        _copy_node(P, d, filtered[k], filtered_shift[k])
         P, d = filtered[k], filtered_shift[k]
-        P[:] = predicted[k]
-        d[:] = predicted_shift[k]
         if damps:
             for r in range(n):
                 damped[r, 0, 0] = P[r, r]
@@ -347,9 +371,11 @@ def solve_chain(
     i = total - 1
     for k in range(count - 1, -1, -1):
         if k < count - 1:
-            after[:] = 0.0
+            for r in range(n):
+                after[r] = 0.0
             add_product(transition[k], adjoint, after)
-            adjoint[:] = after
+            for r in range(n):
+                adjoint[r] = after[r]
         for r in range(n):
             step[k, r] = filtered_shift[k, r]
         add_product(filtered[k], adjoint, step[k])
@@ -387,42 +413,56 @@ def error_after_step(error: Array, F: Array, older: Array, newer: Array, after: 
         after[r] = x
 
 
-@kernel(
-    "void(f8[:, ::1], UniTuple(f8[:, ::1], 2), "
-    "Tuple((f8[:, :, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[::1])), "
-    "Tuple((i8[::1], i8, f8[:, :, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[::1])))"
+#: Types of the last three arguments of `after_step`.
+STEPPED_TYPES = (
+    "UniTuple(f8[:, ::1], 3), Tuple((f8[:, :, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[::1], f8[::1])), "
+    "Tuple((i8[::1], f8[:, :, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[::1], f8[::1]))"
 )
+
+
+@kernel(f"f8({ROWS}, Tuple((f8[:, ::1], f8[::1])), {STEPPED_TYPES})")
 def after_step(
-    step: Array, shifts: tuple[Array, Array], motion: tuple[Array, Array, Array, Array, Array],
-    aids: tuple[Integers, int, Array, Array, Array, Array, Array],
-) -> None:  # fmt: skip
+    rows: Rows, prior: tuple[Array, Array], nodes: tuple[Array, Array, Array],
+    motion: tuple[Array, Array, Array, Array, Array, Array],
+    aids: tuple[Integers, Array, Array, Array, Array, Array, Array],
+) -> float:  # fmt: skip
     """Update shifts and residuals after a step, by the linearised factors.
 
     Parameters
     ----------
-    step : (K, n) array
-        Corrections of the nodes.
-    shifts : two (K, n) arrays
-        Means of the nodes without and with their own measurements, minus the nodes; the step is subtracted.
+    rows : tuple of int
+        Which rows of the arrays below are meant, see `Rows`.
+    prior : (n, n) and (n,) arrays
+        Of the prior, as for `half_squares`.
+    nodes : three (K, n) arrays
+        Corrections of the nodes; means of the nodes without and with their own measurements, minus the nodes: the
+        correction is subtracted from both.
     motion : tuple of arrays
-        F and e, which is updated, as for `solve_chain`; whiteners, whitened errors and norms, as for `whiten`.
+        F and e, which is updated, as for `solve_chain`; whiteners, whitened errors and norms, as for `whiten`; weights.
     aids : tuple
-        Nodes, number of the first node, Jacobians and residuals, which are updated, as for `solve_chain`; whiteners,
-        whitened residuals and norms, as for `whiten`.
+        Nodes, Jacobians and residuals, which are updated, as for `solve_chain`; whiteners, whitened residuals and
+        norms, as for `whiten`; weights.
+
+    Returns
+    -------
+    float
+        The cost after the step (`half_squares`).
     """
-    predicted_shift, filtered_shift = shifts
-    transition, error, whitener, whitened, norm = motion
-    node, base, jacobian, residual, aid_whitener, aid_whitened, aid_norm = aids
+    k0, count, m0, i0, total, base = rows
+    step, predicted_shift, filtered_shift = nodes
+    transition, error, whitener, whitened, norm, weight = motion
+    node, jacobian, residual, aid_whitener, aid_whitened, aid_norm, aid_weight = aids
     n = step.shape[1]
-    for k in range(step.shape[0]):
+    for k in range(k0, k0 + count):
         for r in range(n):
             predicted_shift[k, r] -= step[k, r]
             filtered_shift[k, r] -= step[k, r]
-    for k in range(error.shape[0]):
-        error_after_step(error[k], transition[k], step[k], step[k + 1], error[k])
-        norm[k] = _whiten(error[k], whitener[k], whitened[k])
-    for i in range(node.size):
-        k = node[i] - base
+    for k in range(count - 1):
+        m = m0 + k
+        error_after_step(error[m], transition[m], step[k0 + k], step[k0 + k + 1], error[m])
+        norm[m] = whiten_one(error[m], whitener[m], whitened[m])
+    for i in range(i0, i0 + total):
+        k = k0 + node[i] - base
         x, y, z = residual[i, 0], residual[i, 1], residual[i, 2]
         for c in range(n):
             s = step[k, c]
@@ -430,7 +470,8 @@ def after_step(
             y -= jacobian[i, 1, c] * s
             z -= jacobian[i, 2, c] * s
         residual[i, 0], residual[i, 1], residual[i, 2] = x, y, z
-        aid_norm[i] = _whiten(residual[i], aid_whitener[i], aid_whitened[i])
+        aid_norm[i] = whiten_one(residual[i], aid_whitener[i], aid_whitened[i])
+    return half_squares(rows, prior, (norm, weight), (aid_norm, aid_weight))
 
 
 @kernel("void(i8, f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[::1])")
@@ -451,7 +492,7 @@ def whiten(first: int, error: Array, whitener: Array, whitened: Array, norm: Arr
         Overwritten with the norms of the whitened errors.
     """
     for k in range(first, error.shape[0]):
-        norm[k] = _whiten(error[k], whitener[k], whitened[k])
+        norm[k] = whiten_one(error[k], whitener[k], whitened[k])
 
 
 @kernel("i8(UniTuple(f8[::1], 3), i8[::1], i8, UniTuple(f8[::1], 3), f8)")
@@ -492,29 +533,31 @@ def keep_weights(
     return first
 
 
-@kernel("f8(f8[:, ::1], f8[::1], f8[::1], f8[::1], f8[::1], f8[::1])")
+@kernel(f"f8({ROWS}, Tuple((f8[:, ::1], f8[::1])), UniTuple(f8[::1], 2), UniTuple(f8[::1], 2))")
 def half_squares(
-    whitener: Array, shift: Array, weight: Array, norm: Array, aid_weight: Array, aid_norm: Array
+    rows: Rows, prior: tuple[Array, Array], motion: tuple[Array, Array], aids: tuple[Array, Array]
 ) -> float:
     """The cost: half the sum of squares of all factors.
 
     Parameters
     ----------
-    whitener : (n, n) array
-        Inverse Cholesky factor of the covariance of the prior, lower triangular.
-    shift : (n,) array
-        Mean of the prior minus the first node.
-    weight, norm, aid_weight, aid_norm : arrays
-        Weights of the motion and aiding factors, and the norms of their whitened residuals.
+    rows : tuple of int
+        Which rows of the arrays below are meant, see `Rows`.
+    prior : (n, n) and (n,) arrays
+        Inverse Cholesky factor of the covariance of the prior, lower triangular; its mean minus the first node.
+    motion, aids : two (K - 1,), two (M,) arrays
+        Norms of the whitened residuals, and weights, of the motion and aiding factors.
     """
+    _, count, m0, i0, many, _ = rows
+    (whitener, shift), (norm, weight), (aid_norm, aid_weight) = prior, motion, aids
     total = 0.0
     for i in range(shift.size):
         x = 0.0
         for j in range(i + 1):
             x += whitener[i, j] * shift[j]
         total += x * x
-    for k in range(norm.size):
+    for k in range(m0, m0 + count - 1):
         total += weight[k] * norm[k] * norm[k]
-    for i in range(aid_norm.size):
+    for i in range(i0, i0 + many):
         total += aid_weight[i] * aid_norm[i] * aid_norm[i]
     return 0.5 * total

@@ -22,13 +22,14 @@ from simnav.types import (
     ImuSamples,
     InitialState,
     Instruments,
+    Integers,
     Measurement,
 )
 
 from .many_readings import ManyReadings
 from .own_observation import OwnObservation
 
-__all__ = ["ErrorModel", "Linearised", "Observation", "StepRule"]
+__all__ = ["AidTable", "ErrorModel", "Linearised", "Observation", "StepRule"]
 
 #: A measurement of m components with the covariance P of n states: innovation (m,), P H' (n, m), H P H' (m, m) and
 #: noise (m, m).
@@ -39,6 +40,11 @@ Observation = tuple[Array, Array, Array, Array]
 NIS, INNOVATION, SIGMA, REPORT, SIZE, RESULTS = 0, 1, 4, 7, 8, 9
 #: Instead of the normalised innovation squared: the measurement was set aside.
 REJECTED = -2.0
+
+
+#: The instruments of a filter: their codes, numbers of components, and places of bias and scale factor (i, 4); lever
+#: arms (i, 3) [m]; and the elements of their noise (i, 9).
+AidTable = tuple[Integers, Array, Array]
 
 
 class StepRule(NamedTuple):
@@ -211,6 +217,21 @@ class ErrorModel(ABC):
         -------
         (k, m, m) array or None
             The noises. None where each reading has to be asked for by itself.
+        """
+        return None
+
+    def step_table(self, names: Sequence[str]) -> AidTable | None:
+        """What a kernel knows of instruments that uses all measurements of a step with their nominal noise.
+
+        Parameters
+        ----------
+        names : sequence of str
+            Instruments, in the order in which the kernel counts them.
+
+        Returns
+        -------
+        AidTable or None
+            None if the model's measurements have to be used one by one, for a whole run.
         """
         return None
 

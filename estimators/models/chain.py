@@ -13,8 +13,8 @@ prediction is then a function of that node through the motion between them, and 
 noise of the measurement. Two measurements that are folded onto one node share a part of this noise; this correlation is
 neglected.
 
-A subclass has the loops over a window: `linearise_motion`, `observe`, `move_folds`, `retract`, `along_motion`. All but
-`observe` are in `simnav.estimators.models.moving_chain` for models whose motion depends on state and time only.
+A subclass has the loops over a window: `linearise_motion`, `linearise_aids`, `observe`, `retract`, `along_motion`. All
+but `observe` are in `simnav.estimators.models.moving_chain` for models whose motion depends on state and time only.
 """
 
 from __future__ import annotations
@@ -29,6 +29,7 @@ from numpy.typing import NDArray
 
 from simnav.compiled import kernel, ready
 from simnav.estimator.needs import Needs
+from simnav.estimators.algebra.block_tridiagonal import Rows, after_step, whiten
 from simnav.estimators.algebra.whitening import whitening
 from simnav.types import (
     NO_SIDE,
@@ -39,19 +40,26 @@ from simnav.types import (
     ImuSamples,
     InitialState,
     Instruments,
-    Integers,
     Measurement,
 )
 
 from .base import ErrorModel, Linearised
-from .columns import Columns
+from .columns import Columns, Made, Selection
 from .many_readings import ManyReadings
 
-__all__ = ["Chain", "chain_of"]
+__all__ = ["STEPPED", "Chain", "attach_one", "begin_motion", "chain_of"]
+
+
+#: The whole columns that `after_step` takes.
+STEPPED = Selection(
+    ("nodes", ("step", "predicted_shift", "filtered_shift")),
+    ("motions", ("jacobian", "residual", "whitener", "whitened", "norm", "weight")),
+    ("aids", ("node", "jacobian", "residual", "whitener", "whitened", "norm", "weight")),
+)
 
 
 @kernel("void(f8[:, ::1], f8[::1], f8[:, ::1], f8[:, ::1], f8[::1])")
-def _attach(noise: Array, value: Array, full: Array, whitener: Array, values: Array) -> None:
+def attach_one(noise: Array, value: Array, full: Array, whitener: Array, values: Array) -> None:
     """Extend the (m, m) noise and the value of a measurement to three components, and compute the whitener."""
     for i in range(3):
         values[i] = value[i] if i < value.size else 0.0
@@ -62,13 +70,13 @@ def _attach(noise: Array, value: Array, full: Array, whitener: Array, values: Ar
 
 @kernel("void(f8[:, :, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, :, ::1], f8[:, ::1])")
 def _attach_all(noise: Array, value: Array, full: Array, whitener: Array, values: Array) -> None:
-    """Apply `_attach` to k measurements."""
+    """Apply `attach_one` to k measurements."""
     for k in range(noise.shape[0]):
-        _attach(noise[k], value[k], full[k], whitener[k], values[k])
+        attach_one(noise[k], value[k], full[k], whitener[k], values[k])
 
 
 @kernel("void(f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1])")
-def _begin_motion(
+def begin_motion(
     transition: Array, noise: Array, factor: Array, jacobian: Array, factor_noise: Array, whitener: Array
 ) -> None:
     """Copy transition matrix and noise of a motion to its factor, with the whitener; after it there is no motion."""
@@ -79,90 +87,6 @@ def _begin_motion(
             factor_noise[i, j] = noise[i, j]
             transition[i, j], noise[i, j] = 1.0 if i == j else 0.0, 0.0
     whitening(factor_noise, whitener)
-
-
-@kernel("void(i8, i8[::1], i8, f8[:, :, ::1], f8[:, :, ::1])")
-def through_motion(first: int, row: Integers, coupled: int, transition: Array, jacobian: Array) -> None:
-    """Convert Jacobians with respect to the states at folds to Jacobians with respect to their nodes, in place.
-
-    Parameters
-    ----------
-    first : int
-        Index of the first aiding factor that is converted.
-    row : (M,) int array
-        Index of the fold of each aiding factor; -1 for factors without a fold.
-    coupled : int
-        States from this index on are independent and only decay; each may also move by the one after it.
-    transition : (K, n, n) array
-        Transition matrices from the nodes to the K folds.
-    jacobian : (M, 3, n) array
-        Jacobians with respect to the states at the folds; overwritten.
-    """
-    n = transition.shape[1]
-    at_node = np.empty(n)
-    for i in range(first, row.size):
-        if row[i] < 0:
-            continue
-        for r in range(3):
-            at_node[:] = 0.0
-            for j in range(n):
-                x = jacobian[i, r, j]
-                if x != 0.0:
-                    if j < coupled:
-                        for c in range(coupled):
-                            at_node[c] += x * transition[row[i], j, c]
-                    else:
-                        at_node[j] += x * transition[row[i], j, j]
-                        if j + 1 < n and transition[row[i], j, j + 1] != 0.0:
-                            at_node[j + 1] += x * transition[row[i], j, j + 1]
-            for c in range(n):
-                jacobian[i, r, c] = at_node[c]
-
-
-@kernel("void(i8, i8[::1], i8[::1], f8[:, :, ::1], f8[:, :, ::1], f8[:, :, ::1], f8[:, :, ::1], i8[::1])")
-def add_motion_noise(
-    first: int, row: Integers, components: Integers, jacobian: Array, motion_noise: Array, noise: Array,
-    whitener: Array, bare: Integers,
-) -> None:  # fmt: skip
-    """Add the noise Q of the motion up to a fold to the noise R of the measurements there, ``R + H Q H'``, once.
-
-    Parameters
-    ----------
-    first : int
-        Index of the first aiding factor that is changed.
-    row : (M,) int array
-        Index of the fold of each aiding factor; -1 for factors without a fold.
-    components : (M,) int array
-        Number of components of each measurement.
-    jacobian : (M, 3, n) array
-        Jacobian H with respect to the state at the fold.
-    motion_noise : (K, n, n) array
-        Process noise Q of the motions from the nodes to the folds.
-    noise, whitener : (M, 3, 3) arrays
-        Noise R of the measurements and its inverse Cholesky factor; overwritten.
-    bare : (M,) int array
-        1 if the motion noise has not been added yet; overwritten with 0.
-    """
-    n = jacobian.shape[2]
-    cross = np.empty(n)
-    for i in range(first, row.size):
-        if row[i] < 0 or bare[i] == 0:
-            continue
-        bare[i] = 0
-        H, Q = jacobian[i], motion_noise[row[i]]
-        for a in range(components[i]):
-            cross[:] = 0.0
-            for j in range(n):
-                x = H[a, j]
-                if x != 0.0:
-                    for c in range(n):
-                        cross[c] += x * Q[j, c]
-            for b in range(components[i]):
-                x = 0.0
-                for c in range(n):
-                    x += cross[c] * H[b, c]
-                noise[i, a, b] += x
-        whitening(noise[i], whitener[i])
 
 
 class Chain(ABC):
@@ -178,7 +102,9 @@ class Chain(ABC):
     size : int
         Number n of components of the model's error.
     nodes : Columns
-        The nodes: ``time`` and the arrays of the model that `node_arrays` names.
+        The nodes: ``time`` and the arrays of the model that `node_arrays` names; of the last solution ``predicted``,
+        ``filtered`` (n, n), ``predicted_shift``, ``filtered_shift`` (n,)
+        (`simnav.estimators.algebra.block_tridiagonal.Elimination`), ``step`` (n,), and its ``size``.
     motions : Columns
         The motion factors, each from the previous node to a node: ``transition``, ``noise``, ``whitener`` (n, n);
         ``begin_shift``, ``end_shift`` (n,); of the last linearisation, ``jacobian`` (n, n) and ``residual`` (n,);
@@ -188,7 +114,8 @@ class Chain(ABC):
         (number since the start of the run, or -1), ``instrument`` (index into ``names``), ``components``, ``time``,
         ``value`` (3,), ``noise`` and ``whitener`` (3, 3), ``bare`` (1 if the noise of the motion has not been added to
         the noise yet); ``side`` if readings have side information; of the last linearisation ``residual`` (3,),
-        ``jacobian`` (3, n); ``weight``.
+        ``jacobian`` (3, n); ``weight``; of the last solution ``cross``, ``white`` (3, n), ``innovation`` (3,), ``used``
+        (`simnav.estimators.algebra.block_tridiagonal.Whitened`).
     folds : Columns
         Times between nodes with measurements: ``node`` (number of the previous node), ``time``, ``transition`` and
         ``noise`` (n, n) from the node, ``shift`` (n,) by which the node has moved since the prediction, the predicted
@@ -227,14 +154,18 @@ class Chain(ABC):
         self.names = tuple(instruments)
         self._index = {name: i for i, name in enumerate(self.names)}
         self._kept = (*front.state, *self.node_arrays)
-        self.nodes = Columns(time=(), **{name: getattr(front, name).shape for name in self._kept})
+        self._made = Made()
+        self._states = Selection(("nodes", front.state))
+        self.nodes = Columns(self._made, time=(), **{name: getattr(front, name).shape for name in self._kept})
+        self.nodes.add(predicted=(n, n), predicted_shift=(n,), filtered=(n, n), filtered_shift=(n,), step=(n,), size=())
         self.motions = Columns(
-            transition=(n, n), noise=(n, n), whitener=(n, n), begin_shift=(n,), end_shift=(n,), time=(),
+            self._made, transition=(n, n), noise=(n, n), whitener=(n, n), begin_shift=(n,), end_shift=(n,), time=(),
             residual=(n,), jacobian=(n, n), whitened=(n,), norm=(), weight=(),
         )  # fmt: skip
         self.aids = Columns(
-            node=np.int64, fold=np.int64, instrument=np.int64, components=np.int64, time=(), value=(3,), noise=(3, 3),
-            bare=np.int64, whitener=(3, 3), residual=(3,), jacobian=(3, n), whitened=(3,), norm=(), weight=(),
+            self._made, node=np.int64, fold=np.int64, instrument=np.int64, components=np.int64, time=(), value=(3,),
+            noise=(3, 3), bare=np.int64, whitener=(3, 3), residual=(3,), jacobian=(3, n), whitened=(3,), norm=(),
+            weight=(), cross=(3, n), white=(3, n), innovation=(3,), used=np.int64,
         )  # fmt: skip
         self._sides = max((len(own.kind.side) for own in front.own.values()), default=0)
         if self._sides:
@@ -243,7 +174,9 @@ class Chain(ABC):
         together = {name for many in front.many for name in many.sources}
         #: Of each instrument: whether it has an equation of its own, and one reading is predicted at a time.
         self._one_by_one = np.array([name in front.own and name not in together for name in self.names], dtype=bool)
-        self.folds = Columns(node=np.int64, time=(), transition=(n, n), noise=(n, n), shift=(n,), jacobian=(n, n))
+        self.folds = Columns(
+            self._made, node=np.int64, time=(), transition=(n, n), noise=(n, n), shift=(n,), jacobian=(n, n)
+        )
         self.folds.add(**{name: getattr(front, name).shape for name in self._kept})
         self.folds.add(**{f"now_{name}": getattr(front, name).shape for name in front.state})
         self.base = self.fold_base = 0
@@ -261,6 +194,21 @@ class Chain(ABC):
         self.prior, self.prior_shift = ready(covariance.copy()), ready(shift.copy())
         self.prior_whitener = np.empty_like(self.prior)
         whitening(self.prior, self.prior_whitener)
+
+    @property
+    def rows(self) -> Rows:
+        """Where nodes, motion factors and aiding factors are in whole columns."""
+        nodes, aids = self.nodes, self.aids
+        return nodes.first, nodes.last - nodes.first, self.motions.first, aids.first, aids.last - aids.first, self.base
+
+    def whole(self, selection: Selection) -> Any:
+        """The groups of whole columns that a kernel takes, a tuple of tuples of (capacity, ...) arrays."""
+        found = self._made.get(selection)
+        if found is None:
+            found = self._made[selection] = tuple(
+                [getattr(self, table).whole(names) for table, names in selection.groups]
+            )
+        return found
 
     @property
     def needs(self) -> Needs:
@@ -302,7 +250,7 @@ class Chain(ABC):
         """Make the front a node, with the motion since the newest one as its factor."""
         motions = self.motions
         motions.append(begin_shift=0.0, end_shift=0.0, time=self.front.time, weight=1.0)
-        _begin_motion.unchecked(
+        begin_motion.unchecked(
             self._transition, self._noise, motions.newest("transition"), motions.newest("jacobian"),
             motions.newest("noise"), motions.newest("whitener"),
         )  # fmt: skip
@@ -329,6 +277,26 @@ class Chain(ABC):
         """As `ErrorModel.nominal_noises`, at the front."""
         return self.front.nominal_noises(measurements)
 
+    def take(self, measurements: Sequence[Measurement], until: float, spacing: float) -> tuple[int, int] | None:
+        """Attach all measurements of a step with their nominal noise, each at its own time.
+
+        Parameters
+        ----------
+        measurements : sequence of Measurement
+            In order of their times; one that is later than ``until`` is used then.
+        until : float
+            End of the step [s].
+        spacing : float
+            A measurement closer to the newest node than this [s] is folded onto it, unless it has the latest time.
+
+        Returns
+        -------
+        (int, int) or None
+            Number of measurements that were attached, and of those that cannot be used. None if nothing was done,
+            because the measurements have to be taken one by one.
+        """
+        return None
+
     def attach(self, measurement: Measurement, noise: Array) -> None:
         """Add a measurement at the front, with the (m, m) noise, as a factor on the newest node.
 
@@ -339,7 +307,7 @@ class Chain(ABC):
             node=self.base + len(self.nodes) - 1, fold=self._fold() if ahead else -1, bare=ahead, weight=1.0,
             instrument=self._index[measurement.instrument], components=len(noise), time=measurement.time,
         )  # fmt: skip
-        _attach.unchecked(
+        attach_one.unchecked(
             np.ascontiguousarray(noise, dtype=np.float64), np.ascontiguousarray(measurement.value, dtype=np.float64),
             aids.newest("noise"), aids.newest("whitener"), aids.newest("value"),
         )  # fmt: skip
@@ -375,7 +343,8 @@ class Chain(ABC):
     def settle(self, moved: Array) -> None:
         """Set the front to the newest node. If it is later than the node, correct it by ``moved``, the node's shift."""
         if self.ahead == 0.0:
-            self.front.restore([self.nodes.newest(name) for name in self.front.state])
+            (states,), newest = self.whole(self._states), self.nodes.last - 1
+            self.front.restore([column[newest] for column in states])
         else:
             self.front.correct(self._transition @ moved)
 
@@ -383,15 +352,24 @@ class Chain(ABC):
         """Remove the newest aiding factors."""
         self.aids.drop_newest(count)
 
+    def marginalise(self, count: int) -> None:
+        """Let the oldest nodes leave; what they say about the first that stays, at the last step, is its prior."""
+        step, covariance, shift = (self.nodes[name][count] for name in ("step", "predicted", "predicted_shift"))
+        mean = shift + step
+        self.set_prior(self.turned(covariance, mean), self.relative_shift(mean, step))
+        self.drop(count)
+
     def drop(self, count: int) -> None:
         """Remove the oldest nodes and their factors from the window."""
-        self.base += count
-        self.nodes.drop(count)
-        self.motions.drop(count)
-        self.aids.drop(int(self.aids["node"].searchsorted(self.base)))
-        folds = int(self.folds["node"].searchsorted(self.base))
+        first = self.base + count
+        self._leave(count, *(int(table["node"].searchsorted(first)) for table in (self.aids, self.folds)))
+
+    def _leave(self, nodes: int, aids: int, folds: int) -> None:
+        """Remove the oldest rows."""
+        self.base += nodes
         self.fold_base += folds
-        self.folds.drop(folds)
+        for table, count in ((self.nodes, nodes), (self.motions, nodes), (self.aids, aids), (self.folds, folds)):
+            table.drop(count)
 
     def copy_states(self) -> list[Array]:
         """Copies of the arrays that `retract` changes, for `restore_states`."""
@@ -404,40 +382,53 @@ class Chain(ABC):
         for name, value in zip(self.front.state, states[:-4], strict=True):
             self.nodes[name][...] = value
         self.motions["begin_shift"][...], self.motions["end_shift"][...] = states[-4:-2]
-        self.folds["shift"][...], self.prior_shift = states[-2:]
+        self.folds["shift"][...], self.prior_shift[...] = states[-2:]
 
     def estimate(self, covariance: Array) -> Estimate:
         """The front as an estimate."""
         return self.front.estimate(covariance)
 
-    def factors_from(self, node: int) -> tuple[int, int]:
-        """The indices of the first motion and aiding factors of a node of the window, or of a later one."""
-        return max(node - 1, 0), int(self.aids["node"].searchsorted(self.base + node)) if node else 0
+    def linearise_from(self, node: int = 0) -> None:
+        """Linearise the factors that have to do with a node of the window or later ones, and whiten their residuals."""
+        motions, aids = self.motions, self.aids
+        self.linearise_motion(node)
+        self.linearise_aids(node)
+        whiten.unchecked(
+            max(node - 1, 0), motions["residual"], motions["whitener"], motions["whitened"], motions["norm"]
+        )
+        whiten.unchecked(self.first_aid(node), aids["residual"], aids["whitener"], aids["whitened"], aids["norm"])
+
+    def first_aid(self, node: int) -> int:
+        """The index of the first aiding factor of a node of the window, or of a later one."""
+        return int(self.aids["node"].searchsorted(self.base + node)) if node else 0
 
     @abstractmethod
-    def linearise_motion(self, first: int = 0) -> None:
-        """Compute ``residual`` and ``jacobian`` of the motion factors from an index on, at the present nodes.
+    def linearise_motion(self, node: int = 0) -> None:
+        """Compute ``residual`` and ``jacobian`` of the motion factors that lead to a node or to later ones.
 
         With the state x predicted by a motion, ``residual`` is the newer node minus x, and ``jacobian`` is the
         derivative of x with respect to the older node.
         """
 
-    def linearise_aids(self, first: int = 0) -> None:
-        """Compute ``residual`` (measured minus predicted) and ``jacobian`` (of the prediction) from an index on."""
+    @abstractmethod
+    def linearise_aids(self, node: int = 0) -> None:
+        """Compute ``residual`` (measured minus predicted) and ``jacobian`` (of the prediction) from a node on."""
+
+    def places(self, first: int) -> list[tuple[NDArray[np.int64], Columns, str]]:
+        """The states at which the aids from an index on are predicted: at nodes, and at folds if there are any.
+
+        Returns
+        -------
+        list of (row, states, prefix)
+            The arguments of `observe`.
+        """
         aids, folds = self.aids, self.folds
-        jacobian, row = aids["jacobian"], aids["node"] - self.base
+        row = aids["node"] - self.base
         if not len(folds) or first == len(aids):
-            self.observe(first, row, self.nodes, "", jacobian)
-            return
+            return [(row, self.nodes, "")]
         at_node = aids["fold"] < 0
-        self.observe(first, np.where(at_node, row, -1), self.nodes, "", jacobian)
-        self.move_folds(int(folds["node"].searchsorted(aids["node"][first])))
-        row = np.where(at_node, -1, aids["fold"] - self.fold_base)
-        self.observe(first, row, folds, "now_", jacobian)
-        add_motion_noise.unchecked(
-            first, row, aids["components"], jacobian, folds["noise"], aids["noise"], aids["whitener"], aids["bare"]
-        )
-        through_motion.unchecked(first, row, min(self.coupled, self.size), folds["jacobian"], jacobian)
+        at_fold = np.where(at_node, -1, aids["fold"] - self.fold_base)
+        return [(np.where(at_node, row, -1), self.nodes, ""), (at_fold, folds, "now_")]
 
     @abstractmethod
     def observe(self, first: int, row: NDArray[np.int64], states: Columns, prefix: str, jacobian: Array) -> None:
@@ -516,12 +507,18 @@ class Chain(ABC):
         return side
 
     @abstractmethod
-    def move_folds(self, first: int) -> None:
-        """Compute ``now_...`` and ``jacobian`` of the folds from an index on, at the present nodes."""
-
-    @abstractmethod
     def retract(self, step: Array) -> None:
         """Add a (K, n) step to the nodes and to the shifts of the motion factors; subtract it from the prior shift."""
+
+    def take_step(self) -> float:
+        """Retract the nodes by their ``step``, and do `keep`."""
+        self.retract(self.nodes["step"])
+        return self.keep()
+
+    def keep(self) -> float:
+        """Refer what the elimination left, and the residuals, to the nodes as they are after the step; the cost."""
+        cost: float = after_step.unchecked(self.rows, (self.prior_whitener, self.prior_shift), *self.whole(STEPPED))
+        return cost
 
     @abstractmethod
     def along_motion(self, step: Array) -> Array:

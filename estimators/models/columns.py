@@ -6,18 +6,40 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["Columns"]
+__all__ = ["Columns", "Made", "Selection"]
+
+
+class Selection:
+    """Which whole columns a kernel takes: groups, each with the name of a table and the names of its columns."""
+
+    def __init__(self, *groups: tuple[str, tuple[str, ...]]):
+        self.groups = groups
+
+
+class Made(dict[Any, Any]):
+    """What is made of whole columns, by any key. A copy is empty, because it would refer to the arrays of the other."""
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Made, ()
 
 
 class Columns(dict[str, Any]):
     """Named columns of equal length; rows are appended at the end and dropped at the front.
 
-    An item is a view of a column, (rows, ...). Views are kept until the number of rows changes.
+    An item is a view of a column, (rows, ...). Views are kept until the number of rows changes. A kernel takes whole
+    columns (`whole`) with the indices of their rows, and may append rows itself (`grow`).
 
     Parameters
     ----------
+    made : Made, optional
+        What others make of whole columns, by any key; it is emptied when an array is replaced.
     **columns : tuple of int, or dtype
         Shape of a row's float64 entry, or the type of a scalar.
+
+    Attributes
+    ----------
+    first, last : int
+        Indices in whole columns of the first row, and of the first free one after the rows.
 
     Examples
     --------
@@ -29,10 +51,11 @@ class Columns(dict[str, Any]):
     ([1.0, 2.0], [1.0, -1.0])
     """
 
-    def __init__(self, **columns: Any):
+    def __init__(self, made: Made | None = None, /, **columns: Any):
         self._capacity = 64
         self._columns: dict[str, Any] = {}
-        self._first = self._last = 0
+        self._made = Made() if made is None else made
+        self.first = self.last = 0
         self.add(**columns)
 
     def add(self, **columns: Any) -> None:
@@ -40,12 +63,13 @@ class Columns(dict[str, Any]):
         for name, what in columns.items():
             shape, dtype = ((self._capacity, *what), float) if isinstance(what, tuple) else ((self._capacity,), what)
             self._columns[name] = np.zeros(shape, dtype)
+        self._made.clear()
 
     def __len__(self) -> int:
-        return self._last - self._first
+        return self.last - self.first
 
     def __missing__(self, name: str) -> Any:
-        view = self[name] = self._columns[name][self._first : self._last]
+        view = self[name] = self._columns[name][self.first : self.last]
         return view
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -53,34 +77,58 @@ class Columns(dict[str, Any]):
 
     def newest(self, name: str) -> Any:
         """A view of the last row's entry in a column."""
-        return self._columns[name][self._last - 1]
+        return self._columns[name][self.last - 1]
+
+    def whole(self, names: tuple[str, ...]) -> tuple[Any, ...]:
+        """Columns with the rows that are free: (capacity, ...) arrays."""
+        return tuple([self._columns[name] for name in names])
+
+    @property
+    def names(self) -> set[str]:
+        """Names of the columns."""
+        return set(self._columns)
+
+    @property
+    def free(self) -> int:
+        """Number of rows that can be appended before the rows have to be moved."""
+        return self._capacity - self.last
+
+    def reserve(self, count: int) -> None:
+        """Move the rows to the front, or make more space, unless ``count`` rows are free."""
+        if self.last + count > self._capacity:
+            self._make_room(count)
+
+    def grow(self, count: int) -> None:
+        """Count rows that a kernel has written from index ``last`` on; ``count`` is at most ``free``."""
+        self.last += count
+        self.clear()
 
     def append(self, **values: Any) -> None:
         """Add a row; what is not given keeps any value."""
-        if self._last == self._capacity:
+        if self.last == self._capacity:
             self._make_room()
         for name, value in values.items():
-            self._columns[name][self._last] = value
-        self._last += 1
+            self._columns[name][self.last] = value
+        self.last += 1
         self.clear()
 
     def append_rows(self, count: int, **values: Any) -> None:
         """Add rows with given entries, or one entry for all; what is not given keeps any value."""
-        if self._last + count > self._capacity:
+        if self.last + count > self._capacity:
             self._make_room(count)
         for name, value in values.items():
-            self._columns[name][self._last : self._last + count] = value
-        self._last += count
+            self._columns[name][self.last : self.last + count] = value
+        self.last += count
         self.clear()
 
     def drop(self, count: int) -> None:
         """Take ``count`` rows off the front."""
-        self._first += count
+        self.first += count
         self.clear()
 
     def drop_newest(self, count: int) -> None:
         """Take ``count`` rows off the end."""
-        self._last -= count
+        self.last -= count
         self.clear()
 
     def _make_room(self, count: int = 1) -> None:
@@ -88,14 +136,17 @@ class Columns(dict[str, Any]):
         rows, grown = len(self), self._capacity
         while 2 * rows > grown or rows + count > grown:
             grown *= 2
+        self.clear()
+        if grown > self._capacity:  # before the arrays are replaced, so that none is held longer
+            self._made.clear()
         for name, column in self._columns.items():
             if grown > self._capacity:
                 new = np.zeros((grown, *column.shape[1:]), column.dtype)
-                new[:rows] = column[self._first : self._last]
+                new[:rows] = column[self.first : self.last]
                 self._columns[name] = new
             else:
-                column[:rows] = column[self._first : self._last].copy()
-        self._capacity, self._first, self._last = grown, 0, rows
+                column[:rows] = column[self.first : self.last].copy()
+        self._capacity, self.first, self.last = grown, 0, rows
 
 
 def _restored(state: dict[str, Any]) -> Columns:

@@ -33,13 +33,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from math import atan2, exp, hypot
+from math import atan2, hypot
 from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from simnav.compiled import kernel, ready
+from simnav.compiled import ready
 from simnav.estimator import UnsuitableScenario
 from simnav.estimator.needs import AID, IMU, Needs
 from simnav.estimators.algebra.joseph import joseph_sequence
@@ -57,11 +57,11 @@ from simnav.types import (
     Measurement,
 )
 
-from .base import ErrorModel, Linearised, Observation, StepRule
+from .base import AidTable, ErrorModel, Linearised, Observation, StepRule
 from .declared_errors import CURRENT, bias_of, bias_of_triad
 from .delayed import is_delayed
 from .equations import EQUATIONS, equation_of
-from .inertial_step import AidTable, Packet, filter_inertial
+from .inertial_step import Packet, filter_inertial
 from .inertial_update import absorb_inertial, assimilate_inertial, innovate_inertial
 from .levered import is_own, with_lever_arms
 from .many_readings import of_instruments
@@ -75,7 +75,9 @@ from .measurements import (
 from .own_observation import OwnObservation
 from .propagation import (
     TURN_TIME,
+    Moving,
     Samples,
+    carry_errors,
     correct_inertial,
     propagate_inertial,
 )
@@ -88,24 +90,6 @@ __all__ = ["InertialModel", "roll_pitch_yaw"]
 _NAV, _MOTION = 15, 9
 _NO_TIMES, _NO_VECTORS = np.empty(0), np.empty((0, 3))
 _GRAVITY = 9.81
-
-
-@kernel("void(f8[:, ::1], f8[::1], f8, f8[:, ::1])")
-def _carry(transition: Array, rate: Array, elapsed: float, error: Array) -> None:
-    """Propagate errors, the columns of an (n, k) array, in place; for the arguments see `propagate_covariance`."""
-    m, columns = transition.shape[0], error.shape[1]
-    X = np.zeros((m, columns))
-    for i in range(m):
-        for k in range(m):
-            x = transition[i, k]
-            if x != 0.0:
-                for j in range(columns):
-                    X[i, j] += x * error[k, j]
-    error[:m] = X
-    for i in range(m, error.shape[0]):
-        decay = exp(-rate[i - m] * elapsed)
-        for j in range(columns):
-            error[i, j] *= decay
 
 
 class InertialModel(ErrorModel):
@@ -314,7 +298,7 @@ class InertialModel(ErrorModel):
         """
         if self._fused != set(self.noise) or not self.noise.keys() <= set(names):
             return None
-        codes, arms, noises = self._table(names)
+        codes, arms, noises = self.table(names)
         limits = np.zeros((len(names), 3))
         for i, name in enumerate(names):
             if name in self.noise:
@@ -326,7 +310,11 @@ class InertialModel(ErrorModel):
             "codes": codes, "arms": arms, "noises": noises, "limits": limits,
         }  # fmt: skip
 
-    def _table(self, names: Sequence[str]) -> AidTable:
+    def step_table(self, names: Sequence[str]) -> AidTable | None:
+        """As `ErrorModel.step_table`; None if an instrument has an equation or a clock of its own."""
+        return self.table(names) if self._fused == set(self.noise) and not self.blocks.clocks else None
+
+    def table(self, names: Sequence[str]) -> AidTable:
         """The instruments in the order of their names; zeros for one that is not observed."""
         codes, arms = np.zeros((len(names), 4), np.int64), np.zeros((len(names), 3))
         noises = np.zeros((len(names), 9))
@@ -346,6 +334,21 @@ class InertialModel(ErrorModel):
         else:
             self._samples = ready(imu.time), ready(imu.interval), ready(imu.angular_rate), ready(imu.specific_force)
 
+    def carried(self) -> tuple[Moving, Samples, int, Array, tuple[Array, Array, Array]]:
+        """What a kernel takes that propagates the state.
+
+        Returns
+        -------
+        state, samples, first, noise, others
+            The arguments of `simnav.estimators.models.propagation.propagate_inertial`.
+        """
+        state = self.position, self.velocity, self.dcm, self._memory, self.bias, self._turn, self._clock
+        return state, self._samples, self._first, self._noise, (self.calibration, self._decay, self._density)
+
+    def arrived(self, first: int) -> None:
+        """Note that a kernel has propagated the state, and the index of the first sample that it did not use up."""
+        self._first, self.time = first, float(self._clock[0])
+
     def propagate(self, covariance: Array, until: float) -> None:
         """Advance the state and its covariance through the samples loaded."""
         elapsed = until - self.time
@@ -364,7 +367,7 @@ class InertialModel(ErrorModel):
     def carry(self, error: Array, elapsed: float) -> None:
         """Take an error, or several in columns, through the last propagation, in place."""
         if error.ndim == 2 and error.flags.carray:
-            _carry(self.transition, self._decay, elapsed, error)
+            carry_errors.unchecked(self.transition, self._decay, elapsed, error)
         else:
             m = len(self.transition)
             error[:m] = self.transition @ error[:m]
@@ -483,7 +486,7 @@ class InertialModel(ErrorModel):
             chosen = rule or StepRule(filter_inertial, list(self.noise), ())
             if not self._fused == set(self.noise) == set(chosen.names) or self.blocks.clocks:
                 return None
-            self._packet = Packet(self._table(chosen.names), chosen)
+            self._packet = Packet(self.table(chosen.names), chosen)
         measured, chosen = self._packet.fill(measurements), self._packet.rule
         self._first = chosen.kernel.unchecked(
             (self.position, self.velocity, self.dcm, self._memory, self.bias, self._turn, self._clock), self._samples,

@@ -1,204 +1,42 @@
 """The chain of the inertial model: preintegrated IMU factors, and all aids of a window linearised at once.
 
-Between two nodes the front integrated the IMU samples from the state x' to y', and computed the transition matrix F.
-From another node x, with the shift ``s = x - x'`` (rotation phi, biases b), the same samples lead to ``f(x) = y' + F s
-+ c``. c is the effect of the rotation of the increments beyond the first order. With ``E = exp(phi x)`` and the vectors
-u_p, u_v of the double and single integral of the specific force in north-east-down, which are part of F (its block of
-the attitude is ``-[u x]``),
-
-- ``c_p = (E - 1 - phi x) u_p + (E - 1) F_pb b``, and c_v likewise with u_v and F_vb; the derivative by the attitude
-  is ``-[E (u_p + F_pb b) x]``
-- attitude: the rotation vector of ``exp(F_phi,phi phi) exp(F_phi,b b)``
-
-F and its bias columns turn with the node (``F_pb = C B`` with B in body axes): these are the body-frame increments and
-bias Jacobians of preintegration (Forster et al. 2017, eqs. 38-44; eqs. 8-10 of Mao, Wang and Fu 2025, but with gravity
-outside of the integral). Curvature and rotation of the Earth are in y' and in F, to first order in the shift.
+Equations of the motion factors are in `simnav.estimators.models.preintegrated`. The kernels take whole columns with the
+places of their rows (`simnav.estimators.models.columns.Columns`), so that one call linearises all factors, moves all
+nodes, or attaches all measurements of a step.
 """
 
 from __future__ import annotations
 
-from math import atan2, cos, sqrt
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from simnav.compiled import kernel
-from simnav.estimators.algebra.block_tridiagonal import error_after_step
-from simnav.geometry.rotation import cross, rotated, rotation_coefficients
-from simnav.types import Array, InitialState, Instruments, Integers
+from simnav.estimators.algebra.block_tridiagonal import (
+    ROWS,
+    STEPPED_TYPES,
+    Rows,
+    after_step,
+    error_after_step,
+    whiten_one,
+)
+from simnav.estimators.algebra.whitening import whitening
+from simnav.types import Array, InitialState, Instruments, Integers, Measurement
 
-from .chain import Chain, chain_of
-from .columns import Columns
+from .base import StepRule
+from .chain import STEPPED, Chain, chain_of
+from .columns import Columns, Selection
+from .folds import add_noise, through_one
 from .inertial import InertialModel
-from .measurements import State, observe_inertial
+from .inertial_step import Packet, filter_inertial
+from .inertial_take import TAKEN, take_inertial
+from .measurements import OWN, observe_inertial
+from .preintegrated import add_shift, move_shift, relative_shift, turn_covariance
 from .propagation import correct_inertial
 
 __all__ = ["InertialChain"]
-
-#: Rotations below this are composed by a series [rad].
-SERIES_ANGLE = 0.014
-
-
-@kernel()
-def _compose(a0: float, a1: float, a2: float, b0: float, b1: float, b2: float) -> tuple[float, float, float]:
-    """Rotation vector of ``exp(a x) exp(b x)``.
-
-    A series of third order (Baker, Campbell, Hausdorff) below `SERIES_ANGLE`, where it is good to 2e-9 rad; the product
-    of the quaternions above it.
-    """
-    a, b = a0 * a0 + a1 * a1 + a2 * a2, b0 * b0 + b1 * b1 + b2 * b2
-    x0, x1, x2 = cross(a0, a1, a2, b0, b1, b2)
-    if a + b < SERIES_ANGLE * SERIES_ANGLE:
-        y0, y1, y2 = cross(a0 - b0, a1 - b1, a2 - b2, x0, x1, x2)
-        t = 1.0 / 12.0
-        return a0 + b0 + 0.5 * x0 + t * y0, a1 + b1 + 0.5 * x1 + t * y1, a2 + b2 + 0.5 * x2 + t * y2
-    # sin(x/2)/x and cos(x/2) of both angles
-    p, _ = rotation_coefficients(0.25 * a)
-    q, _ = rotation_coefficients(0.25 * b)
-    p, q, c, d = 0.5 * p, 0.5 * q, cos(0.5 * sqrt(a)), cos(0.5 * sqrt(b))
-    w = c * d - p * q * (a0 * b0 + a1 * b1 + a2 * b2)
-    v0 = p * d * a0 + c * q * b0 + p * q * x0
-    v1 = p * d * a1 + c * q * b1 + p * q * x1
-    v2 = p * d * a2 + c * q * b2 + p * q * x2
-    sine = sqrt(v0 * v0 + v1 * v1 + v2 * v2)
-    if w < 0.0:  # the shorter way round
-        w, v0, v1, v2 = -w, -v0, -v1, -v2
-    ratio = 2.0 if sine < 1e-12 else 2.0 * atan2(sine, w) / sine
-    return ratio * v0, ratio * v1, ratio * v2
-
-
-@kernel()
-def _move(F: Array, s: Array, moved: Array, J: Array) -> None:
-    """Propagate a shift s of a node through a motion: the shift ``moved`` at its end, and its derivative J.
-
-    The equations are those of the module. J must hold F, or the result of an earlier call: only the rows of position,
-    velocity and attitude and the columns of attitude and biases depend on the shift. Biases and calibration states are
-    independent and only decay; a clock's bias also moves by the drift that follows it.
-    """
-    n = s.size
-    m = min(n, 15)
-    for i in range(9):
-        x = 0.0
-        for j in range(m):
-            x += F[i, j] * s[j]
-        moved[i] = x
-        for j in range(6, m):
-            J[i, j] = F[i, j]
-    for i in range(9, n):
-        moved[i] = F[i, i] * s[i]
-        if i >= 15 and i + 1 < n and F[i, i + 1] != 0.0:
-            moved[i] += F[i, i + 1] * s[i + 1]
-    p0, p1, p2 = s[6], s[7], s[8]
-    size = p0 * p0 + p1 * p1 + p2 * p2
-    if n >= 15:
-        for j in range(9, 15):
-            size += s[j] * s[j]
-    if size <= 1e-24:
-        return
-    a, b = rotation_coefficients(p0 * p0 + p1 * p1 + p2 * p2)
-    if n >= 15:  # the bias columns turn with the attitude
-        for j in range(9, 15):
-            for i in range(0, 9, 3):
-                J[i, j], J[i + 1, j], J[i + 2, j] = rotated(p0, p1, p2, a, b, F[i, j], F[i + 1, j], F[i + 2, j])
-    for i in range(0, 6, 3):
-        u0 = 0.5 * (F[i + 1, 8] - F[i + 2, 7])
-        u1 = 0.5 * (F[i + 2, 6] - F[i, 8])
-        u2 = 0.5 * (F[i, 7] - F[i + 1, 6])
-        # E (u + F_b b) - u: what the bias shift adds turns with the node, so the attitude has a share in it.
-        w0, w1, w2 = rotated(p0, p1, p2, a, b, u0, u1, u2)
-        w0, w1, w2 = w0 - u0, w1 - u1, w2 - u2
-        x0, x1, x2 = cross(p0, p1, p2, u0, u1, u2)
-        moved[i] += w0 - x0
-        moved[i + 1] += w1 - x1
-        moved[i + 2] += w2 - x2
-        if n >= 15:
-            for j in range(9, 15):
-                for r in range(3):
-                    moved[i + r] += (J[i + r, j] - F[i + r, j]) * s[j]
-                w0 += J[i, j] * s[j]
-                w1 += J[i + 1, j] * s[j]
-                w2 += J[i + 2, j] * s[j]
-        J[i, 7] += w2
-        J[i, 8] -= w1
-        J[i + 1, 6] -= w2
-        J[i + 1, 8] += w0
-        J[i + 2, 6] += w1
-        J[i + 2, 7] -= w0
-    a0, a1, a2 = moved[6], moved[7], moved[8]
-    b0, b1, b2 = 0.0, 0.0, 0.0
-    if n >= 15:
-        for j in range(9, 15):
-            b0 += F[6, j] * s[j]
-            b1 += F[7, j] * s[j]
-            b2 += F[8, j] * s[j]
-        a0, a1, a2 = a0 - b0, a1 - b1, a2 - b2
-        h0, h1, h2 = rotated(p0, p1, p2, a, b, 0.5 * b0, 0.5 * b1, 0.5 * b2)
-        for j in range(9, 12):  # the left Jacobian of exp(b x), to first order
-            x0, x1, x2 = cross(h0, h1, h2, J[6, j], J[7, j], J[8, j])
-            J[6, j] += x0
-            J[7, j] += x1
-            J[8, j] += x2
-    moved[6], moved[7], moved[8] = _compose(a0, a1, a2, b0, b1, b2)
-
-
-@kernel("void(f8[::1], f8[::1], f8[::1])")
-def _relative_shift(shift: Array, step: Array, out: Array) -> None:
-    """A shift as seen from where a step leads: rotations compose."""
-    for j in range(shift.size):
-        out[j] = shift[j] - step[j]
-    out[6], out[7], out[8] = _compose(shift[6], shift[7], shift[8], -step[6], -step[7], -step[8])
-
-
-@kernel()
-def _add(step: Array, shift: Array, out: Array) -> None:
-    """A shift and a step after it."""
-    for j in range(shift.size):
-        out[j] = shift[j] + step[j]
-    out[6], out[7], out[8] = _compose(step[6], step[7], step[8], shift[6], shift[7], shift[8])
-
-
-@kernel("void(f8[:, ::1], f8[::1], f8[:, ::1])")
-def _turn_covariance(P: Array, shift: Array, out: Array) -> None:
-    p0, p1, p2 = shift[6], shift[7], shift[8]
-    angle2 = p0 * p0 + p1 * p1 + p2 * p2
-    sine, a = rotation_coefficients(angle2)
-    b = 1.0 / 6.0 - angle2 * (1.0 / 120.0 - angle2 / 5040.0) if angle2 < 1e-3 else (1.0 - sine) / angle2
-    n = P.shape[0]
-    out[:] = P
-    for side in range(2):
-        for i in range(n):
-            v0, v1, v2 = (out[6, i], out[7, i], out[8, i]) if side == 0 else (out[i, 6], out[i, 7], out[i, 8])
-            v0, v1, v2 = rotated(p0, p1, p2, a, b, v0, v1, v2)  # with the coefficients of the left Jacobian
-            if side == 0:
-                out[6, i], out[7, i], out[8, i] = v0, v1, v2
-            else:
-                out[i, 6], out[i, 7], out[i, 8] = v0, v1, v2
-
-
-@kernel("void(i8, f8[:, :, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, :, ::1])")
-def _linearise_motion(
-    first: int, transition: Array, begin_shift: Array, end_shift: Array, residual: Array, jacobian: Array
-) -> None:
-    """Residual and derivative of the motion factors from a row on.
-
-    Parameters
-    ----------
-    first : int
-        Index of the first factor that is computed.
-    transition : (K, n, n) array
-        Transition matrix F of each motion, along the predicted trajectory.
-    begin_shift, end_shift : (K, n) arrays
-        Shifts of the nodes at both ends since the prediction.
-    residual : (K, n) array
-        Overwritten with the newer node minus its prediction from the older one.
-    jacobian : (K, n, n) array
-        Overwritten with the derivative of the prediction with respect to the older node.
-    """
-    count, n = begin_shift.shape
-    moved = np.empty(n)
-    for k in range(first, count):
-        _move(transition[k], begin_shift[k], moved, jacobian[k])
-        _relative_shift(end_shift[k], moved, residual[k])
 
 
 @kernel("void(f8[:, :, ::1], f8[:, :, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1])")
@@ -221,124 +59,239 @@ def _along_motion(
     along[0] = step[0]
     for k in range(count):
         error_after_step(residual[k], jacobian[k], step[k], step[k + 1], error)
-        _add(along[k], begin_shift[k], shift)
-        _move(transition[k], shift, moved, J)
-        _add(error, moved, shift)
-        _relative_shift(shift, end_shift[k], along[k + 1])
+        add_shift(along[k], begin_shift[k], shift)
+        move_shift(transition[k], shift, moved, J)
+        add_shift(error, moved, shift)
+        relative_shift(shift, end_shift[k], along[k + 1])
 
 
-@kernel(
-    "void(i8, Tuple((i8[::1], i8[::1], f8[:, ::1])), Tuple((i8[::1], f8[:, ::1], i8[::1], i8[::1])), "
-    "Tuple((f8[:, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1])), f8[:, ::1], f8[:, :, ::1], "
-    "i8[::1])"
-)
-def _linearise_aids(
-    first: int, measured: tuple[Integers, Integers, Array], aids: tuple[Integers, Array, Integers, Integers],
-    states: State, residual: Array, jacobian: Array, components: Integers,
-) -> None:  # fmt: skip
-    """Residuals and derivatives of M measurements at the K states that they are attached to.
-
-    Parameters
-    ----------
-    first : int
-        Index of the first measurement that is computed.
-    measured : (M,) int, (M,) int and (M, 3) arrays
-        Number of the state of each measurement (-1: none of these states); number of its instrument; its value.
-    aids : tuple of arrays
-        Parameters of each instrument, see `simnav.estimators.models.measurements.Aid`.
-    states : tuple of (K, ...) arrays
-        The states, see `simnav.estimators.models.measurements.State`.
-    residual : (M, 3) array
-        Overwritten: measured minus predicted.
-    jacobian : (M, 3, n) array
-        Overwritten: derivative of the prediction with respect to the state's error.
-    components : (M,) int array
-        Overwritten: components that count; 0 where the state has no such measurement.
-    """
-    row, instrument, value = measured
-    codes, arms, bias_at, scale_at = aids
-    position, velocity, dcm, rate, bias, calibration = states
-    innovation = np.empty(3)
-    for i in range(first, row.size):
-        k, s = row[i], instrument[i]
-        if k < 0:
-            continue
-        components[i] = observe_inertial(
-            (codes[s], arms[s], bias_at[s], scale_at[s]), value[i],
-            (position[k], velocity[k], dcm[k], rate[k], bias[k], calibration[k]), innovation, jacobian[i],
-        )  # fmt: skip
-        for r in range(3):
-            residual[i, r] = innovation[r] if r < components[i] else 0.0
-
-
-@kernel(
-    "void(i8, f8[:, :, ::1], f8[:, ::1], Tuple((f8[:, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[:, ::1])), "
-    "f8[:, :, ::1])"
-)
+@kernel()
 def _move_folds(
-    first: int, transition: Array, shift: Array, states: tuple[Array, Array, Array, Array, Array], jacobian: Array
-) -> None:
-    """Correct the states of folds by where their nodes' shifts lead, in place.
-
-    Parameters
-    ----------
-    first : int
-        Fold to begin with.
-    transition : (K, n, n) array
-        Phi from each node to the time of its fold.
-    shift : (K, n) array
-        By how much the node has been moved since the fold was predicted.
-    states : tuple of (K, ...) arrays
-        Position, velocity, rotation, biases and calibration at the folds; updated.
-    jacobian : (K, n, n) array
-        Overwritten: derivative of the fold's state with respect to the node.
-    """
-    position, velocity, dcm, bias, calibration = states
-    count, n = shift.shape
-    moved, dx = np.empty(n), np.zeros(15 + calibration.shape[1])
-    for k in range(first, count):
-        _move(transition[k], shift[k], moved, jacobian[k])
-        for j in range(n):
+    first: int, end: int, transition: Array, shift: Array, jacobian: Array, predicted: tuple[Array, ...],
+    now: tuple[Array, ...],
+) -> None:  # fmt: skip
+    """States of the folds in these rows where their nodes' shifts lead, and their derivatives; see `_linearise`."""
+    position, velocity, dcm, bias, calibration = now
+    moved, dx = np.empty(shift.shape[1]), np.zeros(15 + calibration.shape[1])
+    for k in range(first, end):
+        for i in range(3):
+            position[k, i], velocity[k, i] = predicted[0][k, i], predicted[1][k, i]
+            for j in range(3):
+                dcm[k, i, j] = predicted[2][k, i, j]
+        for i in range(6):
+            bias[k, i] = predicted[3][k, i]
+        for i in range(calibration.shape[1]):
+            calibration[k, i] = predicted[4][k, i]
+        move_shift(transition[k], shift[k], moved, jacobian[k])
+        for j in range(moved.size):
             dx[j] = moved[j]
         correct_inertial(position[k], velocity[k], dcm[k], bias[k], calibration[k], dx)
 
 
-@kernel("void(f8[:, ::1], i8[::1], i8, f8[:, ::1])")
-def _retract_folds(step: Array, node: Integers, base: int, shift: Array) -> None:
-    for i in range(node.size):
-        _add(step[node[i] - base], shift[i].copy(), shift[i])
+#: What `_linearise` is to do: motion factors; readings that it predicts itself; what follows for all readings.
+MOTION, READINGS, REST = 1, 2, 4
+EVERYTHING = MOTION | READINGS | REST
+
+_STATES = "Tuple((f8[:, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[:, ::1]))"
+_NODE_STATES = "Tuple((f8[:, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1]))"
+_STATE = ("position", "velocity", "dcm", "bias", "calibration")
+#: The whole columns that `_linearise`, `_retract` and `_marginalise` take.
+LINEARISED = Selection(
+    ("nodes", ("position", "velocity", "dcm", "raw_rate", "bias", "calibration")),
+    (
+        "motions",
+        ("begin_shift", "transition", "end_shift", "residual", "jacobian", "whitener", "whitened", "norm"),
+    ),
+    (
+        "aids",
+        (
+            "node", "fold", "instrument", "components", "bare", "value", "noise", "residual", "jacobian", "whitener",
+            "whitened", "norm",
+        ),
+    ),
+    ("folds", ("node", "transition", "noise", "shift", "jacobian", "raw_rate")),
+    ("folds", _STATE),
+    ("folds", tuple(f"now_{name}" for name in _STATE)),
+)  # fmt: skip
+MOVED = Selection(("nodes", _STATE), ("motions", ("begin_shift", "end_shift")), ("folds", ("node", "shift")))
+LEFT = Selection(("nodes", ("predicted", "predicted_shift", "step")), ("aids", ("node",)), ("folds", ("node",)))
 
 
-@kernel("void(f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1])")
-def _retract(
-    step: Array, position: Array, velocity: Array, dcm: Array, bias: Array, calibration: Array, begin_shift: Array,
-    end_shift: Array,
+@kernel(
+    f"void(i8, i8, {ROWS}, UniTuple(i8, 3), Tuple(({_NODE_STATES}, "
+    "Tuple((f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, :, ::1], f8[:, ::1], f8[::1])), "
+    "Tuple((i8[::1], i8[::1], i8[::1], i8[::1], i8[::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[:, :, ::1], "
+    "f8[:, :, ::1], f8[:, ::1], f8[::1])), "
+    "Tuple((i8[::1], f8[:, :, ::1], f8[:, :, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1])), "
+    f"{_STATES}, {_STATES})), Tuple((i8[::1], f8[:, ::1], i8[::1], i8[::1])))"
+)
+def _linearise(
+    what: int, first: int, rows: Rows, fold_rows: tuple[int, int, int], columns: tuple[Any, ...],
+    known: tuple[Integers, Array, Integers, Integers],
 ) -> None:  # fmt: skip
+    """Linearise and whiten the factors that have to do with a node or later ones.
+
+    Parameters
+    ----------
+    what : int
+        Sum of `MOTION`, `READINGS` and `REST`: the error of each motion and its derivative; the readings whose equation
+        is compiled; for all readings, what a fold adds to their noise, and their derivatives by its node.
+    first : int
+        The node, counted from the first of the window.
+    rows : tuple of int
+        Where nodes and factors are in the columns, see `simnav.estimators.algebra.block_tridiagonal.Rows`.
+    fold_rows : tuple of int
+        Row of the first fold, their number, and the number of the first fold, from which factors count theirs.
+    columns : tuple of tuples of arrays
+        Whole columns, see `LINEARISED`; of the folds the state as predicted, and as moved by the shift of its node.
+    known : tuple of arrays
+        Parameters of each instrument, see `simnav.estimators.models.measurements.Aid`.
+    """
+    nodes, motions, aids, folds, predicted, now = columns
+    k0, count, m0, i0, total, base = rows
+    fold0, folded, fold_base = fold_rows
+    node, fold, instrument, components, bare, value, noise, residual, jacobian, whitener, whitened, norm = aids
+    fold_node, fold_transition, fold_noise, fold_shift, fold_jacobian, fold_rate = folds
+    codes, arms, bias_at, scale_at = known
+    begin_shift, transition, end_shift, error, motion_jacobian, motion_whitener, whitened_error, motion_norm = motions
+    position, velocity, dcm, rate, bias, calibration = nodes
+    n, begin, end = jacobian.shape[2], i0 + total, i0 + total
+    innovation, wide, moved, work = np.empty(3), np.zeros((3, 15)), np.empty(n), np.empty(n)
+    while begin > i0 and node[begin - 1] - base >= first:
+        begin -= 1
+    if what & MOTION:
+        for m in range(m0 + max(first - 1, 0), m0 + count - 1):
+            move_shift(transition[m], begin_shift[m], moved, motion_jacobian[m])
+            relative_shift(end_shift[m], moved, error[m])
+            motion_norm[m] = whiten_one(error[m], motion_whitener[m], whitened_error[m])
+    if what & READINGS and folded and begin < end:
+        at = fold0 + folded
+        while at > fold0 and fold_node[at - 1] >= node[begin]:
+            at -= 1
+        _move_folds(at, fold0 + folded, fold_transition, fold_shift, fold_jacobian, predicted, now)
+    for i in range(begin, end):
+        s, f = instrument[i], fold0 + fold[i] - fold_base
+        if what & READINGS and codes[s] != OWN:
+            k = k0 + node[i] - base
+            state = position[k], velocity[k], dcm[k], rate[k], bias[k], calibration[k]
+            if fold[i] >= 0:
+                state = now[0][f], now[1][f], now[2][f], fold_rate[f], now[3][f], now[4][f]
+            d = observe_inertial(
+                (codes[s], arms[s], bias_at[s], scale_at[s]), value[i], state, innovation,
+                jacobian[i] if n >= 15 else wide,
+            )  # fmt: skip
+            components[i] = d
+            for r in range(3):
+                residual[i, r] = innovation[r] if r < d else 0.0
+            if n < 15:
+                for r in range(3):
+                    for c in range(n):
+                        jacobian[i, r, c] = wide[r, c]
+                        wide[r, c] = 0.0
+        if what & REST:
+            if fold[i] >= 0:
+                if bare[i] != 0:
+                    bare[i] = 0
+                    add_noise(jacobian[i], components[i], fold_noise[f], noise[i], whitener[i], work)
+                through_one(fold_jacobian[f], min(15, n), jacobian[i], work)
+            norm[i] = whiten_one(residual[i], whitener[i], whitened[i])
+
+
+@kernel(
+    f"f8(b1, {ROWS}, UniTuple(i8, 2), f8[:, ::1], "
+    f"Tuple(({_STATES}, UniTuple(f8[:, ::1], 2), Tuple((i8[::1], f8[:, ::1])))), "
+    f"Tuple((f8[:, ::1], f8[::1])), Tuple(({STEPPED_TYPES})))"
+)
+def _retract(
+    keep: bool, rows: Rows, fold_rows: tuple[int, int], step: Array, moved: tuple[Any, Any, Any],
+    prior: tuple[Array, Array], stepped: tuple[Any, Any, Any],
+) -> float:  # fmt: skip
     """Move the nodes by a step, in place.
 
     Parameters
     ----------
+    keep : bool
+        Whether to do `simnav.estimators.algebra.block_tridiagonal.after_step`.
+    rows, fold_rows : tuples of int
+        Where nodes and motion factors are in the arrays below, see
+        `simnav.estimators.algebra.block_tridiagonal.Rows`; row of the first fold, and number of folds.
     step : (K, n) array
-        Corrections, with a rotation vector at 6:9 that turns the attitude from the left.
-    position, velocity, dcm, bias, calibration : (K, ...) arrays
-        States of the nodes; updated.
-    begin_shift, end_shift : (K - 1, n) arrays
-        By how much the nodes at both ends of each motion have been moved; updated.
+        Corrections, with a rotation vector at 6:9 that turns the attitude from the left; its first row is that of the
+        first node.
+    moved : tuple of tuples of arrays
+        Whole columns, see `MOVED`; all but the numbers of the nodes of folds are updated.
+    prior : (n, n) and (n,) arrays
+        Whitener of the prior; its mean minus the first node, which is updated.
+    stepped : tuple of tuples of arrays
+        Whole columns, the last three arguments of `after_step`.
+
+    Returns
+    -------
+    float
+        The cost, or 0 if it is not computed.
     """
-    count, n = step.shape
-    dx = np.zeros(max(n, 15))
+    k0, count, m0, _, _, base = rows
+    (position, velocity, dcm, bias, calibration), (begin_shift, end_shift), (of_fold, fold_shift) = moved
+    n = step.shape[1]
+    dx, before = np.zeros(max(n, 15)), np.empty(n)
     for k in range(count):
+        row, m = k0 + k, m0 + k
         for j in range(n):
             dx[j] = step[k, j]
-        correct_inertial(position[k], velocity[k], dcm[k], bias[k], calibration[k], dx)
-        for side in range(2):
-            if (side == 0 and k == count - 1) or (side == 1 and k == 0):
-                continue
-            shift = begin_shift[k] if side == 0 else end_shift[k - 1]
-            r0, r1, r2 = _compose(dx[6], dx[7], dx[8], shift[6], shift[7], shift[8])
-            for j in range(n):
-                shift[j] += dx[j]
-            shift[6], shift[7], shift[8] = r0, r1, r2
+        correct_inertial(position[row], velocity[row], dcm[row], bias[row], calibration[row], dx)
+        if k < count - 1:
+            add_shift(step[k], begin_shift[m], begin_shift[m])
+        if k > 0:
+            add_shift(step[k], end_shift[m - 1], end_shift[m - 1])
+    for i in range(fold_rows[0], fold_rows[0] + fold_rows[1]):
+        add_shift(step[of_fold[i] - base], fold_shift[i], fold_shift[i])
+    for j in range(n):
+        before[j] = prior[1][j]
+    relative_shift(before, step[0], prior[1])
+    return after_step(rows, prior, stepped[0], stepped[1], stepped[2]) if keep else 0.0
+
+
+@kernel(
+    f"UniTuple(i8, 2)(i8, {ROWS}, UniTuple(i8, 2), "
+    "Tuple((Tuple((f8[:, :, ::1], f8[:, ::1], f8[:, ::1])), Tuple((i8[::1],)), Tuple((i8[::1],)))), "
+    "Tuple((f8[:, ::1], f8[::1], f8[:, ::1])))"
+)
+def _marginalise(
+    leaving: int, rows: Rows, fold_rows: tuple[int, int], columns: tuple[Any, Any, Any],
+    prior: tuple[Array, Array, Array],
+) -> tuple[int, int]:  # fmt: skip
+    """Make the prior of the first node that stays from what was predicted for it.
+
+    Parameters
+    ----------
+    leaving : int
+        Number of nodes that leave.
+    rows, fold_rows : tuples of int
+        As of `_retract`.
+    columns : tuple of tuples of arrays
+        Whole columns, see `LEFT`.
+    prior : (n, n), (n,) and (n, n) arrays
+        Covariance, shift, and whitener of the prior; overwritten.
+
+    Returns
+    -------
+    int, int
+        Numbers of aiding factors and of folds that leave with their nodes.
+    """
+    nodes, (of_aid,), (of_fold,) = columns
+    k0, _, _, i0, total, base = rows
+    step, mean = nodes[2][k0 + leaving], np.empty(nodes[2].shape[1])
+    for j in range(mean.size):
+        mean[j] = nodes[1][k0 + leaving, j] + step[j]
+    turn_covariance(nodes[0][k0 + leaving], mean, prior[0])
+    relative_shift(mean, step, prior[1])
+    whitening(prior[0], prior[2])
+    aids, folds, first = 0, 0, base + leaving
+    while aids < total and of_aid[i0 + aids] < first:
+        aids += 1
+    while folds < fold_rows[1] and of_fold[fold_rows[0] + folds] < first:
+        folds += 1
+    return aids, folds
 
 
 class InertialChain(Chain):
@@ -363,62 +316,110 @@ class InertialChain(Chain):
         covariance = super().begin(start, instruments)
         front = self.front
         nothing = (0, np.zeros(3), -1, -1)
-        # The compiled loop leaves out what has an equation of its own.
-        self._own = np.array([name in front.own for name in self.names], dtype=bool)
-        known = [nothing if name in front.own else front.aid_parameters.get(name, nothing) for name in self.names]
+        known = [front.aid_parameters.get(name, nothing) for name in self.names]
         self._known = (
-            np.array([code for code, *_ in known], dtype=np.int64),
+            np.array([OWN if name in front.own else code for name, (code, *_) in zip(self.names, known)], np.int64),
             np.array([arm for _, arm, _, _ in known], dtype=np.float64).reshape(-1, 3),
             np.array([at for *_, at, _ in known], dtype=np.int64),
             np.array([at for *_, at in known], dtype=np.int64),
         )
+        table = front.step_table(self.names)
+        self._packet = None if table is None else Packet(table, StepRule(filter_inertial, list(self.names), ()))
         return covariance
 
-    def linearise_motion(self, first: int = 0) -> None:
-        """As `Chain.linearise_motion` (equations in the module)."""
-        m = self.motions
-        _linearise_motion.unchecked(
-            first, m["transition"], m["begin_shift"], m["end_shift"], m["residual"], m["jacobian"]
-        )
+    def take(self, measurements: Sequence[Measurement], until: float, spacing: float) -> tuple[int, int] | None:
+        """As `Chain.take`, if no instrument has an equation or a clock of its own."""
+        nodes, motions, aids, folds = self.nodes, self.motions, self.aids, self.folds
+        count, packet, front = len(measurements), self._packet, self.front
+        if packet is None or count > aids.free:
+            return None
+        for columns in (nodes, motions, folds):
+            columns.reserve(count)
+        state, samples, first, noise, others = front.carried()
+        first, self.ahead, (new, attached, folded, unused) = take_inertial.unchecked(
+            state, samples, (until, spacing, self.ahead), noise,
+            (front.transition, front.process_noise, self._transition, self._noise), others,
+            (packet.aids, packet.fill(measurements)),
+            (
+                first, nodes.last, motions.last, aids.last, folds.last, self.base + len(nodes) - 1,
+                self.fold_base + len(folds), len(folds),
+            ),
+            self.whole(TAKEN),
+        )  # fmt: skip
+        front.arrived(first)
+        for columns, rows in ((nodes, new), (motions, new), (aids, attached), (folds, folded)):
+            if rows:
+                columns.grow(rows)
+        return attached, unused
+
+    def linearise_from(self, node: int = 0) -> None:
+        """As `Chain.linearise_from` (equations in the module)."""
+        if not self.front.own:
+            self._compute(EVERYTHING, node)
+            return
+        self._compute(MOTION | READINGS, node)
+        self._observe_own(self.first_aid(node))
+        self._compute(REST, node)
+
+    def linearise_motion(self, node: int = 0) -> None:
+        """As `Chain.linearise_motion`."""
+        self._compute(MOTION, node)
+
+    def linearise_aids(self, node: int = 0) -> None:
+        """As `Chain.linearise_aids`."""
+        self._compute(READINGS, node)
+        if self.front.own:
+            self._observe_own(self.first_aid(node))
+        self._compute(REST, node)
+
+    def _compute(self, what: int, node: int) -> None:
+        folds = self.folds
+        _linearise.unchecked(
+            what, node, self.rows, (folds.first, folds.last - folds.first, self.fold_base), self.whole(LINEARISED),
+            self._known,
+        )  # fmt: skip
+
+    def _observe_own(self, first: int) -> None:
+        """The readings from an index on whose kind has a measurement equation of its own."""
+        aids = self.aids
+        for row, states, prefix in self.places(first):
+            self.observe(first, row, states, prefix, aids["jacobian"])
 
     def observe(self, first: int, row: NDArray[np.int64], states: Columns, prefix: str, jacobian: Array) -> None:
-        """As `Chain.observe`."""
-        aids = self.aids
-        wide = jacobian if self.size >= 15 else np.zeros((len(aids), 3, 15))
+        """As `Chain.observe`, for readings whose kind has a measurement equation of its own."""
+        wide = jacobian if self.size >= 15 else np.zeros((len(jacobian), 3, 15))
         position, velocity, dcm, bias, calibration = (states[prefix + name] for name in self.front.state)
-        compiled = np.where(self._own[aids["instrument"]], -1, row) if self.front.own else row
-        _linearise_aids.unchecked(
-            first, (compiled, aids["instrument"], aids["value"]), self._known,
-            (position, velocity, dcm, states["raw_rate"], bias, calibration), aids["residual"], wide,
-            aids["components"],
-        )  # fmt: skip
-        if self.front.own:
-            arrays = [states[name] for name in self.node_arrays]
-            inertial = arrays[0] if len(arrays) == 1 else np.hstack(arrays)
-            self.observe_own(first, row, wide, position, velocity, dcm, inertial, bias, calibration)
+        arrays = [states[name] for name in self.node_arrays]
+        inertial = arrays[0] if len(arrays) == 1 else np.hstack(arrays)
+        self.observe_own(first, row, wide, position, velocity, dcm, inertial, bias, calibration)
         if wide is not jacobian:
-            here = np.flatnonzero(row[first:] >= 0) + first
+            own = self._known[0][self.aids["instrument"][first:]] == OWN
+            here = np.flatnonzero((row[first:] >= 0) & own) + first
             jacobian[here] = wide[here, :, : self.size]
-
-    def move_folds(self, first: int) -> None:
-        """As `Chain.move_folds`."""
-        folds, names = self.folds, self.front.state
-        for name in names:
-            folds[f"now_{name}"][first:] = folds[name][first:]
-        position, velocity, dcm, bias, calibration = (folds[f"now_{name}"] for name in names)
-        states = position, velocity, dcm, bias, calibration
-        _move_folds.unchecked(first, folds["transition"], folds["shift"], states, folds["jacobian"])
 
     def retract(self, step: Array) -> None:
         """As `Chain.retract`."""
-        nodes, m = self.nodes, self.motions
-        _retract.unchecked(
-            step, nodes["position"], nodes["velocity"], nodes["dcm"], nodes["bias"], nodes["calibration"],
-            m["begin_shift"], m["end_shift"],
+        self._move(False, step)
+
+    def take_step(self) -> float:
+        """As `Chain.take_step`."""
+        return self._move(True, self.nodes["step"])
+
+    def _move(self, keep: bool, step: Array) -> float:
+        folds = self.folds
+        cost: float = _retract.unchecked(
+            keep, self.rows, (folds.first, folds.last - folds.first), step, self.whole(MOVED),
+            (self.prior_whitener, self.prior_shift), self.whole(STEPPED),
         )  # fmt: skip
-        if len(self.folds):
-            _retract_folds.unchecked(step, self.folds["node"], self.base, self.folds["shift"])
-        self.prior_shift = self.relative_shift(self.prior_shift, step[0])
+        return cost
+
+    def marginalise(self, count: int) -> None:
+        """As `Chain.marginalise`."""
+        aids, folds = _marginalise.unchecked(
+            count, self.rows, (self.folds.first, len(self.folds)), self.whole(LEFT),
+            (self.prior, self.prior_shift, self.prior_whitener),
+        )  # fmt: skip
+        self._leave(count, aids, folds)
 
     def along_motion(self, step: Array) -> Array:
         """As `Chain.along_motion`."""
@@ -431,13 +432,13 @@ class InertialChain(Chain):
     def turned(self, covariance: Array, shift: Array) -> Array:
         """``J P J'`` with the left Jacobian of the rotation (`simnav.geometry.rotation.left_jacobian`)."""
         turned = np.empty_like(covariance)
-        _turn_covariance.unchecked(covariance, shift, turned)
+        turn_covariance.unchecked(covariance, shift, turned)
         return turned
 
     def relative_shift(self, shift: Array, step: Array) -> Array:
         """Rotations compose."""
         rest = np.empty_like(shift)
-        _relative_shift.unchecked(shift, step, rest)
+        relative_shift.unchecked(shift, step, rest)
         return rest
 
 

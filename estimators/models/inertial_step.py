@@ -10,19 +10,16 @@ import numpy as np
 from simnav.compiled import kernel
 from simnav.types import Array, Integers, Measurement
 
-from .base import NIS, RESULTS, SIZE, StepRule
+from .base import NIS, RESULTS, SIZE, AidTable, StepRule
 from .inertial_update import assimilate_inertial
 from .propagation import MOVING, SAMPLES, Moving, Samples, propagate_inertial
 
-__all__ = ["STEP", "AidTable", "Matrices", "Measured", "Others", "Packet", "filter_inertial"]
+__all__ = ["STEP", "Matrices", "Measured", "Others", "Packet", "filter_inertial"]
 
 #: Of a model of n states: transition and process noise (15, 15), and covariance (n, n).
 Matrices: TypeAlias = tuple[Array, Array, Array]
 #: Calibration states (n - 15,), their rates of decay and densities of noise; and the correction (n,), overwritten.
 Others: TypeAlias = tuple[Array, Array, Array, Array]
-#: The instruments of a filter: their codes, numbers of components, and places of bias and scale factor (i, 4); lever
-#: arms (i, 3) [m]; and the elements of their noise (i, 9).
-AidTable: TypeAlias = tuple[Integers, Array, Array]
 #: The k measurements of a step in order of their times: rows of their instruments (k,), times (k,) [s], values (k, 3);
 #: overwritten, for each a row of results (`StepRule`).
 Measured: TypeAlias = tuple[Integers, Array, Array, Array]

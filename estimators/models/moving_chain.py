@@ -18,6 +18,7 @@ from simnav.types import Array
 
 from .base import ErrorModel
 from .chain import Chain
+from .folds import add_motion_noise, through_motion
 
 __all__ = ["MovingChain", "MovingModel"]
 
@@ -73,16 +74,33 @@ class MovingChain(Chain):
         """Views of the states of all nodes."""
         return tuple([self.nodes[name] for name in self.front.state])
 
-    def linearise_motion(self, first: int = 0) -> None:
+    def linearise_motion(self, node: int = 0) -> None:
         """As `Chain.linearise_motion`."""
+        first = max(node - 1, 0)
         time, motions, states = self.nodes["time"], self.motions, self._nodes()
         moved = tuple([each[first:-1].copy() for each in states])
         self.front.move_all(moved, time[first + 1 :] - time[first:-1], motions["jacobian"][first:])
         newer = tuple([each[first + 1 :] for each in states])
         motions["residual"][first:] = self.front.difference_all(newer, moved)
 
+    def linearise_aids(self, node: int = 0) -> None:
+        """As `Chain.linearise_aids`."""
+        aids, folds, first = self.aids, self.folds, self.first_aid(node)
+        jacobian, folded = aids["jacobian"], len(folds) > 0 and first < len(aids)
+        if folded:
+            self.move_folds(int(folds["node"].searchsorted(aids["node"][first])))
+        places = self.places(first)
+        for row, states, prefix in places:
+            self.observe(first, row, states, prefix, jacobian)
+        if folded:
+            row, _, _ = places[-1]
+            add_motion_noise.unchecked(
+                first, row, aids["components"], jacobian, folds["noise"], aids["noise"], aids["whitener"], aids["bare"]
+            )
+            through_motion.unchecked(first, row, min(self.coupled, self.size), folds["jacobian"], jacobian)
+
     def move_folds(self, first: int) -> None:
-        """As `Chain.move_folds`."""
+        """Compute ``now_...`` and ``jacobian`` of the folds from an index on, at the present nodes."""
         nodes, folds = self.nodes, self.folds
         row = folds["node"][first:] - self.base
         now = tuple([folds[f"now_{name}"][first:] for name in self.front.state])

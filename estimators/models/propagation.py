@@ -40,6 +40,7 @@ __all__ = [
     "Samples",
     "accumulate_error",
     "advance_inertial",
+    "carry_errors",
     "correct_inertial",
     "next_stretch",
     "propagate_covariance",
@@ -329,18 +330,21 @@ def advance_inertial(
                 position[0] += dt * velocity[0] / (meridian + position[2])
                 position[1] += dt * velocity[1] / ((prime + position[2]) * cos(position[0]))
                 position[2] -= dt * velocity[2]
-                memory[:] = 0.0
+                for r in range(6):
+                    memory[r] = 0.0
                 held += dt
             else:
                 w0, w1, w2 = clock[3] - bias[0], clock[4] - bias[1], clock[5] - bias[2]
                 f0, f1, f2 = clock[6] - bias[3], clock[7] - bias[4], clock[8] - bias[5]
-                keep[:] = memory
+                for r in range(6):
+                    keep[r] = memory[r]
                 mechanize_step(position, velocity, dcm, memory, (w0, w1, w2), (f0, f1, f2), dt)
                 if whole > 0.0:
                     memory[0], memory[1], memory[2] = w0 * whole, w1 * whole, w2 * whole
                     memory[3], memory[4], memory[5] = f0 * whole, f1 * whole, f2 * whole
                 else:
-                    memory[:] = keep
+                    for r in range(6):
+                        memory[r] = keep[r]
                 s0, s1, s2 = s0 + w0 * dt, s1 + w1 * dt, s2 + w2 * dt
             for r in range(9):
                 block[7 + r] += dcm[r // 3, r % 3] * dt
@@ -433,6 +437,26 @@ def propagate_covariance(
         for j in range(m, n):
             covariance[i, j] *= decay[i - m] * decay[j - m]
         covariance[i, i] += noise[i - m]
+
+
+@kernel("void(f8[:, ::1], f8[::1], f8, f8[:, ::1])")
+def carry_errors(transition: Array, rate: Array, elapsed: float, error: Array) -> None:
+    """Propagate errors, the columns of an (n, k) array, in place; for the arguments see `propagate_covariance`."""
+    m, columns = transition.shape[0], error.shape[1]
+    X = np.zeros((m, columns))
+    for i in range(m):
+        for k in range(m):
+            x = transition[i, k]
+            if x != 0.0:
+                for j in range(columns):
+                    X[i, j] += x * error[k, j]
+    for i in range(m):
+        for j in range(columns):
+            error[i, j] = X[i, j]
+    for i in range(m, error.shape[0]):
+        decay = exp(-rate[i - m] * elapsed)
+        for j in range(columns):
+            error[i, j] *= decay
 
 
 @kernel(f"i8({MOVING}, {SAMPLES}, i8, f8, f8[::1], UniTuple(f8[:, ::1], 3), UniTuple(f8[::1], 3), f8)")

@@ -15,7 +15,7 @@ import numpy as np
 
 from simnav.types import Array, Instruments, Measurement
 
-from .base import ErrorModel, Linearised, Observation, StepRule
+from .base import AidTable, ErrorModel, Linearised, Observation, StepRule
 from .chain import Chain
 
 __all__ = ["with_stated_sigmas"]
@@ -51,6 +51,9 @@ class _Stated(ErrorModel):
 
     def nominal_noises(self, measurements: Sequence[Measurement]) -> Array | None:
         return None if any(map(self._states, measurements)) else super().nominal_noises(measurements)
+
+    def step_table(self, names: Sequence[str]) -> AidTable | None:
+        return None if self.stated_variances else super().step_table(names)
 
     def innovate(self, measurement: Measurement, covariance: Array) -> Observation | None:
         if not self._states(measurement):

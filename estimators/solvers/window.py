@@ -51,11 +51,12 @@ from typing import ClassVar
 import numpy as np
 
 from simnav.estimators.adaptations.base import Adaptation, Innovation
-from simnav.estimators.algebra.block_tridiagonal import after_step, half_squares, keep_weights, solve_chain, whiten
+from simnav.estimators.algebra.block_tridiagonal import half_squares, keep_weights, solve_chain
 from simnav.estimators.composition import Solver
 from simnav.estimators.models.base import ErrorModel
 from simnav.estimators.models.chains import Chain, chain_of
 from simnav.estimators.models.channels import owners, summary
+from simnav.estimators.models.columns import Selection
 from simnav.estimators.models.coupling import by_source
 from simnav.estimators.models.stated_sigmas import with_stated_sigmas
 from simnav.estimators.models.suitable import ModelChoice
@@ -74,6 +75,17 @@ CHECKED_STEP = 1.0
 FIRST_DAMPING, DAMPING_FACTOR = 1e-2, 10.0
 #: A measurement with a weight up to this is reported as faulty.
 FAULTY_WEIGHT = 0.5
+#: The whole columns of the chain that `solve_chain` and `half_squares` take.
+SOLVED = Selection(
+    ("motions", ("jacobian", "noise", "residual", "weight")),
+    ("aids", ("node", "instrument", "components", "jacobian", "residual", "noise", "weight")),
+    ("nodes", ("predicted", "predicted_shift", "filtered", "filtered_shift")),
+    ("aids", ("cross", "white", "innovation", "used")),
+    ("nodes", ("step", "size")),
+)
+SQUARES = Selection(("motions", ("norm", "weight")), ("aids", ("norm", "weight")))
+#: Of new aiding factors, what becomes diagnostics and flags.
+REPORTED = Selection(("aids", ("instrument", "time", "norm", "weight")))
 
 
 class WindowEstimator(LooksBack, Solver):
@@ -187,14 +199,13 @@ class WindowEstimator(LooksBack, Solver):
         self._epochs: deque[int] = deque()  # nodes of each epoch in the window
         self._counted = self._eliminated = 0
         self._contraction = 1.0
+        self._factors: Factors | None = None
+        self._plain = self.adaptation is None and not self._owners and not self.every_sample
         self._cost_test = CostTest()
-        n = self.chain.size
-        self.chain.nodes.add(predicted=(n, n), predicted_shift=(n,), filtered=(n, n), filtered_shift=(n,), step=(n,))
-        self.chain.nodes.add(size=())
-        self.chain.aids.add(cross=(3, n), white=(3, n), innovation=(3,), used=np.int64)
         quantities = ["residual", "weight", *(["innovation", "nis"] if self.adaptation else [])]
         names = [*observed, "motion"]
         self._blank = {f"{q}.{n}": np.nan for q in quantities for n in names if n != "motion" or q in quantities[:2]}
+        self._labels = [(f"residual.{name}", f"weight.{name}") for name in self.chain.names]
         self._blank |= {"iterations": 0.0, "cost": np.nan, "variance_factor": np.nan, "inconsistent": 0.0}
 
     def update(self, measurements: Measurements) -> Estimate:
@@ -203,18 +214,14 @@ class WindowEstimator(LooksBack, Solver):
         chain.load(measurements.imu)
         diagnostics: dict[str, float | Array] = dict(self._blank)
         flagged: list[tuple[str, float]] = []
-        attached = 0
         samples = measurements.imu.time if self.every_sample and measurements.imu is not None else np.empty(0)
         admitted = self._admission.admit(measurements, chain.time)
-        plain = self.adaptation is None and bool(self._owners)
-        for group in together(admitted, self._owners) if plain else [[m] for m in admitted]:
-            self._advance(min(group[0].time, measurements.time), samples)
-            last = group[0].time == admitted[-1].time
-            if len(group) > 1 and self._take_together(group, last):
-                attached += len(group)
-                continue
-            for m in group:
-                attached += self._take(m, last, diagnostics, flagged)
+        taken = chain.take(admitted, measurements.time, self.spacing) if self._plain and admitted else None
+        if taken is None:
+            attached = self._take_each(admitted, measurements.time, samples, diagnostics, flagged)
+        else:
+            attached, unused = taken
+            self._admission.skipped += unused
         if attached:
             self._optimise(attached, diagnostics, flagged)
             self._marginalise()
@@ -233,6 +240,22 @@ class WindowEstimator(LooksBack, Solver):
             estimate.states = {name: (value, wider * sigma) for name, (value, sigma) in estimate.states.items()}
         estimate.diagnostics, estimate.flagged = diagnostics, flagged
         return estimate
+
+    def _take_each(
+        self, admitted: Sequence[Measurement], until: float, samples: Array, diagnostics: dict[str, float | Array],
+        flagged: list[tuple[str, float]],
+    ) -> int:  # fmt: skip
+        """Make the measurements of a step factors, one by one; their number."""
+        attached, by_group = 0, self.adaptation is None and bool(self._owners)
+        for group in together(admitted, self._owners) if by_group else [[m] for m in admitted]:
+            self._advance(min(group[0].time, until), samples)
+            last = group[0].time == admitted[-1].time
+            if len(group) > 1 and self._take_together(group, last):
+                attached += len(group)
+                continue
+            for m in group:
+                attached += self._take(m, last, diagnostics, flagged)
+        return attached
 
     def _advance(self, until: float, samples: Array) -> None:
         """Advance the front, leaving a node at each of the samples on the way."""
@@ -277,7 +300,10 @@ class WindowEstimator(LooksBack, Solver):
         """Make the front a node for a measurement, unless that can be folded onto the newest one."""
         chain = self.chain
         if chain.ahead > 0.0 and (last or self.every_sample or chain.ahead >= self.spacing):
-            self._extend()
+            if self.adaptation is None:
+                chain.extend()  # the measurement is going to change the covariance, and nothing asks for it before
+            else:
+                self._extend()
 
     def _adapted_noise(
         self,
@@ -313,15 +339,16 @@ class WindowEstimator(LooksBack, Solver):
         diagnostics["iterations"], diagnostics["cost"] = float(solved), cost
         diagnostics["variance_factor"] = self._cost_test.variance_factor
         if attached:
-            newest = [chain.aids[column][-attached:].tolist() for column in ("instrument", "time", "norm", "weight")]
+            (columns,), last = chain.whole(REPORTED), chain.aids.last
+            newest = [column[last - attached : last].tolist() for column in columns]
             for index, time, norm, weight in zip(*newest):
-                name = chain.names[index]
-                diagnostics[f"residual.{name}"], diagnostics[f"weight.{name}"] = norm, weight
+                of_residual, of_weight = self._labels[index]
+                diagnostics[of_residual], diagnostics[of_weight] = norm, weight
                 if weight <= FAULTY_WEIGHT:
-                    flagged.append((name, time))
+                    flagged.append((chain.names[index], time))
         if len(chain.motions):
-            diagnostics["residual.motion"] = float(chain.motions["norm"][-1])
-            diagnostics["weight.motion"] = float(chain.motions["weight"][-1])
+            diagnostics["residual.motion"] = float(chain.motions.newest("norm"))
+            diagnostics["weight.motion"] = float(chain.motions.newest("weight"))
 
     def _converge(self, attached: int) -> tuple[int, float, Array, int]:
         """Move the nodes to the minimum of the cost.
@@ -344,8 +371,8 @@ class WindowEstimator(LooksBack, Solver):
         """
         chain, nodes = self.chain, self.chain.nodes
         now = _Progress(np.zeros(chain.size), self._first_new(attached), min(1.0, 2.0 * self._contraction))
-        self._contraction = now.contraction
-        self._linearise(now.first)
+        self._contraction, self._factors = now.contraction, None
+        chain.linearise_from(now.first)
         while True:
             reweighted = len(nodes)
             if now.accepted and self.weighting is not None:
@@ -370,19 +397,19 @@ class WindowEstimator(LooksBack, Solver):
                 now.accepted = self._checked_step()
             else:
                 now.accepted = True
-                chain.retract(nodes["step"])
-                if (weighed and now.linear) or now.solved == self.iterations:
-                    now.moved += nodes["step"][-1]
-                    break
-                if not weighed and now.damping == 0.0 and self.incremental:
-                    now.moved += nodes["step"][-1]
-                    self._keep()
+                now.done = (weighed and now.linear) or now.solved == self.iterations
+                if now.done or (not weighed and now.damping == 0.0 and self.incremental):
+                    now.cost = chain.take_step()
+                    now.moved += nodes.newest("step")
+                    if now.done:
+                        break
                     now.first = len(nodes)
                     continue
-                self._linearise()
+                chain.retract(nodes["step"])
+                chain.linearise_from()
             now.first, now.before, now.since = 0, now.since, 0.0
             if now.accepted:
-                now.moved += nodes["step"][-1]
+                now.moved += nodes.newest("step")
                 now.damping = now.damping / DAMPING_FACTOR if now.damping > FIRST_DAMPING else 0.0
             else:
                 now.damping = max(FIRST_DAMPING, DAMPING_FACTOR * now.damping)
@@ -390,25 +417,27 @@ class WindowEstimator(LooksBack, Solver):
                 now.damping = max(now.damping, FIRST_DAMPING)  # linearised since, so what was solved for is not kept
                 break
         if now.damping > 0.0:  # the covariances and the prior are those without it
-            self._linearise()
+            chain.linearise_from()
             self._solve(0.0)
             nodes["step"][:] = 0.0
-        self._keep()
-        self.covariance = nodes["filtered"][-1].copy()
+        if now.damping > 0.0 or not now.done:
+            now.cost = chain.keep()
+        self.covariance = nodes.newest("filtered").copy()
         self._eliminated = len(nodes)
-        return now.solved, self._cost(), now.moved, attached
+        return now.solved, now.cost, now.moved, attached
 
     def _step(self, damping: float, first: int, attached: int) -> tuple[float, int]:
         """Solve for a step; its size, and the new factors left: none if there is no finite step with them."""
         size, older = self._solve(damping, first)
         if not older <= CHECKED_STEP:  # too far from where the older nodes were linearised
-            self._linearise()
+            self.chain.linearise_from()
             size, _ = self._solve(damping)
         if not isfinite(size):
             self.chain.detach(attached)
+            self._factors = None
             self._admission.skipped += attached
             attached = 0
-            self._linearise()
+            self.chain.linearise_from()
             size, _ = self._solve(0.0)
             if not isfinite(size):
                 raise FloatingPointError(f"the window at {self.chain.time:g} s has no finite solution")
@@ -423,11 +452,11 @@ class WindowEstimator(LooksBack, Solver):
             if along:
                 step[:] = chain.along_motion(step)
             chain.retract(step)
-            self._linearise()
+            self.chain.linearise_from()
             if self._cost() <= limit:
                 return True
             chain.restore_states(before)
-            self._linearise()
+            self.chain.linearise_from()
         return False
 
     def _first_new(self, attached: int) -> int:
@@ -436,33 +465,13 @@ class WindowEstimator(LooksBack, Solver):
             return 0
         return min(self._eliminated, int(self.chain.aids["node"][-attached]) - self.chain.base)
 
-    def _keep(self) -> None:
-        """Refer what the elimination left, and the residuals, to the nodes as they are after the step."""
-        chain, nodes, motions, aids = self.chain, self.chain.nodes, self.chain.motions, self.chain.aids
-        after_step.unchecked(
-            nodes["step"], (nodes["predicted_shift"], nodes["filtered_shift"]),
-            (motions["jacobian"], motions["residual"], motions["whitener"], motions["whitened"], motions["norm"]),
-            (
-                aids["node"], chain.base, aids["jacobian"], aids["residual"], aids["whitener"], aids["whitened"],
-                aids["norm"],
-            ),
-        )  # fmt: skip
-
-    def _linearise(self, node: int = 0) -> None:
-        """Linearise and whiten the factors that have to do with a node or later ones."""
-        motions, aids = self.chain.motions, self.chain.aids
-        motion, aid = self.chain.factors_from(node)
-        self.chain.linearise_motion(motion)
-        self.chain.linearise_aids(aid)
-        whiten.unchecked(motion, motions["residual"], motions["whitener"], motions["whitened"], motions["norm"])
-        whiten.unchecked(aid, aids["residual"], aids["whitener"], aids["whitened"], aids["norm"])
-
     def _weigh(self, iteration: int) -> tuple[bool, int]:
         """Ask the weighting; whether it has settled, and the first node that has to do with a weight that is new."""
         assert self.weighting is not None
         motions, aids = self.chain.motions, self.chain.aids
         before = motions["weight"].copy(), aids["weight"].copy()
-        factors = self._factors(iteration)
+        factors = self._factors = self._factors or self._all_factors()
+        factors.iteration = iteration
         settled = self.weighting.weigh(factors)
         if self.isolation is not None:
             settled = self.isolation.judge(factors) and settled
@@ -474,38 +483,29 @@ class WindowEstimator(LooksBack, Solver):
 
     def _cost(self) -> float:
         """Half the sum of squares of all factors, with the weights that they have."""
-        chain, motions, aids = self.chain, self.chain.motions, self.chain.aids
+        chain = self.chain
         cost: float = half_squares.unchecked(
-            chain.prior_whitener, chain.prior_shift, motions["weight"], motions["norm"], aids["weight"], aids["norm"]
-        )
+            chain.rows, (chain.prior_whitener, chain.prior_shift), *chain.whole(SQUARES)
+        )  # fmt: skip
         return cost
 
     def _solve(self, damping: float, first: int = 0) -> tuple[float, float]:
         """One step of all nodes; its largest component in sigmas, of all nodes and of those before ``first``."""
-        chain, nodes = self.chain, self.chain.nodes
-        motions, aids = chain.motions, chain.aids
+        chain = self.chain
+        motions, aids, left, left_aids, steps = chain.whole(SOLVED)
         sizes: tuple[float, float] = solve_chain.unchecked(
-            (chain.prior if first else chain.turned(chain.prior, -chain.prior_shift), chain.prior_shift),
-            (motions["jacobian"], motions["noise"], motions["residual"], motions["weight"]),
-            (
-                aids["node"], chain.base, aids["instrument"], aids["components"], aids["jacobian"], aids["residual"],
-                aids["noise"], aids["weight"],
-            ),
-            damping, first,
-            (
-                nodes["predicted"], nodes["predicted_shift"], nodes["filtered"], nodes["filtered_shift"],
-                aids["cross"], aids["white"], aids["innovation"], aids["used"],
-            ),
-            nodes["step"], nodes["size"],
+            (chain.prior if first else chain.turned(chain.prior, -chain.prior_shift), chain.prior_shift), chain.rows,
+            motions, aids, damping, first, left, left_aids, steps,
         )  # fmt: skip
         return sizes
 
-    def _factors(self, iteration: int) -> Factors:
+    def _all_factors(self) -> Factors:
+        """Views of the factors, which hold until their number changes."""
         motions, aids = self.chain.motions, self.chain.aids
         return Factors(
             self.chain.names, aids["instrument"], aids["components"], aids["time"], aids["residual"], aids["noise"],
             aids["whitened"], aids["norm"], motions["time"], motions["residual"], motions["norm"],
-            aids["weight"], motions["weight"], iteration,
+            aids["weight"], motions["weight"], 0,
         )  # fmt: skip
 
     def _marginalise(self) -> None:
@@ -518,10 +518,7 @@ class WindowEstimator(LooksBack, Solver):
         while self.window is not None and len(self._epochs) > self.window:
             leaving += self._epochs.popleft()
         if leaving:
-            step = chain.nodes["step"][leaving].copy()
-            mean = chain.nodes["predicted_shift"][leaving] + step
-            chain.set_prior(chain.turned(chain.nodes["predicted"][leaving], mean), chain.relative_shift(mean, step))
-            chain.drop(leaving)
+            chain.marginalise(leaving)
             self._eliminated -= leaving
 
 
@@ -553,6 +550,10 @@ class _Progress:
         Whether linearising anew would move no node by more than the tolerance.
     accepted : bool
         Whether the last step was taken.
+    done : bool
+        Whether it was the last step.
+    cost : float
+        Half the weighted sum of squares, where the last step led without a new linearisation.
     """
 
     moved: Array
@@ -566,6 +567,8 @@ class _Progress:
     settled: bool = True
     linear: bool = False
     accepted: bool = True
+    done: bool = False
+    cost: float = 0.0
 
 
 def _ratio(size: float, before: float, damping: float) -> float:

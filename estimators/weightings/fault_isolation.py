@@ -122,7 +122,9 @@ class FaultIsolation:
 
     def _suspect(self, factors: Factors) -> tuple[float, float] | None:
         """Test the new measurements at full weight; return the interval of a suspect motion, or None."""
-        first, failing_now = _failing(factors.time, self._tested, factors.norm, factors.components, self._limits)
+        first, failing_now = _failing.unchecked(
+            factors.time, self._tested, factors.norm, factors.components, self._limits
+        )
         new = slice(first, None)
         if first == len(factors.time):
             return None

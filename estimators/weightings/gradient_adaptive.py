@@ -169,10 +169,12 @@ class GradientAdaptive(Weighting):
         constants, scales, zero = self._shapes, self._scales, np.zeros(len(motion), np.int64)
         settings = self.epsilon, self._floor, self._least
         of_type = self._type[factors.instrument] if self._owners else factors.instrument
-        _adapt(
+        _adapt.unchecked(
             norm, self._kappa, factors.components, of_type, constants[:-1], settings, scales[:-1], factors.weight,
         )  # fmt: skip
-        _adapt(motion, self._kappa_motion, zero, zero, constants[-1:], settings, scales[-1:], factors.motion_weight)
+        _adapt.unchecked(
+            motion, self._kappa_motion, zero, zero, constants[-1:], settings, scales[-1:], factors.motion_weight
+        )
         return True
 
     def diagnostics(self) -> dict[str, float | Array]:

@@ -22,11 +22,12 @@ schedules left out healthy ones twice as often as the window does without that s
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
-from simnav.types import Array, Instruments
+from simnav.compiled import kernel
+from simnav.types import Array, Instruments, Integers
 
 from .base import Factors
 from .m_estimators import constants, geman_mcclure, truncated
@@ -39,17 +40,47 @@ __all__ = ["GraduatedNonConvexity", "softened_geman_mcclure", "softened_truncate
 HARD = 10.0
 
 
-def softened_truncated(square: Array, mu: float) -> Array:
+@kernel()
+def softened_truncated(square: Any, mu: float) -> Any:
     """Weights of truncated least squares of u^2, softened by mu (Yang et al. 2020, eq. 14)."""
     root = np.sqrt(mu * (mu + 1.0) / np.maximum(square, 1e-12)) - mu
-    weight: Array = np.minimum(np.maximum(root, 0.0), 1.0)
-    return weight
+    return np.minimum(np.maximum(root, 0.0), 1.0)
 
 
-def softened_geman_mcclure(square: Array, mu: float) -> Array:
+@kernel()
+def softened_geman_mcclure(square: Any, mu: float) -> Any:
     """Geman-McClure weights of u^2, softened by mu (Yang et al. 2020, eq. 12)."""
-    weight: Array = (mu / (square + mu)) ** 2
-    return weight
+    return (mu / (square + mu)) ** 2
+
+
+@kernel("Tuple((i8, f8, f8))(f8[::1], f8, f8[::1], i8[::1], f8[::1], f8[::1])")
+def _squares(
+    time: Array, seen: float, norm: Array, components: Integers, scale: Array, square: Array
+) -> tuple[int, float, float]:
+    """Overwrite ``square`` with u^2 of each measurement.
+
+    Returns
+    -------
+    int, float, float
+        Index of the first measurement after the time ``seen``; largest u^2 from there on, and of all; 0 if there is
+        none.
+    """
+    first, newest, largest = time.size, 0.0, 0.0
+    while first > 0 and time[first - 1] > seen:
+        first -= 1
+    for i in range(norm.size):
+        square[i] = norm[i] * norm[i] * scale[components[i]]
+        largest = np.maximum(largest, square[i])
+        if i >= first:
+            newest = np.maximum(newest, square[i])
+    return first, newest, largest
+
+
+@kernel("void(b1, f8[::1], f8, f8[::1])")
+def _soften(truncated: bool, square: Array, mu: float, weight: Array) -> None:
+    """Overwrite the weights of measurements with those of a cost that is softened by mu."""
+    for i in range(square.size):
+        weight[i] = softened_truncated(square[i], mu) if truncated else softened_geman_mcclure(square[i], mu)
 
 
 class GraduatedNonConvexity(RobustWeighting):
@@ -81,7 +112,6 @@ class GraduatedNonConvexity(RobustWeighting):
         self.cost, self.growth = cost, growth
         tuned = constants(truncated if cost == "tls" else geman_mcclure, efficiency)
         self._scale = np.array([1.0, *tuned]) ** -2.0
-        self._soft = softened_truncated if cost == "tls" else softened_geman_mcclure
         self._vote = SiblingVote()
 
     def reset(self, instruments: Instruments) -> None:
@@ -98,11 +128,16 @@ class GraduatedNonConvexity(RobustWeighting):
 
     def choose(self, factors: Factors) -> bool:
         """Set the weights of the measurements; return False while mu still changes."""
-        square = factors.norm * factors.norm * self._scale[factors.components]
+        square = np.empty(len(factors.norm))
+        first, newest, largest = _squares.unchecked(
+            factors.time, self._seen, factors.norm, factors.components, self._scale, square
+        )
         if self._fresh:
-            self._fresh = False
-            first = int(np.searchsorted(factors.time, self._seen, side="right"))
-            self._soften(factors, square, first)
+            self._fresh, self._mu = False, self._hard
+            if first < len(square):
+                self._newest = float(factors.time[-1])
+                if newest > 1.0:
+                    self._mu = self._softest(largest)
             if self._mu != self._hard and self._vote.ask(factors, square, first):
                 return False
         elif self._vote.asked:
@@ -113,19 +148,12 @@ class GraduatedNonConvexity(RobustWeighting):
                 self._mu = self._hard
         elif self._mu != self._hard:
             self._harden()
-        factors.weight[:] = self._soft(square, self._mu)
+        _soften.unchecked(self.cost == "tls", square, self._mu, factors.weight)
         return self._mu == self._hard
 
-    def _soften(self, factors: Factors, square: Array, first: int) -> None:
-        """Choose the epoch's first mu; ``first`` is the index of the first new measurement."""
-        self._mu = self._hard
-        new = square[first:]
-        if not len(new):
-            return
-        self._newest = float(factors.time[-1])
-        if new.max() > 1.0:
-            largest = float(square.max())
-            self._mu = 1.0 / (2.0 * largest - 1.0) if self.cost == "tls" else max(2.0 * largest, 1.0)
+    def _softest(self, largest: float) -> float:
+        """The mu with which a schedule begins, from the largest u^2."""
+        return 1.0 / (2.0 * largest - 1.0) if self.cost == "tls" else max(2.0 * largest, 1.0)
 
     def _harden(self) -> None:
         if self.cost == "tls":

@@ -29,10 +29,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cache
+from typing import Any
 
 import numpy as np
 
-from simnav.types import Array
+from simnav.compiled import kernel
+from simnav.types import Array, Integers
 
 from .base import Factors
 from .robust_weighting import RobustWeighting
@@ -52,27 +54,49 @@ __all__ = [
 WeightFunction = Callable[[Array], Array]
 
 
-def huber(u: Array) -> Array:
+@kernel()
+def huber(u: Any) -> Any:
     """Huber's weight ``min(1, 1/u)``."""
-    weight: Array = 1.0 / np.maximum(u, 1.0)
-    return weight
+    return 1.0 / np.maximum(u, 1.0)
 
 
-def tukey(u: Array) -> Array:
+@kernel()
+def tukey(u: Any) -> Any:
     """The weight of Tukey's biweight: ``(1 - u^2)^2``, and 0 from u = 1 on."""
     v = np.maximum(1.0 - u * u, 0.0)
     return v * v
 
 
-def cauchy(u: Array) -> Array:
+@kernel()
+def cauchy(u: Any) -> Any:
     """The weight of Cauchy's cost, ``1 / (1 + u^2)``."""
     return 1.0 / (1.0 + u * u)
 
 
-def geman_mcclure(u: Array) -> Array:
+@kernel()
+def geman_mcclure(u: Any) -> Any:
     """The weight of Geman and McClure, ``1 / (1 + u^2)^2``."""
     v = 1.0 + u * u
     return 1.0 / (v * v)
+
+
+#: The weight functions that `_weigh` knows by their number. Each is written once, for an array and for one number.
+COMPILED: tuple[WeightFunction, ...] = (huber, tukey, cauchy, geman_mcclure)
+
+
+@kernel("void(i8, f8[::1], i8[::1], f8[::1], f8[::1])")
+def _weigh(function: int, norm: Array, components: Integers, scale: Array, weight: Array) -> None:
+    """Weights of M measurements by a function in `COMPILED`; ``scale`` has 1/c for each number of components."""
+    for i in range(norm.size):
+        u = norm[i] * scale[components[i]]
+        if function == 0:
+            weight[i] = huber(u)
+        elif function == 1:
+            weight[i] = tukey(u)
+        elif function == 2:
+            weight[i] = cauchy(u)
+        else:
+            weight[i] = geman_mcclure(u)
 
 
 def truncated(u: Array) -> Array:
@@ -147,11 +171,15 @@ class MEstimator(RobustWeighting):
             raise ValueError(f"constants = {constants}: they must be above 0")
         super().__init__(smallest)
         self.weight = weight
+        self._compiled = COMPILED.index(weight) if weight in COMPILED else -1
         self._scale = 1.0 / np.array([1.0, *constants])
 
     def choose(self, factors: Factors) -> bool:
         """Set the weights of the measurements."""
-        factors.weight[:] = self.weight(factors.norm * self._scale[factors.components])
+        if self._compiled >= 0:
+            _weigh.unchecked(self._compiled, factors.norm, factors.components, self._scale, factors.weight)
+        else:
+            factors.weight[:] = self.weight(factors.norm * self._scale[factors.components])
         return True
 
 

@@ -11,8 +11,6 @@ from __future__ import annotations
 from abc import abstractmethod
 from functools import cache
 
-import numpy as np
-
 from simnav.compiled import kernel
 from simnav.types import Array
 
@@ -27,21 +25,33 @@ def _quantile(n: int) -> float:
     return float(n**0.5 * (1.0 - 2.0 / (9.0 * n) + 3.0902 * (2.0 / (9.0 * n)) ** 0.5) ** 1.5)
 
 
-@kernel("void(f8, f8[::1], f8[::1])")
-def _weigh_motion(quantile: float, norm: Array, weight: Array) -> None:
+@kernel("void(f8, f8[::1], f8[::1], f8, f8[::1])")
+def _weigh_motion(quantile: float, norm: Array, weight: Array, smallest: float, aid_weight: Array) -> None:
+    """Set the weights of motion factors (`weigh_motion`); raise those of measurements to the smallest."""
     for k in range(norm.size):
         u = quantile / max(norm[k], quantile)
         weight[k] = u * u
+    for i in range(aid_weight.size):
+        if aid_weight[i] < smallest:
+            aid_weight[i] = smallest
 
 
-def weigh_motion(factors: Factors) -> None:
+def weigh_motion(factors: Factors, smallest: float = 0.0) -> None:
     """Set the weights of motion factors to ``min(1, (c/r)^2)``, with the whitened norm r.
 
     c is the 99.9 % quantile of the chi distribution with n degrees of freedom. So the noise of a motion factor
     increases to the size of its residual. Without faults the weights are 1, because the residuals of motion in a window
     are smaller than its noise.
+
+    Parameters
+    ----------
+    factors : Factors
+        The factors of a window.
+    smallest : float
+        Smaller weights of measurements are raised to this.
     """
-    _weigh_motion(_quantile(factors.motion_residual.shape[1]), factors.motion_norm, factors.motion_weight)
+    quantile = _quantile(factors.motion_residual.shape[1])
+    _weigh_motion.unchecked(quantile, factors.motion_norm, factors.motion_weight, smallest, factors.weight)
 
 
 class RobustWeighting(Weighting):
@@ -71,8 +81,7 @@ class RobustWeighting(Weighting):
             self.begin()
             return False
         settled = self.choose(factors)
-        np.maximum(factors.weight, self.smallest, out=factors.weight)
-        weigh_motion(factors)
+        weigh_motion(factors, self.smallest)
         return settled
 
     def begin(self) -> None:

@@ -31,6 +31,10 @@ class Problem:
         self.R = np.array([covariance(rng, 3) for _ in range(total)])
         self.v = rng.uniform(0.2, 1.0, total)
 
+    @property
+    def rows(self) -> tuple[int, ...]:
+        return 0, COUNT, 0, 0, len(self.node), 7
+
     def solve(self, damping: float = 0.0, first: int = 0, left: tuple = ()):
         """Largest step; predicted and filtered covariances and shifts, step; and what is left of each measurement.
 
@@ -50,9 +54,9 @@ class Problem:
             ours[:rows] = theirs[:rows]
         step = np.empty((COUNT, N))
         size = solve_chain(
-            (self.prior, self.shift), (self.F, self.Q, self.e, self.w),
-            (self.node + 7, 7, self.instrument, self.m, self.H, self.r, self.R, self.v), damping, first,
-            (*nodes, *aids), step, np.empty(COUNT),
+            (self.prior, self.shift), self.rows, (self.F, self.Q, self.e, self.w),
+            (self.node + 7, self.instrument, self.m, self.H, self.r, self.R, self.v), damping, first,
+            nodes, aids, (step, np.empty(COUNT)),
         )  # fmt: skip
         self.left = *nodes, *aids
         return size, (*nodes, step)
@@ -164,6 +168,30 @@ def test_older_nodes_need_not_be_eliminated_again(first: int):
         np.testing.assert_array_equal(ours, theirs)
 
 
+def test_rows_before_and_after_do_not_count():
+    """Arrays that hold more rows than those of the chain give the same step, and keep the others."""
+    p = Problem(11)
+    size, alone = p.solve()
+    nodes, motions, aids = (
+        [np.concatenate([np.full_like(x[:2], 7), x, np.full_like(x[:1], 7)]) for x in arrays]
+        for arrays in (alone, (p.F, p.Q, p.e, p.w), (p.node, p.instrument, p.m, p.H, p.r, p.R, p.v))
+    )
+    left = [np.concatenate([np.full_like(x[:2], 7), x, np.full_like(x[:1], 7)]) for x in p.left[4:]]
+    for column in left[:3]:
+        column[2:-1] = np.nan  # as `Problem.solve` begins
+    for column in nodes:
+        column[2:-1] = 0.0
+    again = solve_chain(
+        (p.prior, p.shift), (2, COUNT, 2, 2, len(p.node), 0), tuple(motions), tuple(aids), 0.0, 0, tuple(nodes[:4]),
+        tuple(left), (nodes[4], np.empty(COUNT + 3)),
+    )  # fmt: skip
+    assert again == size
+    for ours, theirs in zip((*nodes, *left), (*alone, *p.left[4:])):
+        np.testing.assert_array_equal(ours[2:-1], theirs)
+        assert np.all(ours[:2] == 7)
+        assert np.all(ours[-1] == 7)
+
+
 def test_after_a_step_there_is_none_to_take():
     """Residuals and prior moved as the step supposes: what is linear is solved."""
     p = Problem(10)
@@ -171,9 +199,14 @@ def test_after_a_step_there_is_none_to_take():
     left = p.left
     motion, aids = (np.empty((COUNT - 1, N)), np.empty(COUNT - 1)), (np.empty_like(p.r), np.empty(len(p.node)))
     unit, one = np.tile(np.eye(N), (COUNT - 1, 1, 1)), np.tile(np.eye(3), (len(p.node), 1, 1))
-    shifts = predicted_shift, filtered_shift
-    after_step(step, shifts, (p.F, p.e, unit, *motion), (p.node + 7, 7, p.H, p.r, one, *aids))
     p.shift -= step[0]
+    prior = np.empty((N, N))
+    whitening(p.prior, prior)
+    cost = after_step(
+        p.rows, (prior, p.shift), (step, predicted_shift, filtered_shift), (p.F, p.e, unit, *motion, p.w),
+        (p.node + 7, p.H, p.r, one, *aids, p.v),
+    )  # fmt: skip
+    assert cost == half_squares(p.rows, (prior, p.shift), (motion[1], p.w), (aids[1], p.v))
     assert np.abs(step).max() > 0.1
     for first in (0, 3, COUNT):  # whatever is eliminated anew
         _, (*_, after) = p.solve(first=first, left=left)
@@ -251,7 +284,9 @@ def test_the_cost_is_half_the_weighted_sum_of_squares():
     norm, weight = rng.uniform(size=(2, 3))
     aid_norm, aid_weight = rng.uniform(size=(2, 5))
     squares = shift @ np.linalg.solve(P, shift) + weight @ norm**2 + aid_weight @ aid_norm**2
-    assert half_squares(W, shift, weight, norm, aid_weight, aid_norm) == pytest.approx(0.5 * squares)
+    around = [np.concatenate([[9.0], x, [9.0]]) for x in (norm, weight, aid_norm, aid_weight)]
+    cost = half_squares((1, 4, 1, 1, 5, 0), (W, shift), (around[0], around[1]), (around[2], around[3]))
+    assert cost == pytest.approx(0.5 * squares)  # rows before and after do not count
 
 
 @pytest.mark.parametrize(

@@ -24,6 +24,7 @@ from simnav.estimators.weightings.graduated_non_convexity import (
     softened_truncated,
 )
 from simnav.estimators.weightings.m_estimators import (
+    COMPILED,
     MEstimator,
     cauchy,
     constants,
@@ -294,6 +295,36 @@ def test_max_mixture_picks_the_more_probable_component(m: int):
         wide = np.log(p) + multivariate_normal.logpdf(x, np.zeros(m), s * s * np.eye(m))
         expected = 1.0 if nominal > wide else s**-2
         assert weights(MaxMixture(s, p), [norm], components=m) == pytest.approx(expected)
+
+
+# In kernels
+
+
+NORMS = np.concatenate([[0.0, 1e-300, 1e12, np.nan], np.random.default_rng(4).uniform(0.0, 12.0, 200)])
+
+
+@pytest.mark.parametrize("function", COMPILED)
+@pytest.mark.parametrize("m", [1, 2, 3])
+def test_a_weight_in_a_kernel_is_that_of_the_array_to_the_last_bit(function, m: int):
+    c = constants(function)
+    f = factors(along(NORMS), components=m)
+    MEstimator(function, c).choose(f)
+    np.testing.assert_array_equal(f.weight, function(f.norm * (1.0 / np.array(c))[m - 1]))
+
+
+@pytest.mark.parametrize(("cost", "function"), [("tls", softened_truncated), ("gm", softened_geman_mcclure)])
+def test_softened_weights_in_a_kernel_are_those_of_the_array_to_the_last_bit(cost: str, function):
+    """Without an outlier among the new measurements mu is the last one."""
+    weighting = GraduatedNonConvexity(cost, smallest=0.0)
+    weighting.reset(SHEETS)
+    norms = NORMS[np.isfinite(NORMS)]
+    scale = constants(truncated if cost == "tls" else geman_mcclure, 0.95)[2] ** -2.0
+    mu = 10.0 if cost == "tls" else 1.0
+    weighting._seen = weighting._newest = np.inf
+    f = factors(along(norms))
+    weighting._fresh, f.iteration = True, 1
+    assert weighting.weigh(f)
+    np.testing.assert_array_equal(f.weight, function(f.norm * f.norm * scale, mu))
 
 
 # Graduated non-convexity
