@@ -182,6 +182,22 @@ def test_smoothed_trajectories_cross_too(
     same(there.trial, run_trial(make(str(file)), recording))
 
 
+def test_an_estimator_has_the_linear_algebra_of_the_one_who_starts_it(
+    recording: Recording, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """OpenBLAS has other code, and other last bits, for each type of processor."""
+    monkeypatch.setenv("OPENBLAS_CORETYPE", "Prescott")
+    file = tmp_path / "mine.py"
+    file.write_text(HEAD.format(reset="", update="diagnostics = {os.environ['OPENBLAS_CORETYPE']: 1.0}"))
+    server = EstimatorServer("process", loaded=())
+    try:
+        there = attempt(server, replace(entrant(str(file)), kernels=()), recording, Limits(60.0, 1 << 30))
+    finally:
+        server.close()
+    assert there.trial is not None, there.reason
+    assert "Prescott" in there.trial.diagnostics
+
+
 @pytest.fixture
 def told(server: EstimatorServer, recording: Recording, tmp_path: Path) -> Callable[..., Any]:
     """What an estimator finds where it runs: the value of an expression, as JSON in the name of a diagnostic."""
