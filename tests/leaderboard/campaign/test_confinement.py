@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from simnav.compiled import cache_directory
+from simnav.compiled import cache_directory, kernels
 from simnav.estimator import make
 from simnav.leaderboard.campaign.confinement import attempt as attempt_module
 from simnav.leaderboard.campaign.confinement import bubblewrap, landlock, seccomp
@@ -277,11 +277,13 @@ def test_a_server_loads_no_kernel_that_an_estimator_left(tmp_path: Path, monkeyp
     """In a sandbox estimators run before the kernels are loaded, and have the folder of the kernels in common."""
     given = cache_directory()
     assert given is not None
+    warmup(load=False)
+    kernel = next(kernel for kernel in kernels() if kernel.cached())
     monkeypatch.setenv("SIMNAV_CACHE_DIR", str(tmp_path))
     target = cache_directory()
     assert target is not None
     assert tmp_path in target.parents
-    ours = next(path for path in given.rglob("*.nbi"))
+    ours = next(path for path in (given / kernel.fingerprint()).rglob("*.nbi"))
     planted = target / ours.relative_to(given)
     planted.parent.mkdir(parents=True)
     planted.write_bytes(b"a compiled function of a stranger")
