@@ -6,7 +6,7 @@ import pytest
 
 from tests.audit import poor_imu
 
-GOOD = (1.0, 1.0)
+GOOD = (1.0, 1.0, False)
 
 
 @pytest.fixture
@@ -16,13 +16,13 @@ def pages(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(poor_imu, "explained", lambda name: name == "said")
 
 
-def judged(ratio: float, nees: float = 1.0, row: str = "unsaid") -> dict[str, tuple[str, bool]]:
+def judged(ratio: float, nees: float = 1.0, row: str = "unsaid", told: bool = False) -> dict[str, tuple[str, bool]]:
     """The lines on a row that has this ratio on one voyage of 100, with their figure and whether it is kept."""
     found = {}
     for first in range(poor_imu.FIRST, poor_imu.FIRST + 100, 10):
         mine = [GOOD] * 10
         if first == poor_imu.FIRST + 30:
-            mine[4] = (ratio, nees)
+            mine[4] = (ratio, nees, told)
         found[f"filters-{first}"] = {"ekf": [GOOD] * 10, row: mine}
     return {what.split(":")[1].split(",")[0].strip(): (figure, kept) for what, figure, _, kept in poor_imu.rows(found)}
 
@@ -40,16 +40,22 @@ def test_one_voyage_of_a_hundred_may_be_worse_and_none_ruined():
 
 
 @pytest.mark.usefixtures("pages")
-def test_a_page_does_not_replace_a_covariance_that_admits_the_error():
+def test_a_page_does_not_replace_a_covariance_or_a_self_test_that_admits_the_error():
     lines = judged(20.0, nees=300.0, row="said")
     assert lines["above 1.5 times ekf"][1]
     assert lines["admitted"] == ("0 %", False)
     assert judged(20.0, nees=3.0, row="said")["admitted"] == ("100 %", True)
+    assert judged(20.0, nees=300.0, row="said", told=True)["admitted"] == ("100 %", True)
 
 
 @pytest.mark.usefixtures("pages")
 def test_voyages_on_which_the_plain_row_is_lost_are_also_left_out():
-    found = {f"filters-{poor_imu.FIRST}": {"ekf": [(1.0, 90.0)] * 9 + [GOOD], "unsaid": [GOOD] * 9 + [(2.0, 1.0)]}}
+    found = {
+        f"filters-{poor_imu.FIRST}": {
+            "ekf": [(1.0, 90.0, False)] * 9 + [GOOD],
+            "unsaid": [GOOD] * 9 + [(2.0, 1.0, False)],
+        }
+    }
     everywhere, sound = list(poor_imu.rows(found))
     assert everywhere[1].startswith("10.0 %; 2.0")
     assert "where that is not lost, of 1;" in sound[0]
