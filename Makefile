@@ -42,7 +42,8 @@ test: $(VENV)/installed-test
 
 bench: $(VENV)/installed-test
 	$(BIN)/simnav warmup
-	$(BIN)/python -m pytest tests/benchmarks --benchmark-enable --benchmark-only --benchmark-columns=median,mean,iqr,rounds --benchmark-sort=name
+	@mkdir -p results
+	$(BIN)/python -m pytest tests/benchmarks --benchmark-enable --benchmark-only --benchmark-columns=median,mean,iqr,rounds --benchmark-sort=name --benchmark-json=results/bench.json
 
 $(VENV)/installed-docs: $(VENV)/pyvenv.cfg pyproject.toml
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[docs]'
