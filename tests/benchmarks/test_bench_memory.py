@@ -29,7 +29,7 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
-from simnav.estimator import Estimator, describe, make, names
+from simnav.estimator import Estimator, UnsuitableScenario, describe, make, names
 from simnav.estimators.solvers.kalman import KalmanEstimator
 from simnav.scenario import load
 from simnav.source import record
@@ -168,7 +168,10 @@ def test_peak_memory(benchmark, sea: Sea, peer: Callable[[tuple[int, int]], int]
     if on_gtsam and not hasattr(ctypes.CDLL(None), "mallinfo2"):
         pytest.skip("what GTSAM holds is known from glibc only")
     pieces = PIECES[slow] if benchmark.enabled else SHORT
-    sea.run(make(name), 10)  # libraries, kernels, free lists
+    try:
+        sea.run(make(name), 10)  # libraries, kernels, free lists
+    except UnsuitableScenario as error:
+        pytest.skip(str(error))
     peaks: dict[int, int] = {}
     seconds_of_run = pieces[0] if benchmark.enabled else 1
     milliseconds = 1e3 * benchmark.pedantic(sea.run, (make(name), seconds_of_run), rounds=1)
@@ -182,8 +185,9 @@ def test_peak_memory(benchmark, sea: Sea, peer: Callable[[tuple[int, int]], int]
     solver = getattr(estimator, "solver", estimator)  # a row that is no declaration is its own solver
     kalman = isinstance(solver, KalmanEstimator)
     if solver.smoother is None if kalman else type(solver).smooth is Estimator.smooth:  # no use for what is past
-        grown = sea.grown(make(name), pieces, given_out if on_gtsam else traced_now)
-        assert grown < 0.25 * peer(pieces)
+        # GTSAM keeps an empty place for each factor that has left its window. And its tree changes by 60 kB.
+        spans, share = (PIECES[False], 0.75) if on_gtsam else (pieces, 0.25)
+        assert sea.grown(make(name), spans, given_out if on_gtsam else traced_now) < share * peer(spans)
 
 
 def test_a_row_that_keeps_what_is_past_is_found(sea: Sea, peer: Callable[[tuple[int, int]], int]):
