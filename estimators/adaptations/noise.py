@@ -293,15 +293,6 @@ class EstimatedNoise(NoiseAdaptation):
     def estimate(self, innovation: Innovation) -> Array:
         """The (m, m) estimate of the noise within the bounds, including this innovation."""
 
-    def ask(self, rule: Kernel[..., float], innovation: Innovation, noise: Array) -> float:
-        """What a rule returns for a measurement; it overwrites the noise, and its inflation is set."""
-        m, residual, predicted, nominal, *_ = innovation
-        shared = self.rule_shared
-        shared[TIME], shared[INFLATION], shared[REJECT] = m.time, 1.0, 0.0
-        found = rule(*self.memory_of(m.instrument), shared, residual, predicted, nominal, noise)
-        self.inflation = float(shared[INFLATION])
-        return found
-
     def in_scope(self, kind: str) -> bool:
         """Whether the noise of a kind of instrument is estimated, by the scope."""
         return self.scope == "all" or KINDS[kind].role == "fix"
