@@ -20,6 +20,7 @@ from typing import NamedTuple
 from simnav.compiled import kernel
 from simnav.estimators.algebra.chi_square import chi_square_limits, normal_quantile
 from simnav.geometry.earth import radii_scalar
+from simnav.kernel_types import Vector
 from simnav.kinds import kinds_with
 from simnav.types import Array, Datasheet, Estimate, Instruments, Measurement, Measurements
 
@@ -28,11 +29,15 @@ from .persistence import add_innovation, begun, is_correlated, is_large
 __all__ = ["FixTest"]
 
 
-@kernel("i8(UniTuple(f8, 3), UniTuple(f8, 3), UniTuple(f8, 2), UniTuple(f8, 4), UniTuple(f8, 3), f8[::1])")
+@kernel
 def _judge(
-    fix: tuple[float, float, float], position: tuple[float, float, float], antenna: tuple[float, float],
-    variances: tuple[float, float, float, float], limits: tuple[float, float, float], course: Array,
-) -> int:  # fmt: skip
+    fix: tuple[float, float, float],
+    position: tuple[float, float, float],
+    antenna: tuple[float, float],
+    variances: tuple[float, float, float, float],
+    limits: tuple[float, float, float],
+    course: Vector,
+) -> int:
     """Whether the fixes of a receiver are off in one direction; -1 if this one cannot be compared.
 
     Parameters

@@ -14,7 +14,7 @@ from math import sqrt
 
 import numpy as np
 
-from simnav.compiled import kernel
+from simnav.compiled import helper
 from simnav.types import Array
 
 __all__ = ["COURSE", "TIME", "Course", "add_innovation", "begun", "is_correlated", "is_directed", "is_large"]
@@ -34,7 +34,7 @@ def begun(count: int, more: int = 0) -> Array:
     return courses
 
 
-@kernel()
+@helper
 def add_innovation(course: Array, u0: float, u1: float, u2: float, count: int, time: float, failed: bool) -> None:
     """Do `Course.add` on the array of a course."""
     b0, b1, b2 = course[BEFORE], course[BEFORE + 1], course[BEFORE + 2]
@@ -53,21 +53,21 @@ def add_innovation(course: Array, u0: float, u1: float, u2: float, count: int, t
     course[FAILED], course[COUNT] = 1.0 if failed else 0.0, count
 
 
-@kernel()
+@helper
 def is_correlated(course: Array, quantile: float) -> bool:
     """Do `Course.correlated` on the array of a course."""
     found: bool = course[PRODUCT] > 0.0 and course[PRODUCT] * course[PRODUCT] > quantile * quantile * course[SQUARE]
     return found
 
 
-@kernel()
+@helper
 def is_directed(course: Array, quantile: float) -> bool:
     """Do `Course.directed` on the array of a course."""
     found: bool = course[PAIRS] > 0.0 and course[COSINES] * sqrt(course[COUNT] / course[PAIRS]) > quantile
     return found
 
 
-@kernel()
+@helper
 def is_large(course: Array, quantile: float) -> bool:
     """Do `Course.large` on the array of a course."""
     spread = 2.0 / (9.0 * course[FREEDOM])

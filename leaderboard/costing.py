@@ -85,9 +85,13 @@ def costs(request: CostsRequest) -> MultipleReport:
 
 
 def _multiples(
-    mine: Sequence[EstimatorRequest], scenario: ScenarioLike | None, seed: int, epochs: int, rounds: int,
+    mine: Sequence[EstimatorRequest],
+    scenario: ScenarioLike | None,
+    seed: int,
+    epochs: int,
+    rounds: int,
     progress: Callable[..., None] | None,
-) -> tuple[MultipleReport, list[tuple[str, Recording]]]:  # fmt: skip
+) -> tuple[MultipleReport, list[tuple[str, Recording]]]:
     """The multiples of estimators, and the recordings of the scenarios, by versioned id."""
     from simnav.leaderboard.ranking.cost_measurement import SCENARIOS, multiples_of
     from simnav.leaderboard.ranking.costs import MultipleReport

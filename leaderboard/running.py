@@ -366,9 +366,13 @@ def _names(given: Sequence[str] | str) -> tuple[str, ...]:
 
 
 def _run(
-    request: RunOptions, scenarios: Sequence[Scenario], estimators: Sequence[EstimatorRequest], seeds: range,
-    folder: Path, **more: Any,
-) -> Summary:  # fmt: skip
+    request: RunOptions,
+    scenarios: Sequence[Scenario],
+    estimators: Sequence[EstimatorRequest],
+    seeds: range,
+    folder: Path,
+    **more: Any,
+) -> Summary:
     """Run a campaign with those options of a request that campaigns have."""
     from simnav.leaderboard.campaign.campaign import Campaign, run_campaign
     from simnav.leaderboard.results.store import create

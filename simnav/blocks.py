@@ -148,9 +148,13 @@ class StateBlock:
 
     @classmethod
     def stationary(
-        cls, name: str, size: int, units: str | tuple[str, ...], sigma: float | tuple[float, ...],
+        cls,
+        name: str,
+        size: int,
+        units: str | tuple[str, ...],
+        sigma: float | tuple[float, ...],
         correlation_time: float,
-    ) -> StateBlock:  # fmt: skip
+    ) -> StateBlock:
         """A block of a constant sigma: Gauss-Markov, or constant where the correlation time [s] is infinite."""
         if correlation_time == inf:
             return cls(name, size, units, sigma)

@@ -18,13 +18,15 @@ import threading
 import time
 import types
 from collections.abc import Callable, Iterator
+from functools import cached_property, partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Generic, ParamSpec, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, ParamSpec, Protocol, TypeVar, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
 from simnav.cache_folder import cache_directory
+from simnav.kernel_types import hints_of, numba_type
 from simnav.watchers import announce, announced, awaited
 
 __all__ = [
@@ -34,6 +36,7 @@ __all__ = [
     "Kernel",
     "announced",
     "cache_directory",
+    "helper",
     "kernel",
     "kernels",
     "prune",
@@ -63,27 +66,35 @@ class Kernel(Generic[Parameters, Returned]):
     ----------
     function : callable
         The plain Python function that is compiled.
-    signature : str or None
-        Numba signature; with it the kernel is compiled for these types only, and can be compiled before
-        its first call. Small helpers that other kernels call have none; a call from Python runs them as Python.
+    typed : bool
+        True: it is compiled for the types of its annotations only (`simnav.kernel_types`), and can be compiled before
+        its first call. False: it is a small helper that other kernels call; a call from Python runs it as Python.
     fastmath : bool or set of str
         Permitted changes of floating-point arithmetic; passed to Numba.
-    borrows : bool
+    borrows, passed : bool
         See `kernel`.
     """
 
     def __init__(
         self,
         function: Callable[Parameters, Returned],
-        signature: str | None,
-        fastmath: bool | set[str],
+        typed: bool,
+        fastmath: bool | set[str] = False,
         borrows: bool = False,
+        passed: bool = False,
     ):
         assert isinstance(function, types.FunctionType)
+        names = function.__code__.co_varnames[: function.__code__.co_argcount]
+        missing = [name for name in (*names, "return") if name not in function.__annotations__]
+        if typed and missing:
+            raise TypeError(
+                f"kernel {function.__module__}.{function.__name__}: {', '.join(missing)} needs an annotation"
+            )
         self.function: types.FunctionType = function
-        self.signature = signature
+        self.typed = typed
         self.fastmath = fastmath
         self.borrows = borrows
+        self.passed = passed
         self._dispatcher: Callable[..., Any] | None = None
         self._entry: Callable[..., Any] | None = None
         self.__name__ = function.__name__
@@ -97,6 +108,17 @@ class Kernel(Generic[Parameters, Returned]):
 
     def __reduce__(self) -> str:
         return self.__qualname__  # pickled by name, like a function
+
+    @cached_property
+    def signature(self) -> Any:
+        """The signature of Numba, from the annotations; None for a helper."""
+        if not self.typed:
+            return None
+        hints = hints_of(self.function)
+        try:
+            return numba_type(hints.pop("return"))(*map(numba_type, hints.values()))
+        except TypeError as error:
+            raise TypeError(f"kernel {self.__module__}.{self.__name__}: {error}") from None
 
     def tree(self) -> list[Kernel[..., Any]]:
         """This kernel and all kernels that it calls, directly or indirectly."""
@@ -121,7 +143,7 @@ class Kernel(Generic[Parameters, Returned]):
             text += _code_text(how.__code__)
         for k in self.tree():
             fastmath = sorted(k.fastmath) if isinstance(k.fastmath, set) else k.fastmath
-            text += [k.__module__, k.__qualname__, f"{k.signature!r} {fastmath!r} {k.borrows!r}"]
+            text += [k.__module__, k.__qualname__, f"{k.signature} {fastmath!r} {k.borrows!r} {k.passed!r}"]
             # The code in memory is hashed, not the file: a file may be edited after it was imported.
             text += _code_text(k.function.__code__)
             text.append(repr(k.function.__defaults__))
@@ -147,7 +169,7 @@ class Kernel(Generic[Parameters, Returned]):
         with _compiling:
             if self._dispatcher is None:
                 directory = self.directory()
-                if self.signature is not None and awaited() and not _holds(directory):
+                if self.typed and awaited() and not _holds(directory):
                     announce()
                 if directory is not None:
                     try:
@@ -187,14 +209,14 @@ class Kernel(Generic[Parameters, Returned]):
         options["fastmath"] = self.fastmath
         if self.borrows:
             options["_nrt"] = False  # the runtime of Numba, which counts references
-        if self.signature is None:
+        if not self.typed:
             # A helper is inlined: this is faster by a sixth, and keeps results equal to the last bit. Without inlining
             # a helper would exist once in its own library and again in the library of each caller, optimised
             # differently, and the linker uses the copy that is loaded first. With fast arithmetic a result would then
             # depend on whether its kernels came from the cache.
             options["forceinline"] = True
             options["no_cpython_wrapper"] = True
-        options["no_cfunc_wrapper"] = True  # C never calls a kernel, and Python no helper
+        options["no_cfunc_wrapper"] = not self.passed  # Numba hands a function over by the address of its form for C
         fast = any(k.fastmath for k in self.tree())
         previous = config.CACHE_DIR, config.SLP_VECTORIZE
         # Sums that are written side by side become vector instructions. Each keeps its order; with fast arithmetic it
@@ -203,7 +225,7 @@ class Kernel(Generic[Parameters, Returned]):
         try:
             compiled: Callable[..., Any] = numba.jit(**options)(function)
             compile_with(compiled, self.signature)
-            if self.signature is not None and not fast:
+            if self.typed and not fast:
                 # Its callers contain a call of it, and no copy of its code. They are compiled, or loaded, after it.
                 code = self.fingerprint() if directory is None else os.path.basename(directory)
                 call_by_symbol(compiled, f"simnav.{self.__qualname__}.{code}")
@@ -231,7 +253,7 @@ class Kernel(Generic[Parameters, Returned]):
     else:
 
         def __call__(self, *args: Any) -> Any:
-            if self.signature is None:  # a helper is compiled within its callers; alone it would be at the first call,
+            if not self.typed:  # a helper is compiled within its callers; alone it would be at the first call,
                 return self.function(*args)  # in every process anew, and a confined one cannot write what it compiles
             return (self._dispatcher or self.compile())(*args)
 
@@ -303,34 +325,77 @@ def ready(array: Array) -> Array:
     return np.array(array, dtype=np.float64, order="C")
 
 
+class _Decorator(Protocol):
+    """What makes a function a kernel."""
+
+    def __call__(self, function: Callable[Parameters, Returned], /) -> Kernel[Parameters, Returned]: ...
+
+
+@overload
+def kernel(function: Callable[Parameters, Returned], /) -> Kernel[Parameters, Returned]: ...
+
+
+@overload
+def kernel(*, fastmath: bool | set[str] = False, borrows: bool = False, passed: bool = False) -> _Decorator: ...
+
+
 def kernel(
-    signature: str | None = None, *, fastmath: bool | set[str] = False, borrows: bool = False
-) -> Callable[[Callable[Parameters, Returned]], Kernel[Parameters, Returned]]:
-    """Make a function a `Kernel`.
+    function: Callable[..., Any] | None = None,
+    *,
+    fastmath: bool | set[str] = False,
+    borrows: bool = False,
+    passed: bool = False,
+) -> Any:
+    """Make a function a `Kernel` that Python calls, for the types of its annotations (`simnav.kernel_types`).
 
     Parameters
     ----------
-    signature : str, optional
-        Numba signature (``"void(f8[:, ::1], f8)"``). Every kernel that Python calls has one, so that
-        `simnav warmup` can compile it in advance. Helpers that only kernels call need none.
+    function : callable
+        The function; None: the result is a decorator with the settings that follow.
     fastmath : bool or set of str
         Permitted changes of floating-point arithmetic; passed to Numba.
     borrows : bool
         True for a function that makes no array, and returns none but its arguments. Numba then counts no references to
-        arrays. For a short helper in a loop the count may take longer than the work.
+        arrays. For a short function in a loop the count may take longer than the work.
+    passed : bool
+        True for a function that is handed over to other kernels, as an argument or in a record.
     """
+    if function is None:
+        return partial(kernel, fastmath=fastmath, borrows=borrows, passed=passed)
+    return _kept(Kernel(function, True, fastmath, borrows, passed))
 
-    def wrap(function: Callable[Parameters, Returned]) -> Kernel[Parameters, Returned]:
-        k = Kernel(function, signature, fastmath, borrows)
-        _kernels.append(k)
-        return k
 
-    return wrap
+@overload
+def helper(function: Callable[Parameters, Returned], /) -> Kernel[Parameters, Returned]: ...
+
+
+@overload
+def helper(*, fastmath: bool | set[str] = False, borrows: bool = False) -> _Decorator: ...
+
+
+def helper(
+    function: Callable[..., Any] | None = None, *, fastmath: bool | set[str] = False, borrows: bool = False
+) -> Any:
+    """Make a function a `Kernel` that only other kernels call, for any types; it becomes a part of their code.
+
+    Parameters
+    ----------
+    function, fastmath, borrows
+        As of `kernel`.
+    """
+    if function is None:
+        return partial(helper, fastmath=fastmath, borrows=borrows)
+    return _kept(Kernel(function, False, fastmath, borrows))
+
+
+def _kept(made: Kernel[Parameters, Returned]) -> Kernel[Parameters, Returned]:
+    _kernels.append(made)
+    return made
 
 
 def kernels() -> list[Kernel[..., Any]]:
-    """All kernels with a signature in the modules that are imported at this time."""
-    return [k for k in _kernels if k.signature is not None]
+    """All kernels that Python calls in the modules that are imported at this time."""
+    return [k for k in _kernels if k.typed]
 
 
 def prune() -> int:

@@ -22,12 +22,12 @@ from math import cos, cosh, exp, inf, pi, sin, sinh, sqrt
 import numpy as np
 
 from simnav.blocks import StateBlock
-from simnav.compiled import Array, kernel
+from simnav.compiled import Array, helper
 
 __all__ = ["DeclaredProcess", "Factor", "oscillation"]
 
 
-@kernel()
+@helper
 def oscillation(elapsed: float, frequency: float, damping: float) -> tuple[float, float, float, float]:
     """Transition matrix [[a, b], [c, d]] of (x, x') of a second-order process, as (a, b, c, d).
 

@@ -15,7 +15,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from simnav.compiled import kernel
+from simnav.compiled import helper, kernel
 from simnav.geometry.earth import ECCENTRICITY_SQUARED, radii_scalar
 from simnav.geometry.rotation import (
     cross,
@@ -24,6 +24,7 @@ from simnav.geometry.rotation import (
     rotation_coefficients,
     small_rotation_coefficients,
 )
+from simnav.kernel_types import Matrix, Stack, Vector
 from simnav.strapdown import TWELFTH, Triple, local_rates, middle_latitude, per_north_scalar, rates_in_the_middle
 from simnav.types import Array, ImuSamples
 
@@ -67,7 +68,7 @@ COFACTORS, INVERSE = 48, 57
 SAMPLE_ROWS = 58
 
 
-@kernel(borrows=True)
+@helper(borrows=True)
 def _small_ratio(square: float) -> float:
     """asin(s) / s for s^2 = ``square`` below 1e-3, exact to rounding."""
     ratio: float = 1.0 + square * (
@@ -76,7 +77,7 @@ def _small_ratio(square: float) -> float:
     return ratio
 
 
-@kernel(borrows=True)
+@helper(borrows=True)
 def _ratio(square: float) -> float:
     """asin(s) / s for s^2 = ``square``. A sample turns by far less than a quarter turn."""
     if square < 1e-3:
@@ -85,7 +86,7 @@ def _ratio(square: float) -> float:
     return ratio
 
 
-@kernel(borrows=True)
+@helper(borrows=True)
 def _twice_sine(c: Nine, d: Nine, z: Triple, sz: float, bz: float) -> Triple:
     """Twice the sine of the angle times the axis of the body rotation exp(phi x) = C' exp(zeta x) D."""
     b00, b10, b20 = rotated(z[0], z[1], z[2], sz, bz, d[0], d[3], d[6])
@@ -99,13 +100,13 @@ def _twice_sine(c: Nine, d: Nine, z: Triple, sz: float, bz: float) -> Triple:
     )
 
 
-@kernel(borrows=True)
+@helper(borrows=True)
 def _square(x: Triple) -> float:
     square: float = x[0] * x[0] + x[1] * x[1] + x[2] * x[2]
     return square
 
 
-@kernel(borrows=True)
+@helper(borrows=True)
 def _solved(h: Triple, r: Triple) -> Triple:
     """The solution a of ``r = (I + [h x]) a``."""
     inverse = 1.0 / (1.0 + h[0] * h[0] + h[1] * h[1] + h[2] * h[2])
@@ -114,7 +115,7 @@ def _solved(h: Triple, r: Triple) -> Triple:
     return (r[0] - q0 + h[0] * dot) * inverse, (r[1] - q1 + h[1] * dot) * inverse, (r[2] - q2 + h[2] * dot) * inverse
 
 
-@kernel(borrows=True)
+@helper(borrows=True)
 def _velocity_change(
     c: Nine, v: Triple, w: Triple, z: Triple, earth: tuple[float, float], k: Triple, g: float, dt: float
 ) -> Triple:
@@ -132,7 +133,7 @@ def _velocity_change(
     )
 
 
-@kernel(borrows=True)
+@helper(borrows=True)
 def _cofactors(r: Triple, h: Triple, angle2: float, b: float, k: float) -> tuple[Nine, float]:
     """Cofactors and inverse of the determinant of I + b phi x + c (phi x)^2 + alpha' / 12 x, which is diagonally
     dominant; k is c.
@@ -153,7 +154,7 @@ def _cofactors(r: Triple, h: Triple, angle2: float, b: float, k: float) -> tuple
     return (x0, x1, x2, y0, y1, y2, t0, t1, t2), inverse
 
 
-@kernel(borrows=True)
+@helper(borrows=True)
 def _nu(change: Triple, nu: Triple, a: Triple, m: Nine, inverse: float) -> Triple:
     """The velocity increment, by Cramer's rule; ``nu`` is that of the interval before, ``a`` the angle increment."""
     t0, t1, t2 = cross(nu[0], nu[1], nu[2], a[0], a[1], a[2])
@@ -165,7 +166,7 @@ def _nu(change: Triple, nu: Triple, a: Triple, m: Nine, inverse: float) -> Tripl
     )
 
 
-@kernel(borrows=True)
+@helper(borrows=True)
 def sample_from_motion(
     latitude: float, height: float, v: Triple, w: Triple, c: Nine, d: Nine, memory: Array, dt: float
 ) -> tuple[float, ...]:
@@ -214,12 +215,12 @@ def sample_from_motion(
     )  # fmt: skip
 
 
-@kernel(borrows=True)
+@helper(borrows=True)
 def _three(block: Array, row: int, k: int) -> Triple:
     return block[row, k], block[row + 1, k], block[row + 2, k]
 
 
-@kernel(borrows=True)
+@helper(borrows=True)
 def _nine(block: Array, row: int, k: int) -> Nine:
     return (
         block[row, k], block[row + 1, k], block[row + 2, k], block[row + 3, k], block[row + 4, k], block[row + 5, k],
@@ -227,7 +228,7 @@ def _nine(block: Array, row: int, k: int) -> Nine:
     )  # fmt: skip
 
 
-@kernel(borrows=True)
+@helper(borrows=True)
 def _coefficients(block: Array, n: int) -> None:
     """The coefficients of n rotations by the squares of their angles, and (1 - sin(x)/x)/x^2 of each."""
     large = 0
@@ -245,7 +246,7 @@ def _coefficients(block: Array, n: int) -> None:
                 block[COEFFICIENTS + 2, k] = (1.0 - sa) / angle2
 
 
-@kernel(borrows=True)
+@helper(borrows=True)
 def _locate(block: Array, n: int) -> None:
     """Latitudes and heights at the ends of n intervals, and what follows from those in their middle.
 
@@ -289,7 +290,7 @@ def _locate(block: Array, n: int) -> None:
             break
 
 
-@kernel(borrows=True)
+@helper(borrows=True)
 def ideal_samples(block: Array, n: int, memory: Array, rate: Array, force: Array) -> None:
     """The samples of ideal instruments over n intervals: `sample_from_motion` for a block.
 
@@ -373,9 +374,15 @@ def ideal_samples(block: Array, n: int, memory: Array, rate: Array, force: Array
     memory[3], memory[4], memory[5] = nu
 
 
-@kernel("void(f8[::1], f8[:, ::1], f8[:, :, ::1], f8[::1], f8[:, ::1], f8[:, ::1], f8[:, ::1])")
+@kernel
 def _increments(
-    time: Array, velocity: Array, dcm: Array, memory: Array, position: Array, angular_rate: Array, specific_force: Array
+    time: Vector,
+    velocity: Matrix,
+    dcm: Stack,
+    memory: Vector,
+    position: Matrix,
+    angular_rate: Matrix,
+    specific_force: Matrix,
 ) -> None:
     """The samples of ideal instruments between k + 1 states; see `increments`.
 

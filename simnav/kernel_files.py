@@ -15,17 +15,18 @@ import hashlib
 import io
 import os
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, BinaryIO
 
 from llvmlite import binding
-from numba.core import base, imputils, typeinfer
+from numba.core import base, imputils, typeinfer, types
 from numba.core import config as numba_config
 from numba.core.caching import FunctionCache, IndexDataCacheFile
 from numba.core.runtime.nrt import rtsys
+from numba.experimental import structref
 
-__all__ = ["WithDigests", "call_by_symbol", "compile_with"]
+__all__ = ["WithDigests", "call_by_symbol", "compile_with", "record_type"]
 
 _DIGEST = hashlib.sha256().digest_size
 
@@ -34,6 +35,8 @@ _Files: Any = IndexDataCacheFile  # Numba has no annotations
 _Cache: Any = FunctionCache
 _user_function: Any = imputils.user_function
 _Overloads: Any = base.OverloadSelector
+_Reference: Any = types.StructRef
+structures: Any = structref
 config: Any = numba_config
 
 
@@ -147,3 +150,32 @@ def call_by_symbol(dispatcher: Any, symbol: str) -> None:
     calls = _Overloads()
     calls.append(call, call.signature)
     dispatcher.targetctx._defns[result.entry_point] = calls  # Numba has no public way to do this
+
+
+@structures.register
+class RecordType(_Reference):  # type: ignore[misc]
+    """The type of a reference to a record (`simnav.records.Record`), with a short name."""
+
+    def __init__(self, name: str, fields: Any):
+        super().__init__(fields)
+        described = " ".join(f"{field}: {kind}" for field, kind in self._fields)
+        self.name = f"{name}<{hashlib.blake2b(described.encode(), digest_size=6).hexdigest()}>"
+
+
+class _Structure:
+    """What compiled code returns for a record: the owner of its structure."""
+
+    def __init__(self, meminfo: Any):
+        self._meminfo = meminfo
+
+    @classmethod
+    def _numba_box_(cls, _: Any, meminfo: Any) -> _Structure:
+        return cls(meminfo)
+
+
+structures.define_boxing(RecordType, _Structure)
+
+
+def record_type(name: str, fields: Mapping[str, Any]) -> Any:
+    """The type of a record with fields of these types of Numba."""
+    return RecordType(name, list(fields.items()))

@@ -21,10 +21,11 @@ from numpy.typing import NDArray
 
 from simnav.array_units import in_arrays
 from simnav.blocks import StateBlock
-from simnav.compiled import Array, kernel
+from simnav.compiled import Array, helper, kernel
 from simnav.declared_process import DeclaredProcess
 from simnav.geometry.earth import displace_scalar, relative_position
 from simnav.geometry.rotation import wrap_angle, wrap_scalar
+from simnav.kernel_types import Matrix
 from simnav.plugins import PluginError, Registry
 from simnav.timing import TimingSheet
 
@@ -154,7 +155,7 @@ class NavigationPoints(NamedTuple):
     side: Array
 
 
-@kernel()
+@helper
 def add_error_scalar(positions: int, cyclic: int, value: Array, error: Array) -> None:
     """Add an error to one measurement, in place. This is the compiled form of `Kind.add_error`.
 
@@ -179,8 +180,8 @@ def add_error_scalar(positions: int, cyclic: int, value: Array, error: Array) ->
             value[i] = wrap_scalar(value[i])
 
 
-@kernel("void(i8, i8, f8[:, ::1], f8[:, ::1])")
-def _add_errors(positions: int, cyclic: int, values: Array, errors: Array) -> None:
+@kernel
+def _add_errors(positions: int, cyclic: int, values: Matrix, errors: Matrix) -> None:
     """Apply `add_error_scalar` to each of n measurements."""
     for i in range(values.shape[0]):
         add_error_scalar(positions, cyclic, values[i], errors[i])

@@ -9,11 +9,13 @@ from __future__ import annotations
 
 from functools import lru_cache
 from math import exp, log1p
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 
-from simnav.compiled import Array, kernel
+from simnav.compiled import Array, helper, kernel
+from simnav.kernel_types import Matrix, Vector
 
 __all__ = ["NormalVariates"]
 
@@ -26,7 +28,7 @@ _TAIL, _PER_TAIL = 3.6541528853610087963519472518, 0.273661237329758272033382475
 _ONE, _UNIT = np.uint64(1), 1.0 / 9007199254740992.0
 
 
-@kernel(borrows=True)
+@helper(borrows=True)
 def _next(state: _State) -> tuple[np.uint64, _State]:
     """The next 64 random bits, and the state after them."""
     a, b, c, counter = state
@@ -35,13 +37,13 @@ def _next(state: _State) -> tuple[np.uint64, _State]:
     return bits, (b ^ (b >> np.uint64(11)), c + (c << np.uint64(3)), turned + bits, counter + _ONE)
 
 
-@kernel(borrows=True)
+@helper(borrows=True)
 def _unit(bits: np.uint64) -> float:
     """Random bits as a number in [0, 1)."""
     return np.int64(bits >> np.uint64(11)) * _UNIT
 
 
-@kernel(borrows=True)
+@helper(borrows=True)
 def _variate(state: _State, least: Words, width: Array, density: Array) -> tuple[float, _State]:
     """The next variate, and the state after it. The tables are those of `_fill`."""
     while True:
@@ -70,8 +72,14 @@ def _variate(state: _State, least: Words, width: Array, density: Array) -> tuple
             return x, state
 
 
-@kernel("void(u8[::1], f8[:, ::1], u8[::1], f8[::1], f8[::1])", borrows=True)
-def _fill(words: Words, out: Array, least: Words, width: Array, density: Array) -> None:
+@kernel(borrows=True)
+def _fill(
+    words: Annotated[NDArray[np.uint64], "uint64[::1]"],
+    out: Matrix,
+    least: Annotated[NDArray[np.uint64], "uint64[::1]"],
+    width: Vector,
+    density: Vector,
+) -> None:
     """Fill an array with standard normal variates.
 
     Parameters

@@ -34,7 +34,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from simnav.compiled import kernel
+from simnav.compiled import helper, kernel
 from simnav.geometry.earth import ROTATION_RATE, SEMI_MAJOR_AXIS, gravity_scalar, radii_scalar
 from simnav.geometry.rotation import (
     cross,
@@ -44,6 +44,7 @@ from simnav.geometry.rotation import (
     rotation_coefficients,
     rpy_from_dcm,
 )
+from simnav.kernel_types import Matrix, Stack, Vector
 from simnav.types import Array, ImuSamples, NavigationStates
 
 #: Divisions by constants are products here: the compiler may not turn one into the other by itself.
@@ -62,20 +63,20 @@ __all__ = [
 ]
 
 
-@kernel()
+@helper
 def middle_latitude(latitude: float, vm0: float, dt: float) -> float:
     """Latitude in the middle of an interval [rad], as of `local_rates`."""
     return latitude + 0.5 * dt * vm0 * (1.0 / SEMI_MAJOR_AXIS)
 
 
-@kernel()
+@helper
 def per_north_scalar(s: float, hm: float) -> tuple[float, float]:
     """d(latitude)/d(north) [rad/m] and prime-vertical radius [m] at a sine of latitude and a height."""
     meridian, prime_vertical = radii_scalar(s)
     return 1.0 / (meridian + hm), prime_vertical
 
 
-@kernel()
+@helper
 def rates_in_the_middle(
     s: float, c: float, hm: float, prime_vertical: float, per_north: float, vm0: float, vm1: float
 ) -> tuple[float, float, float, float, float, float, float]:
@@ -97,7 +98,7 @@ def rates_in_the_middle(
     )
 
 
-@kernel()
+@helper
 def local_rates(latitude: float, height: float, vm0: float, vm1: float, vm2: float, dt: float) -> tuple[float, ...]:
     """Earth rate, transport rate, gravity and radii at the middle of an interval.
 
@@ -127,7 +128,7 @@ def local_rates(latitude: float, height: float, vm0: float, vm1: float, vm2: flo
 Triple: TypeAlias = tuple[float, float, float]
 
 
-@kernel()
+@helper
 def mechanize_step(
     position: Array, velocity: Array, dcm: Array, memory: Array, rate: Triple, force: Triple, dt: float
 ) -> None:
@@ -191,11 +192,16 @@ def mechanize_step(
     rotate_left(dcm, z0, z1, z2, -sz, bz, dcm)  # the other way round: exp(-zeta x)
 
 
-@kernel("void(f8[::1], f8[::1], f8[:, ::1], f8[::1], f8[:, ::1], f8[:, ::1], f8[::1])")
+@kernel
 def mechanize(
-    position: Array, velocity: Array, dcm: Array, memory: Array, angular_rate: Array, specific_force: Array,
-    interval: Array,
-) -> None:  # fmt: skip
+    position: Vector,
+    velocity: Vector,
+    dcm: Matrix,
+    memory: Vector,
+    angular_rate: Matrix,
+    specific_force: Matrix,
+    interval: Vector,
+) -> None:
     """Integrate n IMU samples, in place.
 
     Parameters
@@ -220,11 +226,18 @@ def mechanize(
         )  # fmt: skip
 
 
-@kernel("void(f8[::1], f8[::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[::1], f8[:, ::1], f8[:, ::1], f8[:, :, ::1])")
+@kernel
 def _integrate(
-    position: Array, velocity: Array, dcm: Array, angular_rate: Array, specific_force: Array, interval: Array,
-    positions: Array, velocities: Array, dcms: Array,
-) -> None:  # fmt: skip
+    position: Vector,
+    velocity: Vector,
+    dcm: Matrix,
+    angular_rate: Matrix,
+    specific_force: Matrix,
+    interval: Vector,
+    positions: Matrix,
+    velocities: Matrix,
+    dcms: Stack,
+) -> None:
     """Integrate k samples and store the state after each of them.
 
     Parameters

@@ -12,13 +12,13 @@ from typing import TypeAlias
 
 import numpy as np
 
-from simnav.compiled import kernel
+from simnav.compiled import helper, kernel
 from simnav.estimators.algebra.inflation import inflate_motion
 from simnav.estimators.algebra.mixture import mixture_update
-from simnav.estimators.models.base import INNOVATION, NIS, REJECTED, REPORT, RESULTS, SIGMA, SIZE, AidTable, StepRule
-from simnav.estimators.models.inertial_step import STEP, Matrices, Measured, Others
+from simnav.estimators.models.base import INNOVATION, NIS, REJECTED, REPORT, RESULTS, SIGMA, SIZE, StepRule
 from simnav.estimators.models.inertial_update import absorb_inertial, assimilate_inertial, innovate_inertial
-from simnav.estimators.models.propagation import Moving, Samples, correct_inertial, propagate_inertial
+from simnav.estimators.models.propagation import correct_inertial, propagate_inertial
+from simnav.kernel_types import FlagMatrix, IntegerMatrix, IntegerVector, Matrix, Vector
 from simnav.types import Array, Flags, Integers
 
 from .adkf import adkf_noise
@@ -65,7 +65,7 @@ Rule: TypeAlias = tuple[int, int, Integers, Array, Array, Array, Array, Integers
 Test: TypeAlias = tuple[bool, Array, tuple[Integers, Array, Flags], Array, Array]
 
 
-@kernel()
+@helper
 def _choose(
     row: int, rule: Rule, time: float, innovation: Array, predicted: Array, nominal: Array, used: Array
 ) -> float:
@@ -105,14 +105,21 @@ def _choose(
     return fading_noise(own, memory, shared, innovation, predicted, nominal, used)
 
 
-@kernel(
-    f"i8({STEP}, Tuple((Tuple((i8, i8, i8[:, ::1], f8[:, ::1], f8[::1], f8[:, ::1], f8[::1], i8[::1], f8[::1])), "
-    "Tuple((b1, f8[::1], Tuple((i8[:, ::1], f8[::1], b1[:, ::1])), f8[:, ::1], f8[::1])))))"
-)
+@kernel
 def adapt_inertial(
-    state: Moving, samples: Samples, start: int, until: float, noise: Array, matrices: Matrices, others: Others,
-    packet: tuple[AidTable, Measured], choice: tuple[Rule, Test],
-) -> int:  # fmt: skip
+    state: tuple[Vector, Vector, Matrix, Vector, Vector, Vector, Vector],
+    samples: tuple[Vector, Vector, Matrix, Matrix],
+    start: int,
+    until: float,
+    noise: Vector,
+    matrices: tuple[Matrix, Matrix, Matrix],
+    others: tuple[Vector, Vector, Vector, Vector],
+    packet: tuple[tuple[IntegerMatrix, Matrix, Matrix], tuple[IntegerVector, Vector, Matrix, Matrix]],
+    choice: tuple[
+        tuple[int, int, IntegerMatrix, Matrix, Vector, Matrix, Vector, IntegerVector, Vector],
+        tuple[bool, Vector, tuple[IntegerMatrix, Vector, FlagMatrix], Matrix, Vector],
+    ],
+) -> int:
     """Do what `simnav.estimators.models.inertial_step.filter_inertial` does, with a noise that a rule chooses.
 
     Parameters
@@ -231,9 +238,13 @@ def step_rule(adaptation: NoiseAdaptation, names: Sequence[str], variances: Arra
 
 
 def mixture_rule(
-    levels: Array, transition: Array, probability: Array, names: Sequence[str], prediction: PredictionTest,
+    levels: Array,
+    transition: Array,
+    probability: Array,
+    names: Sequence[str],
+    prediction: PredictionTest,
     variances: Array,
-) -> StepRule:  # fmt: skip
+) -> StepRule:
     """The rule of a mixture of noise levels (`simnav.estimators.algebra.mixture.mixture_update`).
 
     Parameters

@@ -8,12 +8,13 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from simnav.compiled import kernel
+from simnav.compiled import helper, kernel
 from simnav.estimators.algebra.direct_update import normalised_square
+from simnav.kernel_types import Matrix, Vector
 from simnav.types import Array, Instruments
 
 from .base import Innovation
-from .noise import RULE, NoiseAdaptation, Posterior, copied
+from .noise import NoiseAdaptation, Posterior, copied
 from .robust import igg3
 
 __all__ = ["FACTORS", "AdaptiveFactor", "adkf_noise", "exponential", "three_segment", "two_segment"]
@@ -22,7 +23,7 @@ Statistic = Literal["discrepancy", "residual", "ratio"]
 Factor = Literal["two-segment", "three-segment", "exponential"]
 
 
-@kernel()
+@helper
 def two_segment(s: float, c0: float, c1: float = 0.0) -> float:
     """Eq. 34: 1 up to c0, then ``c0/s``; continuous.
 
@@ -34,13 +35,13 @@ def two_segment(s: float, c0: float, c1: float = 0.0) -> float:
     return 1.0 if s <= c0 else c0 / s
 
 
-@kernel()
+@helper
 def three_segment(s: float, c0: float, c1: float, two: float = 2.0) -> float:
     """Eq. 35, the same function as IGG-III: 1 up to c0, decreasing to 0 at c1; continuous."""
     return igg3(s, c0, c1, two)
 
 
-@kernel()
+@helper
 def exponential(s: float, c0: float, c1: float = 0.0, two: float = 2.0) -> float:
     """Eq. 36: 1 up to c0, then ``exp(-(s - c0)^2)``; continuous. The exponent is an argument as in `igg3`."""
     return 1.0 if s <= c0 else exp(-min((s - c0) ** two, 700.0))
@@ -54,8 +55,8 @@ FACTORS: Mapping[str, Callable[[float, float, float], float]] = {
 }
 
 
-@kernel("f8(f8[::1], f8[:, ::1], f8[:, ::1])")
-def _printed_residual(residual: Array, predicted: Array, noise: Array) -> float:
+@kernel
+def _printed_residual(residual: Vector, predicted: Matrix, noise: Matrix) -> float:
     """Eq. 31: v'v / sqrt(tr S)."""
     square, trace = 0.0, 0.0
     for i in range(residual.size):
@@ -69,9 +70,15 @@ def _printed_residual(residual: Array, predicted: Array, noise: Array) -> float:
 PRINTED, FUNCTION, C0, C1, TWO, SMALLEST = range(6)
 
 
-@kernel(RULE)
+@kernel
 def adkf_noise(
-    settings: Array, memory: Array, shared: Array, innovation: Array, predicted: Array, nominal: Array, noise: Array
+    settings: Vector,
+    memory: Vector,
+    shared: Vector,
+    innovation: Vector,
+    predicted: Matrix,
+    nominal: Matrix,
+    noise: Matrix,
 ) -> float:
     """Divide the nominal noise by the factor of the residual statistic (`AdaptiveFactor`).
 

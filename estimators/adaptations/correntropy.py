@@ -9,19 +9,26 @@ import numpy as np
 
 from simnav.compiled import kernel
 from simnav.estimators.algebra.direct_update import posterior
+from simnav.kernel_types import Matrix, Vector
 from simnav.types import Array
 
 from .base import Innovation
-from .noise import RULE, WeightedNoise
+from .noise import WeightedNoise
 
 __all__ = ["MaximumCorrentropy", "correntropy_noise", "correntropy_rule"]
 
 
-@kernel("f8(f8[::1], f8[:, ::1], f8[:, ::1], f8, f8, i8, b1, f8[:, ::1])")
+@kernel
 def correntropy_noise(
-    innovation: Array, predicted: Array, nominal: Array, bandwidth: float, smallest: float, iterations: int,
-    from_update: bool, noise: Array,
-) -> float:  # fmt: skip
+    innovation: Vector,
+    predicted: Matrix,
+    nominal: Matrix,
+    bandwidth: float,
+    smallest: float,
+    iterations: int,
+    from_update: bool,
+    noise: Matrix,
+) -> float:
     """The fixed-point iteration (see `MaximumCorrentropy`).
 
     Parameters
@@ -65,9 +72,15 @@ def correntropy_noise(
     return least
 
 
-@kernel(RULE)
+@kernel
 def correntropy_rule(
-    settings: Array, memory: Array, shared: Array, innovation: Array, predicted: Array, nominal: Array, noise: Array
+    settings: Vector,
+    memory: Vector,
+    shared: Vector,
+    innovation: Vector,
+    predicted: Matrix,
+    nominal: Matrix,
+    noise: Matrix,
 ) -> float:
     """Call `correntropy_noise`; settings: bandwidth, smallest weight, iterations, whether it begins with the update."""
     return correntropy_noise(

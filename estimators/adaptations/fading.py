@@ -7,17 +7,24 @@ from math import exp, isnan
 import numpy as np
 
 from simnav.compiled import kernel
+from simnav.kernel_types import Matrix, Vector
 from simnav.types import Array
 
 from .base import Innovation
-from .noise import INFLATION, OWN, RULE, TIME, NoiseAdaptation, copied
+from .noise import INFLATION, OWN, TIME, NoiseAdaptation, copied
 
 __all__ = ["FadingMemory", "fading_noise"]
 
 
-@kernel(RULE)
+@kernel
 def fading_noise(
-    settings: Array, memory: Array, shared: Array, innovation: Array, predicted: Array, nominal: Array, noise: Array
+    settings: Vector,
+    memory: Vector,
+    shared: Vector,
+    innovation: Vector,
+    predicted: Matrix,
+    nominal: Matrix,
+    noise: Matrix,
 ) -> float:
     """Inflate P by the time since the last measurement (`FadingMemory`); the noise is the nominal one; 0."""
     copied(nominal, noise)

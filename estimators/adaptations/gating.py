@@ -10,10 +10,11 @@ from simnav.compiled import kernel
 from simnav.estimators.algebra.chi_square import chi_square_limits
 from simnav.estimators.algebra.direct_update import normalised_square
 from simnav.estimators.models.channels import ChannelDatasheet
+from simnav.kernel_types import Matrix, Vector
 from simnav.types import Array, Instruments, Measurement
 
 from .base import Innovation
-from .noise import REJECT, RULE, TIME, NoiseAdaptation, copied
+from .noise import REJECT, TIME, NoiseAdaptation, copied
 
 __all__ = ["ChiSquareGate", "gate_noise"]
 
@@ -23,9 +24,15 @@ PATIENCE, LIMITS = range(2)
 HEARD, FAILING = range(2)
 
 
-@kernel(RULE)
+@kernel
 def gate_noise(
-    settings: Array, memory: Array, shared: Array, innovation: Array, predicted: Array, nominal: Array, noise: Array
+    settings: Vector,
+    memory: Vector,
+    shared: Vector,
+    innovation: Vector,
+    predicted: Matrix,
+    nominal: Matrix,
+    noise: Matrix,
 ) -> float:
     """Make the test of `ChiSquareGate`, without the witnesses among channels; 1 if it fails, else 0."""
     copied(nominal, noise)

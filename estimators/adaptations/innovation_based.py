@@ -7,17 +7,18 @@ from typing import Literal
 
 import numpy as np
 
-from simnav.compiled import kernel
+from simnav.compiled import helper, kernel
 from simnav.estimators.algebra.direct_update import posterior
+from simnav.kernel_types import Matrix, Vector
 from simnav.types import Array
 
 from .base import Innovation
-from .noise import RULE, EstimatedNoise, Scope, bound, copied
+from .noise import EstimatedNoise, Scope, bound, copied
 
 __all__ = ["FixedWindow", "InnovationBased", "adaptive_window", "innovation_noise"]
 
 
-@kernel("i8(f8, f8, f8, f8, i8, i8)")
+@kernel
 def adaptive_window(variance: float, nominal: float, low: float, high: float, shortest: int, longest: int) -> int:
     """Length of the window after Mao, Wang and Fu (2025), eq. 20: the more the innovations scatter, the longer.
 
@@ -38,8 +39,8 @@ def adaptive_window(variance: float, nominal: float, low: float, high: float, sh
 
 
 #: Columns of a row of a window: v; then, each (m, m), v v', e e', and H P H' or minus H P+ H'.
-@kernel("void(f8[:, ::1], i8, f8[::1], f8[::1], f8, f8[:, ::1])")
-def _push(rows: Array, count: int, innovation: Array, residual: Array, sign: float, predicted: Array) -> None:
+@kernel
+def _push(rows: Matrix, count: int, innovation: Vector, residual: Vector, sign: float, predicted: Matrix) -> None:
     """Overwrite the oldest row with that of the present epoch."""
     m, row = innovation.size, rows[count % rows.shape[0]]
     at = m
@@ -52,7 +53,7 @@ def _push(rows: Array, count: int, innovation: Array, residual: Array, sign: flo
             at += 1
 
 
-@kernel()
+@helper
 def _sums(rows: Array, count: int, n: int, sums: Array) -> None:
     """Overwrite with the sums of all columns over the last n of ``count`` rows."""
     ring, columns = rows.shape
@@ -65,11 +66,17 @@ def _sums(rows: Array, count: int, n: int, sums: Array) -> None:
         r = r + 1 if r + 1 < ring else 0
 
 
-@kernel("i8(f8[:, ::1], i8, f8[:, ::1], f8[:, ::1], Tuple((i8, i8, f8, f8)), b1, f8, f8[:, ::1])")
+@kernel
 def _average(
-    rows: Array, count: int, predicted: Array, nominal: Array, window: tuple[int, int, float, float], newest: bool,
-    forgetting: float, estimate: Array,
-) -> int:  # fmt: skip
+    rows: Matrix,
+    count: int,
+    predicted: Matrix,
+    nominal: Matrix,
+    window: tuple[int, int, float, float],
+    newest: bool,
+    forgetting: float,
+    estimate: Matrix,
+) -> int:
     """Noise from the last innovations (eqs. 16-20).
 
     Parameters
@@ -139,15 +146,15 @@ SHORTEST, LONGEST, LOW, HIGH, FORGETTING, NEWEST, RESIDUAL, FULL, LOWEST, HIGHES
 COUNT, BEGUN, ESTIMATE, ROWS = 0, 1, 2, 11
 
 
-@kernel()
+@helper
 def _rows(settings: Array, memory: Array, m: int) -> Array:
     """The ring buffer in the memory."""
     count, width = int(settings[LONGEST]), m + 3 * m * m
     return memory[ROWS : ROWS + count * width].reshape((count, width))
 
 
-@kernel("void(f8[::1], f8[::1], f8[::1], f8[:, ::1], f8[:, ::1])")
-def _remember(settings: Array, memory: Array, innovation: Array, predicted: Array, noise: Array) -> None:
+@kernel
+def _remember(settings: Vector, memory: Vector, innovation: Vector, predicted: Matrix, noise: Matrix) -> None:
     """Store the residual after an update with the noise."""
     m = innovation.size
     residual, after = np.empty(m), np.empty((m, m))
@@ -156,7 +163,7 @@ def _remember(settings: Array, memory: Array, innovation: Array, predicted: Arra
     memory[COUNT] += 1.0
 
 
-@kernel()
+@helper
 def _contradicted(settings: Array, place: int, estimate: Array, nominal: Array, predicted: Array) -> bool:
     """Whether the innovations contradict the nominal noise in a component, by the limits from a place on."""
     low, high = settings[place], settings[place + 1]
@@ -169,9 +176,15 @@ def _contradicted(settings: Array, place: int, estimate: Array, nominal: Array, 
     return False
 
 
-@kernel(RULE)
+@kernel
 def innovation_noise(
-    settings: Array, memory: Array, shared: Array, innovation: Array, predicted: Array, nominal: Array, noise: Array
+    settings: Vector,
+    memory: Vector,
+    shared: Vector,
+    innovation: Vector,
+    predicted: Matrix,
+    nominal: Matrix,
+    noise: Matrix,
 ) -> float:
     """Estimate the noise (`InnovationBased`), and write it into ``noise`` within its bounds, or the nominal one.
 

@@ -9,9 +9,10 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from simnav.compiled import Kernel, kernel
+from simnav.compiled import Kernel, helper, kernel
 from simnav.estimators.algebra.direct_update import posterior
 from simnav.estimators.models.base import SIGMA, SIZE
+from simnav.kernel_types import Matrix
 from simnav.types import KINDS, Array, Instruments
 
 from .base import Adaptation, Innovation
@@ -33,8 +34,8 @@ TIME, INFLATION, REJECT, OWN = range(4)
 Scope = Literal["fixes", "all"]
 
 
-@kernel("void(f8[:, ::1], f8, f8, f8, f8[:, ::1])")
-def scale(noise: Array, f0: float, f1: float, f2: float, product: Array) -> None:
+@kernel
+def scale(noise: Matrix, f0: float, f1: float, f2: float, product: Matrix) -> None:
     r0, r1, r2 = sqrt(f0), sqrt(f1), sqrt(f2)
     for i in range(noise.shape[0]):
         a = r0 if i == 0 else r1 if i == 1 else r2
@@ -42,8 +43,8 @@ def scale(noise: Array, f0: float, f1: float, f2: float, product: Array) -> None
             product[i, j] = noise[i, j] * a * (r0 if j == 0 else r1 if j == 1 else r2)
 
 
-@kernel("void(f8[:, ::1], f8[:, ::1], f8, f8, f8[:, ::1])")
-def bound(estimate: Array, nominal: Array, low: float, high: float, bounded: Array) -> None:
+@kernel
+def bound(estimate: Matrix, nominal: Matrix, low: float, high: float, bounded: Matrix) -> None:
     for i in range(nominal.shape[0]):
         bounded[i, i] = sqrt(min(max(estimate[i, i] / nominal[i, i], low), high))
     for i in range(nominal.shape[0]):
@@ -53,7 +54,7 @@ def bound(estimate: Array, nominal: Array, low: float, high: float, bounded: Arr
         bounded[i, i] *= nominal[i, i] * bounded[i, i]
 
 
-@kernel()
+@helper
 def copied(noise: Array, used: Array) -> None:
     """Copy an (m, m) array into another; a slice would take seconds to compile."""
     for i in range(noise.shape[0]):
@@ -61,8 +62,8 @@ def copied(noise: Array, used: Array) -> None:
             used[i, j] = noise[i, j]
 
 
-@kernel("UniTuple(f8, 3)(f8[:, ::1])")
-def _sigmas(noise: Array) -> tuple[float, float, float]:
+@kernel
+def _sigmas(noise: Matrix) -> tuple[float, float, float]:
     m = noise.shape[0]
     return sqrt(noise[0, 0]), sqrt(noise[1, 1]) if m > 1 else 0.0, sqrt(noise[2, 2]) if m > 2 else 0.0
 

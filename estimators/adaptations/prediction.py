@@ -6,10 +6,11 @@ from math import sqrt
 
 import numpy as np
 
-from simnav.compiled import kernel
+from simnav.compiled import helper, kernel
 from simnav.estimators.algebra.chi_square import chi_square_limits, normal_quantile
 from simnav.estimators.models.roles import fixes_and_logs, witnesses
 from simnav.estimators.persistence import COURSE, TIME, add_innovation, begun, is_correlated, is_directed, is_large
+from simnav.kernel_types import FlagMatrix, IntegerMatrix, Matrix, Vector
 from simnav.types import Array, Flags, Instruments, Integers
 
 from .base import Innovation
@@ -20,8 +21,8 @@ __all__ = [
 ]  # fmt: skip
 
 
-@kernel("UniTuple(f8, 3)(f8[::1], f8[:, ::1], f8[:, ::1])")
-def standardised(residual: Array, predicted: Array, noise: Array) -> tuple[float, float, float]:
+@kernel
+def standardised(residual: Vector, predicted: Matrix, noise: Matrix) -> tuple[float, float, float]:
     """The components of an innovation, each divided by its sigma in ``H P H' + R``, with zeros up to three."""
     m = residual.size
     u0 = residual[0] / sqrt(predicted[0, 0] + noise[0, 0])
@@ -46,7 +47,7 @@ LARGEST, TOTAL = 100.0, 1e8
 IS_WRONG, IS_DISTURBED, HAS_PASSED = 1, 2, 4
 
 
-@kernel()
+@helper
 def _fails_jointly(
     i: int, time: float, square: float, limit: float, settings: Array, sort: Integers, memory: Array
 ) -> int:
@@ -67,7 +68,7 @@ def _fails_jointly(
     return 0
 
 
-@kernel()
+@helper
 def _persists(
     i: int, time: float, settings: Array, sort: Integers, recent: Array, witness: Flags, memory: Array
 ) -> bool:
@@ -90,11 +91,17 @@ def _persists(
     return True
 
 
-@kernel("i8(f8[::1], f8[:, ::1], f8[:, ::1], i8, f8, f8[::1], Tuple((i8[:, ::1], f8[::1], b1[:, ::1])), f8[:, ::1])")
+@kernel
 def judge_prediction(
-    residual: Array, predicted: Array, noise: Array, i: int, time: float, settings: Array,
-    known: tuple[Integers, Array, Flags], memory: Array,
-) -> int:  # fmt: skip
+    residual: Vector,
+    predicted: Matrix,
+    noise: Matrix,
+    i: int,
+    time: float,
+    settings: Vector,
+    known: tuple[IntegerMatrix, Vector, FlagMatrix],
+    memory: Matrix,
+) -> int:
     """Make the tests of `PredictionTest` for an innovation of m components.
 
     Parameters
@@ -137,8 +144,8 @@ def judge_prediction(
     return found + IS_WRONG if wrong else found
 
 
-@kernel("f8(f8, f8[:, ::1], f8[::1])")
-def limited_inflation(inflation: float, covariance: Array, kept: Array) -> float:
+@kernel
+def limited_inflation(inflation: float, covariance: Matrix, kept: Vector) -> float:
     """Limit an inflation of P (`PredictionTest.limited`)."""
     if inflation <= 1.0:
         return 1.0
@@ -152,9 +159,9 @@ def limited_inflation(inflation: float, covariance: Array, kept: Array) -> float
     return max(1.0, min(inflation, LARGEST, TOTAL / grown))
 
 
-@kernel("f8(f8[::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[::1], f8[::1])")
+@kernel
 def joint_inflation(
-    residual: Array, predicted: Array, noise: Array, covariance: Array, settings: Array, kept: Array
+    residual: Vector, predicted: Matrix, noise: Matrix, covariance: Matrix, settings: Vector, kept: Vector
 ) -> float:
     """Count a failure of the prediction, and return the factor on the variances (`PredictionTest.inflation`)."""
     kept[BLAMED] += 1.0

@@ -5,17 +5,18 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import partial
 
-from simnav.compiled import kernel
+from simnav.compiled import helper, kernel
+from simnav.kernel_types import Matrix, Vector
 from simnav.types import Array
 
 from .base import Innovation
-from .noise import RULE, WeightedNoise, copied, scale, scaled
+from .noise import WeightedNoise, copied, scale, scaled
 from .prediction import standardised
 
 __all__ = ["EquivalentWeights", "HuberWeights", "Igg3Weights", "huber", "huber_noise", "igg3", "igg3_noise"]
 
 
-@kernel()
+@helper
 def huber(u: float, k: float = 1.345) -> float:
     """Huber's weight: 1 up to k, then ``k/|u|`` (Huber 1964); continuous.
 
@@ -28,7 +29,7 @@ def huber(u: float, k: float = 1.345) -> float:
     return 1.0 if u <= k else k / u
 
 
-@kernel()
+@helper
 def igg3(u: float, k0: float = 2.5, k1: float = 8.0, two: float = 2.0) -> float:
     """IGG-III weight: 1 up to k0, ``k0/|u| ((k1 - |u|)/(k1 - k0))^2`` up to k1, then 0 (Yang 1999); continuous.
 
@@ -53,7 +54,7 @@ def _with_igg3(k0: float, k1: float, u: float) -> float:
     return igg3(u, k0, k1)
 
 
-@kernel()
+@helper
 def _weigh(w0: float, w1: float, w2: float, smallest: float, nominal: Array, noise: Array) -> float:
     """Divide a noise by the weights of up to three components; the least, which is the weight of the largest one."""
     least = max(min(w0, w1, w2), smallest)
@@ -64,9 +65,15 @@ def _weigh(w0: float, w1: float, w2: float, smallest: float, nominal: Array, noi
     return least
 
 
-@kernel(RULE)
+@kernel
 def huber_noise(
-    settings: Array, memory: Array, shared: Array, innovation: Array, predicted: Array, nominal: Array, noise: Array
+    settings: Vector,
+    memory: Vector,
+    shared: Vector,
+    innovation: Vector,
+    predicted: Matrix,
+    nominal: Matrix,
+    noise: Matrix,
 ) -> float:
     """Divide the nominal noise by Huber's weights; the least. The settings are k and the smallest weight."""
     u0, u1, u2 = standardised(innovation, predicted, nominal)
@@ -74,9 +81,15 @@ def huber_noise(
     return _weigh(huber(u0, k), huber(u1, k), huber(u2, k), settings[1], nominal, noise)
 
 
-@kernel(RULE)
+@kernel
 def igg3_noise(
-    settings: Array, memory: Array, shared: Array, innovation: Array, predicted: Array, nominal: Array, noise: Array
+    settings: Vector,
+    memory: Vector,
+    shared: Vector,
+    innovation: Vector,
+    predicted: Matrix,
+    nominal: Matrix,
+    noise: Matrix,
 ) -> float:
     """Divide the nominal noise by IGG-III weights; the least. The settings are k0, k1, 2 and the smallest weight."""
     u0, u1, u2 = standardised(innovation, predicted, nominal)

@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from simnav.compiled import kernel
+from simnav.kernel_types import Matrix, Vector
 from simnav.types import Array
 
 from .base import Innovation
-from .noise import RULE, EstimatedNoise, Scope, bound, copied
+from .noise import EstimatedNoise, Scope, bound, copied
 
 __all__ = ["SageHusa", "sage_husa_noise"]
 
@@ -19,9 +20,15 @@ FADING, LOWEST, HIGHEST = range(3)
 COUNT, BEGUN, ESTIMATE = range(3)
 
 
-@kernel(RULE)
+@kernel
 def sage_husa_noise(
-    settings: Array, memory: Array, shared: Array, innovation: Array, predicted: Array, nominal: Array, noise: Array
+    settings: Vector,
+    memory: Vector,
+    shared: Vector,
+    innovation: Vector,
+    predicted: Matrix,
+    nominal: Matrix,
+    noise: Matrix,
 ) -> float:
     """Update the estimate by the recursion of `SageHusa`, and write it into ``noise`` within its bounds; 0."""
     m = innovation.size

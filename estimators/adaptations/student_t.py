@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import numpy as np
 
-from simnav.compiled import kernel
+from simnav.compiled import helper, kernel
 from simnav.estimators.algebra.cholesky import factorise, invert_factor
 from simnav.estimators.algebra.direct_update import posterior
+from simnav.kernel_types import Matrix, Vector
 from simnav.types import Array
 
 from .base import Innovation
-from .noise import RULE, WeightedNoise
+from .noise import WeightedNoise
 
 __all__ = ["StudentT", "normalised_trace", "student_t_noise", "student_weight"]
 
 
-@kernel()
+@helper
 def _whitening(noise: Array, inverse: Array) -> bool:
     """Overwrite with the inverse of the Cholesky factor of R; whether R is positive definite."""
     m = noise.shape[0]
@@ -25,7 +26,7 @@ def _whitening(noise: Array, inverse: Array) -> bool:
     return definite
 
 
-@kernel()
+@helper
 def _trace(inverse: Array, residual: Array, spread: Array) -> float:
     """As `normalised_trace`, given `_whitening`."""
     total = 0.0
@@ -36,15 +37,15 @@ def _trace(inverse: Array, residual: Array, spread: Array) -> float:
     return total
 
 
-@kernel("f8(f8[:, ::1], f8[::1], f8[:, ::1])")
-def normalised_trace(noise: Array, residual: Array, spread: Array) -> float:
+@kernel
+def normalised_trace(noise: Matrix, residual: Vector, spread: Matrix) -> float:
     """``tr(R^-1 (e e' + A))`` of a residual e and an (m, m) matrix A (``spread``); -1 if R is singular."""
     inverse = np.empty((residual.size, residual.size))
     return _trace(inverse, residual, spread) if _whitening(noise, inverse) else -1.0
 
 
-@kernel("f8(f8[::1], f8[:, ::1], f8[:, ::1], f8, i8)")
-def student_weight(innovation: Array, predicted: Array, noise: Array, dof: float, iterations: int) -> float:
+@kernel
+def student_weight(innovation: Vector, predicted: Matrix, noise: Matrix, dof: float, iterations: int) -> float:
     """The weight w of a measurement; its noise is R / w (see `StudentT`).
 
     Parameters
@@ -76,9 +77,15 @@ def student_weight(innovation: Array, predicted: Array, noise: Array, dof: float
     return weight
 
 
-@kernel(RULE)
+@kernel
 def student_t_noise(
-    settings: Array, memory: Array, shared: Array, innovation: Array, predicted: Array, nominal: Array, noise: Array
+    settings: Vector,
+    memory: Vector,
+    shared: Vector,
+    innovation: Vector,
+    predicted: Matrix,
+    nominal: Matrix,
+    noise: Matrix,
 ) -> float:
     """Divide the nominal noise by `student_weight`, which is returned; settings: degrees of freedom, iterations."""
     weight = student_weight(innovation, predicted, nominal, settings[0], int(settings[1]))

@@ -8,19 +8,27 @@ import numpy as np
 
 from simnav.compiled import kernel
 from simnav.estimators.algebra.direct_update import posterior
+from simnav.kernel_types import Matrix, Vector
 from simnav.types import Array
 
 from .base import Innovation
-from .noise import RULE, EstimatedNoise, Scope
+from .noise import EstimatedNoise, Scope
 
 __all__ = ["VariationalBayes", "variational_bayes_noise", "variational_noise"]
 
 
-@kernel("void(f8[::1], f8[:, ::1], f8[:, ::1], f8, i8, f8, f8, f8[::1], f8[:, ::1])")
+@kernel
 def variational_noise(
-    innovation: Array, predicted: Array, nominal: Array, shape: float, iterations: int, lowest: float, highest: float,
-    scales: Array, noise: Array,
-) -> None:  # fmt: skip
+    innovation: Vector,
+    predicted: Matrix,
+    nominal: Matrix,
+    shape: float,
+    iterations: int,
+    lowest: float,
+    highest: float,
+    scales: Vector,
+    noise: Matrix,
+) -> None:
     """Compute the iteration of `VariationalBayes` for one measurement.
 
     Parameters
@@ -63,9 +71,15 @@ FORGETTING, ITERATIONS, LOWEST, HIGHEST = range(4)
 SHAPE, SCALES = range(2)
 
 
-@kernel(RULE)
+@kernel
 def variational_bayes_noise(
-    settings: Array, memory: Array, shared: Array, innovation: Array, predicted: Array, nominal: Array, noise: Array
+    settings: Vector,
+    memory: Vector,
+    shared: Vector,
+    innovation: Vector,
+    predicted: Matrix,
+    nominal: Matrix,
+    noise: Matrix,
 ) -> float:
     """Make one step of `VariationalBayes`, and write the noise of its last iteration into ``noise``; 0."""
     memory[SHAPE] = settings[FORGETTING] * memory[SHAPE] + 0.5

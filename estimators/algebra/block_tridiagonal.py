@@ -42,7 +42,8 @@ from typing import TypeAlias
 
 import numpy as np
 
-from simnav.compiled import kernel
+from simnav.compiled import helper, kernel
+from simnav.kernel_types import IntegerVector, Matrix, Stack, Vector
 from simnav.types import Array, Integers
 
 from .cholesky import factorise
@@ -81,7 +82,7 @@ Whitened: TypeAlias = tuple[Array, Array, Array, Integers]
 _WHITENED = "Tuple((f8[:, :, ::1], f8[:, :, ::1], f8[:, ::1], i8[::1]))"
 
 
-@kernel()
+@helper
 def _copy_node(P: Array, d: Array, to_P: Array, to_d: Array) -> None:
     """Copy a covariance and a mean, element by element: a kernel with assignments of arrays takes long to compile."""
     for i in range(d.size):
@@ -90,7 +91,7 @@ def _copy_node(P: Array, d: Array, to_P: Array, to_d: Array) -> None:
             to_P[i, j] = P[i, j]
 
 
-@kernel()
+@helper
 def _predict(P: Array, F: Array, Q: Array, weight: float, lists: Lists, room: Room, out: Array) -> None:
     """Compute ``out = F P F' + Q / weight``, for a sparse F."""
     n = P.shape[0]
@@ -113,11 +114,15 @@ def _predict(P: Array, F: Array, Q: Array, weight: float, lists: Lists, room: Ro
             out[j, i] = x
 
 
-@kernel()
+@helper
 def _absorb(
-    P: Array, d: Array, measured: tuple[Array, Array, Array, float, int], L: Array, white: tuple[Array, Array, Array],
+    P: Array,
+    d: Array,
+    measured: tuple[Array, Array, Array, float, int],
+    L: Array,
+    white: tuple[Array, Array, Array],
     columns: Integers,
-) -> bool:  # fmt: skip
+) -> bool:
     """Update P and d with a measurement (H, r, R, weight, m) with the noise covariance ``R / weight``.
 
     With ``L L' = S = H P H' + R / weight`` the whitened quantities ``white`` = (U, G, y) are stored: ``U = L^-1 H P``,
@@ -184,7 +189,7 @@ def _absorb(
     return True
 
 
-@kernel()
+@helper
 def _mean_of(i: int, end: int, aids: Aids, used: Integers, mean_H: Array, mean_r: Array, mean_R: Array) -> int:
     """Compute the mean of measurement i and of the later used measurements of its instrument before ``end``.
 
@@ -235,7 +240,7 @@ def _mean_of(i: int, end: int, aids: Aids, used: Integers, mean_H: Array, mean_r
     return count
 
 
-@kernel()
+@helper
 def whiten_one(error: Array, whitener: Array, whitened: Array) -> float:
     """Whiten an error with an inverse Cholesky factor; the result is the norm of the whitened error."""
     square = 0.0
@@ -248,7 +253,7 @@ def whiten_one(error: Array, whitener: Array, whitened: Array) -> float:
     return sqrt(square)
 
 
-@kernel()
+@helper
 def _return(adjoint: Array, U: Array, G: Array, y: Array, m: int, z: Array) -> None:
     """Update the adjoint a through a measurement of m components, backward: ``a + G' (y - U a)``; z is work space."""
     n = adjoint.size
@@ -261,14 +266,18 @@ def _return(adjoint: Array, U: Array, G: Array, y: Array, m: int, z: Array) -> N
             adjoint[c] += G[a, c] * z[a]
 
 
-@kernel(
-    f"UniTuple(f8, 2)(Tuple((f8[:, ::1], f8[::1])), {ROWS}, Tuple((f8[:, :, ::1], f8[:, :, ::1], f8[:, ::1], f8[::1])),"
-    f"{_AIDS}, f8, i8, {_ELIMINATION}, {_WHITENED}, Tuple((f8[:, ::1], f8[::1])))"
-)
+@kernel
 def solve_chain(
-    prior: tuple[Array, Array], rows: Rows, motion: tuple[Array, Array, Array, Array], aids: Aids, damping: float,
-    first: int, left: Elimination, left_aids: Whitened, steps: tuple[Array, Array],
-) -> tuple[float, float]:  # fmt: skip
+    prior: tuple[Matrix, Vector],
+    rows: tuple[int, int, int, int, int, int],
+    motion: tuple[Stack, Stack, Matrix, Vector],
+    aids: tuple[IntegerVector, IntegerVector, IntegerVector, Stack, Matrix, Stack, Vector],
+    damping: float,
+    first: int,
+    left: tuple[Stack, Matrix, Stack, Matrix],
+    left_aids: tuple[Stack, Stack, Matrix, IntegerVector],
+    steps: tuple[Matrix, Vector],
+) -> tuple[float, float]:
     """Compute one step of K nodes of n states with K - 1 motion factors and M aiding factors (equations in the module).
 
     Parameters
@@ -402,7 +411,7 @@ def solve_chain(
     return largest, older
 
 
-@kernel()
+@helper
 def error_after_step(error: Array, F: Array, older: Array, newer: Array, after: Array) -> None:
     """The error of a motion that a step of the nodes at its ends leaves, ``after = e + dx_k+1 - F dx_k``."""
     n = error.size
@@ -420,12 +429,14 @@ STEPPED_TYPES = (
 )
 
 
-@kernel(f"f8({ROWS}, Tuple((f8[:, ::1], f8[::1])), {STEPPED_TYPES})")
+@kernel
 def after_step(
-    rows: Rows, prior: tuple[Array, Array], nodes: tuple[Array, Array, Array],
-    motion: tuple[Array, Array, Array, Array, Array, Array],
-    aids: tuple[Integers, Array, Array, Array, Array, Array, Array],
-) -> float:  # fmt: skip
+    rows: tuple[int, int, int, int, int, int],
+    prior: tuple[Matrix, Vector],
+    nodes: tuple[Matrix, Matrix, Matrix],
+    motion: tuple[Stack, Matrix, Stack, Matrix, Vector, Vector],
+    aids: tuple[IntegerVector, Stack, Matrix, Stack, Matrix, Vector, Vector],
+) -> float:
     """Update shifts and residuals after a step, by the linearised factors.
 
     Parameters
@@ -474,8 +485,8 @@ def after_step(
     return half_squares(rows, prior, (norm, weight), (aid_norm, aid_weight))
 
 
-@kernel("void(i8, f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[::1])")
-def whiten(first: int, error: Array, whitener: Array, whitened: Array, norm: Array) -> None:
+@kernel
+def whiten(first: int, error: Matrix, whitener: Stack, whitened: Matrix, norm: Vector) -> None:
     """Whiten N errors of n components.
 
     Parameters
@@ -495,9 +506,13 @@ def whiten(first: int, error: Array, whitener: Array, whitened: Array, norm: Arr
         norm[k] = whiten_one(error[k], whitener[k], whitened[k])
 
 
-@kernel("i8(UniTuple(f8[::1], 3), i8[::1], i8, UniTuple(f8[::1], 3), f8)")
+@kernel
 def keep_weights(
-    motion: tuple[Array, Array, Array], node: Integers, base: int, aids: tuple[Array, Array, Array], tolerance: float
+    motion: tuple[Vector, Vector, Vector],
+    node: IntegerVector,
+    base: int,
+    aids: tuple[Vector, Vector, Vector],
+    tolerance: float,
 ) -> int:
     """Keep the old values of weights that have hardly changed.
 
@@ -533,9 +548,12 @@ def keep_weights(
     return first
 
 
-@kernel(f"f8({ROWS}, Tuple((f8[:, ::1], f8[::1])), UniTuple(f8[::1], 2), UniTuple(f8[::1], 2))")
+@kernel
 def half_squares(
-    rows: Rows, prior: tuple[Array, Array], motion: tuple[Array, Array], aids: tuple[Array, Array]
+    rows: tuple[int, int, int, int, int, int],
+    prior: tuple[Matrix, Vector],
+    motion: tuple[Vector, Vector],
+    aids: tuple[Vector, Vector],
 ) -> float:
     """The cost: half the sum of squares of all factors.
 

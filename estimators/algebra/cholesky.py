@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from math import sqrt
 
-from simnav.compiled import kernel
+from simnav.compiled import helper
 from simnav.types import Array
 
 __all__ = ["factorise", "invert_factor", "solve_factor"]
 
 
-@kernel()
+@helper
 def factorise(L: Array, m: int, least: float, pivot: Array) -> bool:
     """Overwrite the lower triangle of a covariance with its Cholesky factor. The upper triangle is not changed.
 
@@ -48,7 +48,7 @@ def factorise(L: Array, m: int, least: float, pivot: Array) -> bool:
     return definite
 
 
-@kernel()
+@helper
 def solve_factor(L: Array, m: int, v: Array) -> None:
     """Overwrite the first m components of a vector with ``L^-1 v``.
 
@@ -68,7 +68,7 @@ def solve_factor(L: Array, m: int, v: Array) -> None:
         v[i] = x / L[i, i] if L[i, i] > 0.0 else 0.0
 
 
-@kernel()
+@helper
 def invert_factor(L: Array, m: int, inverse: Array) -> None:
     """The inverse of a Cholesky factor.
 

@@ -12,7 +12,8 @@ from math import sqrt
 
 import numpy as np
 
-from simnav.compiled import kernel
+from simnav.compiled import helper, kernel
+from simnav.kernel_types import Matrix, Vector
 from simnav.types import Array
 
 __all__ = ["normalised_square", "posterior"]
@@ -21,7 +22,7 @@ __all__ = ["normalised_square", "posterior"]
 LEAST = 1e-14
 
 
-@kernel()
+@helper
 def _factor(predicted: Array, noise: Array) -> tuple[bool, float, float, float, float, float, float]:
     """Whether ``S = H P H' + R`` is positive definite, and the rows of its Cholesky factor."""
     m = predicted.shape[0]
@@ -48,7 +49,7 @@ def _factor(predicted: Array, noise: Array) -> tuple[bool, float, float, float, 
     return True, a00, a10, a11, a20, a21, a22
 
 
-@kernel()
+@helper
 def _square(innovation: Array, a00: float, a10: float, a11: float, a20: float, a21: float, a22: float) -> float:
     """``v' S^-1 v``, given the factor of S."""
     m = innovation.size
@@ -59,15 +60,15 @@ def _square(innovation: Array, a00: float, a10: float, a11: float, a20: float, a
     return square
 
 
-@kernel("f8(f8[::1], f8[:, ::1], f8[:, ::1])")
-def normalised_square(innovation: Array, predicted: Array, noise: Array) -> float:
+@kernel
+def normalised_square(innovation: Vector, predicted: Matrix, noise: Matrix) -> float:
     """Normalised innovation squared ``v' S^-1 v`` with ``S = H P H' + R``; -1 if S is singular."""
     definite, a00, a10, a11, a20, a21, a22 = _factor(predicted, noise)
     return _square(innovation, a00, a10, a11, a20, a21, a22) if definite else -1.0
 
 
-@kernel("f8(f8[::1], f8[:, ::1], f8[:, ::1], f8[::1], f8[:, ::1])")
-def posterior(innovation: Array, predicted: Array, noise: Array, residual: Array, after: Array) -> float:
+@kernel
+def posterior(innovation: Vector, predicted: Matrix, noise: Matrix, residual: Vector, after: Matrix) -> float:
     """Residual and covariance of the prediction after an update, in the m components of the measurement.
 
     With ``S = H P H' + R`` they are ``v - H P H' S^-1 v`` and ``H P+ H' = H P H' - H P H' S^-1 H P H'``.

@@ -7,13 +7,13 @@ from math import sqrt
 import numpy as np
 
 from simnav.compiled import kernel
-from simnav.types import Array
+from simnav.kernel_types import Matrix, Vector
 
 __all__ = ["inflate_motion"]
 
 
-@kernel("void(f8[:, ::1], f8, f8[::1], UniTuple(i8, 4))")
-def inflate_motion(covariance: Array, inflation: float, first: Array, moving: tuple[int, int, int, int]) -> None:
+@kernel
+def inflate_motion(covariance: Matrix, inflation: float, first: Vector, moving: tuple[int, int, int, int]) -> None:
     """Inflate the covariance of the motion in place, with the correlations as they are.
 
     Parameters

@@ -9,15 +9,15 @@ from __future__ import annotations
 import numpy as np
 
 from simnav.compiled import kernel
-from simnav.types import Array
+from simnav.kernel_types import Matrix, Stack, Vector
 
 from .cholesky import factorise, solve_factor
 
 __all__ = ["joseph_sequence", "joseph_update", "project"]
 
 
-@kernel("void(f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1])")
-def project(covariance: Array, jacobian: Array, cross: Array, predicted: Array) -> None:
+@kernel
+def project(covariance: Matrix, jacobian: Matrix, cross: Matrix, predicted: Matrix) -> None:
     """Compute ``P H'`` and ``H P H'``, the covariance of a predicted measurement.
 
     Parameters
@@ -53,9 +53,9 @@ def project(covariance: Array, jacobian: Array, cross: Array, predicted: Array) 
                     predicted[i, k] += x * cross[c, k]
 
 
-@kernel("f8(f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[::1], f8[::1])")
+@kernel
 def joseph_update(
-    covariance: Array, cross: Array, innovation_covariance: Array, residual: Array, correction: Array
+    covariance: Matrix, cross: Matrix, innovation_covariance: Matrix, residual: Vector, correction: Vector
 ) -> float:
     """Kalman gain, correction and Joseph-form update of the covariance, in place.
 
@@ -139,9 +139,9 @@ def joseph_update(
     return nis
 
 
-@kernel("void(f8[:, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, :, ::1], f8[::1], f8[::1], f8[::1])")
+@kernel
 def joseph_sequence(
-    covariance: Array, residual: Array, jacobian: Array, noise: Array, correction: Array, nis: Array, size: Array
+    covariance: Matrix, residual: Matrix, jacobian: Stack, noise: Stack, correction: Vector, nis: Vector, size: Vector
 ) -> None:
     """Apply `joseph_update` with k independent measurements, one after the other, linearised at one state.
 

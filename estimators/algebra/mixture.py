@@ -11,20 +11,25 @@ from math import exp, log
 import numpy as np
 
 from simnav.compiled import kernel
-from simnav.types import Array
+from simnav.kernel_types import Matrix, Vector
 
 from .cholesky import factorise, invert_factor
 
 __all__ = ["mixture_update"]
 
 
-@kernel(
-    "UniTuple(f8, 2)(f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[::1], f8[::1], f8[:, ::1], f8[::1], f8[::1])"
-)
+@kernel
 def mixture_update(
-    covariance: Array, cross: Array, predicted: Array, noise: Array, residual: Array, variances: Array,
-    transition: Array, probability: Array, correction: Array,
-) -> tuple[float, float]:  # fmt: skip
+    covariance: Matrix,
+    cross: Matrix,
+    predicted: Matrix,
+    noise: Matrix,
+    residual: Vector,
+    variances: Vector,
+    transition: Matrix,
+    probability: Vector,
+    correction: Vector,
+) -> tuple[float, float]:
     """Kalman update with every noise level, weighted by likelihood and merged by moments, in place.
 
     With ``S_j = H P H' + variances_j R``, ``y_j = S_j^-1 v`` and mu_j proportional to the probability of level j times

@@ -12,7 +12,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from simnav.compiled import kernel
+from simnav.compiled import helper
 from simnav.types import Array
 
 __all__ = [
@@ -27,13 +27,13 @@ _0, _1, _2, _3, _4, _5, _6, _7, _8 = (np.uint64(i) for i in range(9))
 NOTHING = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
 
 
-@kernel()
+@helper
 def padded(n: int) -> int:
     """The next multiple of eight."""
     return 8 * ((n + 7) // 8)
 
 
-@kernel()
+@helper
 def list_elements(F: Array, value: Array, column: Places, count: Places) -> None:
     """List the elements of an (m, n) matrix that are not zero, their columns, and how many there are in each row."""
     for i in range(np.uint64(F.shape[0])):
@@ -44,7 +44,7 @@ def list_elements(F: Array, value: Array, column: Places, count: Places) -> None
         count[i] = q
 
 
-@kernel()
+@helper
 def eight_sums(value: Array, column: Places, i: Place, count: Place, M: Array, j: Place, s: Eight) -> Eight:
     """Row i of the product, columns j to j + 7, added to eight sums.
 
@@ -75,20 +75,20 @@ def eight_sums(value: Array, column: Places, i: Place, count: Place, M: Array, j
     return s0, s1, s2, s3, s4, s5, s6, s7
 
 
-@kernel()
+@helper
 def eight_of(row: Array, j: Place) -> Eight:
     """Eight elements of a row, from j on."""
     return row[j], row[j + _1], row[j + _2], row[j + _3], row[j + _4], row[j + _5], row[j + _6], row[j + _7]
 
 
-@kernel()
+@helper
 def put_eight(row: Array, j: Place, s: Eight) -> None:
     """Overwrite eight elements of a row, from j on."""
     row[j], row[j + _1], row[j + _2], row[j + _3] = s[0], s[1], s[2], s[3]
     row[j + _4], row[j + _5], row[j + _6], row[j + _7] = s[4], s[5], s[6], s[7]
 
 
-@kernel()
+@helper
 def add_eight(row: Array, j: Place, s: Eight) -> None:
     """Add eight sums to a row, from element j on."""
     t = eight_of(row, j)
@@ -98,7 +98,7 @@ def add_eight(row: Array, j: Place, s: Eight) -> None:
     )  # fmt: skip
 
 
-@kernel()
+@helper
 def sparse_product(value: Array, column: Places, count: Places, M: Array, out: Array) -> None:
     """The product of a matrix in lists (`eight_sums`) and M; M and ``out`` have a multiple of eight columns."""
     for i in range(np.uint64(count.size)):
@@ -106,7 +106,7 @@ def sparse_product(value: Array, column: Places, count: Places, M: Array, out: A
             put_eight(out[i], j, eight_sums(value, column, i, count[i], M, j, NOTHING))
 
 
-@kernel()
+@helper
 def _eight_columns(M: Array, x: Array, j: Place, total: Array) -> Eight:
     """Elements j to j + 7 of ``total + M' x``, row by row."""
     s0, s1, s2, s3, s4, s5, s6, s7 = eight_of(total, j)
@@ -123,7 +123,7 @@ def _eight_columns(M: Array, x: Array, j: Place, total: Array) -> Eight:
     return s0, s1, s2, s3, s4, s5, s6, s7
 
 
-@kernel()
+@helper
 def add_product(M: Array, x: Array, total: Array) -> None:
     """Compute ``total += M' x`` for an (n, n) matrix, row by row."""
     n = x.size

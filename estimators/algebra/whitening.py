@@ -5,15 +5,15 @@ from __future__ import annotations
 import numpy as np
 
 from simnav.compiled import kernel
-from simnav.types import Array
+from simnav.kernel_types import Matrix
 
 from .cholesky import factorise, invert_factor
 
 __all__ = ["whitening"]
 
 
-@kernel("void(f8[:, ::1], f8[:, ::1])")
-def whitening(covariance: Array, whitener: Array) -> None:
+@kernel
+def whitening(covariance: Matrix, whitener: Matrix) -> None:
     """The inverse Cholesky factor of a covariance, so that ``whitener`` times an error has unit covariance.
 
     Parameters

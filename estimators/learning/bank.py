@@ -7,17 +7,17 @@ estimator that holds a policy call the same three kernels, so that they agree bi
 from __future__ import annotations
 
 from math import exp, log, log1p, log10, sqrt
-from typing import TypeAlias
+from typing import Annotated, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from simnav.compiled import Array, Flags, Integers, kernel
+from simnav.compiled import Array, Flags, Integers, helper, kernel
 from simnav.estimators.algebra.cholesky import factorise, solve_factor
 from simnav.estimators.algebra.joseph import joseph_update, project
+from simnav.kernel_types import FlagVector, IntegerVector, Matrix, Stack, Vector
 
 from .features import LIMIT, MEMORY, PER_INSTRUMENT, PER_MEASUREMENT, WHITE
-from .reference import Events
 
 __all__ = ["EVENTS", "MEMORY_COLUMNS", "STEPS", "Steps", "observe", "set_scales", "take"]
 
@@ -35,8 +35,8 @@ STEPS = "Tuple((b1[::1], i8[::1], i8[::1]))"
 MEMORY_COLUMNS = 6
 
 
-@kernel("void(f8[:, ::1], f8, f8[:, ::1], f8[:, :, ::1], f8[::1])")
-def set_scales(actions: Array, largest: float, setting: Array, scale: Array, process_scale: Array) -> None:
+@kernel
+def set_scales(actions: Matrix, largest: float, setting: Matrix, scale: Stack, process_scale: Vector) -> None:
     """Convert actions in [-1, 1], logarithms of factors over the logarithm of the largest factor, to factors on sigmas.
 
     Parameters
@@ -63,19 +63,21 @@ def set_scales(actions: Array, largest: float, setting: Array, scale: Array, pro
         process_scale[b] = exp(min(max(actions[b, places], -1.0), 1.0) * log(largest))
 
 
-@kernel()
+@helper
 def _clipped(value: float) -> float:
     return min(max(value, -LIMIT), LIMIT)
 
 
-@kernel(
-    f"void({STEPS}, {EVENTS}, f8[::1], f8[:, ::1], Tuple((i8[::1], f8[:, ::1], i8)), "
-    "Tuple((f8[:, :, ::1], f8[:, ::1], f8[:, :, ::1])), f4[:, ::1])"
-)
+@kernel
 def observe(
-    steps: Steps, events: Events, end: Array, context: Array, layout: tuple[Integers, Array, int],
-    filters: tuple[Array, Array, Array], observation: NDArray[np.float32],
-) -> None:  # fmt: skip
+    steps: tuple[FlagVector, IntegerVector, IntegerVector],
+    events: tuple[Stack, Stack, FlagVector, IntegerVector, Vector, IntegerVector, Matrix, Stack, Stack, Matrix],
+    end: Vector,
+    context: Matrix,
+    layout: tuple[IntegerVector, Matrix, int],
+    filters: tuple[Stack, Matrix, Stack],
+    observation: Annotated[NDArray[np.float32], "float32[:, ::1]"],
+) -> None:
     """Compute the observations before the decision on the next step (`simnav.estimators.learning.features`).
 
     The innovations are those before any measurement of the step is used.
@@ -180,7 +182,7 @@ def observe(
             row[base + 1 + i] = _clipped(context[b, i])
 
 
-@kernel()
+@helper
 def _moving(transition: Array) -> int:
     """Number of states without the last ones that are constant, as those of instruments are: rows and columns of I."""
     for i in range(transition.shape[0] - 1, -1, -1):
@@ -192,11 +194,18 @@ def _moving(transition: Array) -> int:
     return 0
 
 
-@kernel()
+@helper
 def _propagate(
-    P: Array, delta: Array, transition: Array, process_noise: Array, factor: float, A: Array, B: Array, T: Array,
+    P: Array,
+    delta: Array,
+    transition: Array,
+    process_noise: Array,
+    factor: float,
+    A: Array,
+    B: Array,
+    T: Array,
     moved: Array,
-) -> None:  # fmt: skip
+) -> None:
     """Compute ``delta = Phi delta`` and ``P = Phi P Phi' + factor Q`` in place; P is symmetric.
 
     Products with zeros are left out, and so are those of the constant states. The sums stay the same to the last bit.
@@ -244,9 +253,15 @@ def _propagate(
             P[j, i] = x
 
 
-@kernel(f"void({STEPS}, {EVENTS}, i8[::1], f8[:, :, ::1], f8[::1], f8[:, :, ::1], f8[:, ::1])")
+@kernel
 def take(
-    steps: Steps, events: Events, place: Integers, scale: Array, process_scale: Array, covariance: Array, delta: Array
+    steps: tuple[FlagVector, IntegerVector, IntegerVector],
+    events: tuple[Stack, Stack, FlagVector, IntegerVector, Vector, IntegerVector, Matrix, Stack, Stack, Matrix],
+    place: IntegerVector,
+    scale: Stack,
+    process_scale: Vector,
+    covariance: Stack,
+    delta: Matrix,
 ) -> None:
     """Advance each filter of a bank by one step, with the noise that its agent has set.
 

@@ -160,9 +160,14 @@ class Filters:
         self.observation[i] = 0.0
 
     def observe(
-        self, linear: Linear, first: NDArray[np.int64], last: NDArray[np.int64], end: Array, context: Array,
+        self,
+        linear: Linear,
+        first: NDArray[np.int64],
+        last: NDArray[np.int64],
+        end: Array,
+        context: Array,
         active: NDArray[np.bool_],
-    ) -> None:  # fmt: skip
+    ) -> None:
         """Fill `observation` for the active filters; the arguments as of `simnav.estimators.learning.bank.observe`."""
         layout = self.layout.place, self.period, self.layout.most
         observe(
@@ -186,9 +191,15 @@ class Filters:
         self.memory[active, :, 5] = decision.setting[active]
 
     def reward(
-        self, linear: Linear, first: NDArray[np.int64], last: NDArray[np.int64], active: NDArray[np.bool_],
-        error: Array, oracle: Array, faulty: NDArray[np.bool_],
-    ) -> Array:  # fmt: skip
+        self,
+        linear: Linear,
+        first: NDArray[np.int64],
+        last: NDArray[np.int64],
+        active: NDArray[np.bool_],
+        error: Array,
+        oracle: Array,
+        faulty: NDArray[np.bool_],
+    ) -> Array:
         """(b,) array: what the step was worth; the arguments as of `simnav.estimators.learning.rewards.reward`."""
         decision = self.decision
         reward(

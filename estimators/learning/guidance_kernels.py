@@ -7,13 +7,14 @@ voyage and the vector form call the same kernels, so that they agree bit for bit
 from __future__ import annotations
 
 from math import atan2, cos, exp, hypot, inf, log1p, log10, pi, radians, sin
-from typing import TypeAlias
+from typing import Annotated, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from simnav.compiled import Array, Flags, Integers, kernel
+from simnav.compiled import Array, Integers, helper, kernel
 from simnav.geometry.rotation import wrap_scalar
+from simnav.kernel_types import FlagMatrix, FlagVector, IntegerMatrix, IntegerVector, Matrix, Stack, Vector
 
 from .features import GUIDANCE, LIMIT, SPEED, TURN_RATE
 
@@ -38,11 +39,17 @@ BEHIND, AHEAD = 20, 120
 _TRACKS = "Tuple((i8[::1], i8[::1], f8[:, :, ::1], f8[:, :, ::1], f8[:, ::1], f8[:, ::1]))"
 
 
-@kernel(f"void(b1[::1], f8[:, ::1], i8[::1], i8[::1], {_TRACKS}, f8[:, ::1], f8[:, ::1], UniTuple(f8[::1], 4))")
+@kernel
 def steer(
-    active: Flags, actions: Array, at: Integers, ahead: Integers, tracks: Tracks, truth: Array, estimate: Array,
-    commands: tuple[Array, Array, Array, Array],
-) -> None:  # fmt: skip
+    active: FlagVector,
+    actions: Matrix,
+    at: IntegerVector,
+    ahead: IntegerVector,
+    tracks: tuple[IntegerVector, IntegerVector, Stack, Stack, Matrix, Matrix],
+    truth: Matrix,
+    estimate: Matrix,
+    commands: tuple[Vector, Vector, Vector, Vector],
+) -> None:
     """Convert the actions of the agents to commands of the vessels.
 
     Parameters
@@ -75,7 +82,7 @@ def steer(
         speed[b] = planned[b] * (1.0 + 0.5 * haste)
 
 
-@kernel()
+@helper
 def _place(
     latitude: float, longitude: float, at: int, length: int, geodetic: Array, course: Array, along: Array
 ) -> tuple[int, float, float]:
@@ -92,14 +99,17 @@ def _place(
     return at, east * c - north * s, along[at] + (north * c + east * s)
 
 
-@kernel(
-    f"void(Tuple((b1[::1], b1[::1])), UniTuple(f8[::1], 3), f8[:, ::1], {_TRACKS}, Tuple((i8, f8)), i8[::1], "
-    "f8[:, ::1], Tuple((f8[::1], f8[::1], b1[::1])))"
-)
+@kernel
 def judge(
-    which: tuple[Flags, Flags], paces: tuple[Array, Array, Array], truth: Array, tracks: Tracks,
-    task: tuple[int, float], at: Integers, tally: Array, outcome: tuple[Array, Array, Flags],
-) -> None:  # fmt: skip
+    which: tuple[FlagVector, FlagVector],
+    paces: tuple[Vector, Vector, Vector],
+    truth: Matrix,
+    tracks: tuple[IntegerVector, IntegerVector, Stack, Stack, Matrix, Matrix],
+    task: tuple[int, float],
+    at: IntegerVector,
+    tally: Matrix,
+    outcome: tuple[Vector, Vector, FlagVector],
+) -> None:
     """Compute the rewards of a step.
 
     Parameters
@@ -155,27 +165,28 @@ def judge(
         rewards[b] = value
 
 
-@kernel()
+@helper
 def _sigma(variance: float, unit: float) -> float:
     """Decimal logarithm of a sigma in a unit."""
     return 0.5 * log10(max(variance, 1e-18)) - log10(unit)
 
 
-@kernel()
+@helper
 def _number(value: float) -> float:
     return min(max(value, -LIMIT), LIMIT) if value == value else 0.0
 
 
-@kernel(
-    "void(b1[::1], Tuple((i8[::1], f8[::1], f8[::1])), UniTuple(f8[:, ::1], 2), "
-    f"Tuple((i8[::1], i8[:, ::1], f8[:, ::1], b1[:, ::1])), {_TRACKS}, f8, "
-    "Tuple((i8[::1], f8[:, ::1], f8[:, ::1])), f4[:, ::1])"
-)
+@kernel
 def look(
-    active: Flags, clock: tuple[Integers, Array, Array], estimated: tuple[Array, Array],
-    delivered: tuple[Integers, Integers, Array, Flags], tracks: Tracks, half_width: float,
-    memory: tuple[Integers, Array, Array], observation: NDArray[np.float32],
-) -> None:  # fmt: skip
+    active: FlagVector,
+    clock: tuple[IntegerVector, Vector, Vector],
+    estimated: tuple[Matrix, Matrix],
+    delivered: tuple[IntegerVector, IntegerMatrix, Matrix, FlagMatrix],
+    tracks: tuple[IntegerVector, IntegerVector, Stack, Stack, Matrix, Matrix],
+    half_width: float,
+    memory: tuple[IntegerVector, Matrix, Matrix],
+    observation: Annotated[NDArray[np.float32], "float32[:, ::1]"],
+) -> None:
     """Compute the observations of the agents.
 
     Parameters

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from simnav.compiled import Flags, Integers, kernel
+from simnav.compiled import kernel
 from simnav.estimator import Estimator
 from simnav.estimators.models.inertial import InertialModel
 from simnav.estimators.models.inertial_update import assimilate_inertial
@@ -26,6 +26,7 @@ from simnav.estimators.models.propagation import (
 from simnav.estimators.models.suitable import Suitable
 from simnav.estimators.solvers.admission import LATE
 from simnav.estimators.solvers.kalman import KalmanEstimator
+from simnav.kernel_types import FlagVector, IntegerMatrix, IntegerStack, IntegerVector, Matrix, Stack, Vector
 from simnav.simulation.steps import SteppedRuns
 from simnav.types import Array, Estimate, InitialState, Instruments
 
@@ -132,20 +133,17 @@ class Navigators:
         return np.array([[p, q], [q, r]])
 
 
-@kernel(
-    "void(b1[::1], f8[::1], Tuple((i8[::1], i8[:, ::1], f8[:, ::1], f8[:, :, ::1])), "
-    "Tuple((i8[::1], f8[:, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, :, ::1])), "
-    "Tuple((i8[:, :, ::1], f8[:, :, ::1], f8[:, :, ::1], f8[:, :, ::1], f8[:, ::1])), UniTuple(f8[:, ::1], 3), "
-    "Tuple((i8[::1], f8[::1], f8[:, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], "
-    "f8[:, ::1], f8[:, ::1], f8[:, ::1])), UniTuple(f8[:, ::1], 2))"
-)
+@kernel
 def navigate(
-    active: Flags, until: Array, delivered: tuple[Integers, Integers, Array, Array],
-    imu: tuple[Integers, Array, Array, Array, Array], instruments: tuple[Integers, Array, Array, Array, Array],
-    process: tuple[Array, Array, Array],
-    state: tuple[Integers, Array, Array, Array, Array, Array, Array, Array, Array, Array, Array],
-    result: tuple[Array, Array],
-) -> None:  # fmt: skip
+    active: FlagVector,
+    until: Vector,
+    delivered: tuple[IntegerVector, IntegerMatrix, Matrix, Stack],
+    imu: tuple[IntegerVector, Matrix, Matrix, Stack, Stack],
+    instruments: tuple[IntegerStack, Stack, Stack, Stack, Matrix],
+    process: tuple[Matrix, Matrix, Matrix],
+    state: tuple[IntegerVector, Vector, Matrix, Matrix, Stack, Matrix, Matrix, Matrix, Matrix, Matrix, Matrix],
+    result: tuple[Matrix, Matrix],
+) -> None:
     """One step of many inertial filters: each propagated to its measurements, and corrected by them.
 
     Parameters

@@ -25,10 +25,8 @@ from math import log, sqrt
 
 import numpy as np
 
-from simnav.compiled import Array, Flags, Integers, kernel
-
-from .bank import EVENTS, STEPS, Steps
-from .reference import Events
+from simnav.compiled import kernel
+from simnav.kernel_types import FlagVector, IntegerVector, Matrix, Stack, Vector
 
 __all__ = ["NEED_ORACLE", "REWARDS", "reward"]
 
@@ -38,14 +36,17 @@ REWARDS = {"error": 0, "likelihood": 1, "labels": 2, "improvement": 3, "gain": 4
 NEED_ORACLE = ("error", "gain")
 
 
-@kernel(
-    f"void(i8, {STEPS}, {EVENTS}, b1[::1], UniTuple(f8[:, ::1], 2), "
-    "Tuple((i8[::1], f8[:, :, ::1], f8[:, ::1])), Tuple((f8[:, :, ::1], f8[:, ::1])), f8[::1])"
-)
+@kernel
 def reward(
-    code: int, steps: Steps, events: Events, faulty: Flags, errors: tuple[Array, Array],
-    decision: tuple[Integers, Array, Array], filters: tuple[Array, Array], rewards: Array,
-) -> None:  # fmt: skip
+    code: int,
+    steps: tuple[FlagVector, IntegerVector, IntegerVector],
+    events: tuple[Stack, Stack, FlagVector, IntegerVector, Vector, IntegerVector, Matrix, Stack, Stack, Matrix],
+    faulty: FlagVector,
+    errors: tuple[Matrix, Matrix],
+    decision: tuple[IntegerVector, Stack, Matrix],
+    filters: tuple[Stack, Matrix],
+    rewards: Vector,
+) -> None:
     """Compute the reward of each filter's step; 0 if the truth is not known.
 
     Parameters

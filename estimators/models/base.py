@@ -288,9 +288,13 @@ class ErrorModel(ABC):
         return None
 
     def assimilate_step(
-        self, measurements: Sequence[Measurement], until: float, covariance: Array, correction: Array,
+        self,
+        measurements: Sequence[Measurement],
+        until: float,
+        covariance: Array,
+        correction: Array,
         rule: StepRule | None = None,
-    ) -> list[list[float]] | None:  # fmt: skip
+    ) -> list[list[float]] | None:
         """Use the measurements of a step, each at its time, and propagate to the step's end.
 
         Parameters

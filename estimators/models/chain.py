@@ -31,6 +31,7 @@ from simnav.compiled import kernel, ready
 from simnav.estimator.needs import Needs
 from simnav.estimators.algebra.block_tridiagonal import Rows, after_step, whiten
 from simnav.estimators.algebra.whitening import whitening
+from simnav.kernel_types import Matrix, Stack, Vector
 from simnav.types import (
     NO_SIDE,
     Array,
@@ -58,8 +59,8 @@ STEPPED = Selection(
 )
 
 
-@kernel("void(f8[:, ::1], f8[::1], f8[:, ::1], f8[:, ::1], f8[::1])")
-def attach_one(noise: Array, value: Array, full: Array, whitener: Array, values: Array) -> None:
+@kernel
+def attach_one(noise: Matrix, value: Vector, full: Matrix, whitener: Matrix, values: Vector) -> None:
     """Extend the (m, m) noise and the value of a measurement to three components, and compute the whitener."""
     for i in range(3):
         values[i] = value[i] if i < value.size else 0.0
@@ -68,16 +69,16 @@ def attach_one(noise: Array, value: Array, full: Array, whitener: Array, values:
     whitening(full, whitener)
 
 
-@kernel("void(f8[:, :, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, :, ::1], f8[:, ::1])")
-def _attach_all(noise: Array, value: Array, full: Array, whitener: Array, values: Array) -> None:
+@kernel
+def _attach_all(noise: Stack, value: Matrix, full: Stack, whitener: Stack, values: Matrix) -> None:
     """Apply `attach_one` to k measurements."""
     for k in range(noise.shape[0]):
         attach_one(noise[k], value[k], full[k], whitener[k], values[k])
 
 
-@kernel("void(f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1])")
+@kernel
 def begin_motion(
-    transition: Array, noise: Array, factor: Array, jacobian: Array, factor_noise: Array, whitener: Array
+    transition: Matrix, noise: Matrix, factor: Matrix, jacobian: Matrix, factor_noise: Matrix, whitener: Matrix
 ) -> None:
     """Copy transition matrix and noise of a motion to its factor, with the whitener; after it there is no motion."""
     n = transition.shape[0]
@@ -477,9 +478,15 @@ class Chain(ABC):
                 aids["residual"][i, :d], jacobian[i, :d], aids["components"][i] = *found, d
 
     def _observe_many(
-        self, many: ManyReadings, channel: NDArray[np.intp], first: int, found: Flags, row: NDArray[np.int64],
-        jacobian: Array, states: tuple[Array, ...],
-    ) -> None:  # fmt: skip
+        self,
+        many: ManyReadings,
+        channel: NDArray[np.intp],
+        first: int,
+        found: Flags,
+        row: NDArray[np.int64],
+        jacobian: Array,
+        states: tuple[Array, ...],
+    ) -> None:
         """`observe_own` for the readings of an instrument with channels: those ``found`` among the aids from one on."""
         aids, d = self.aids, len(many.kind.components)
         rows: Any = slice(first, len(row)) if found.all() else first + np.flatnonzero(found)

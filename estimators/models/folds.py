@@ -7,14 +7,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from simnav.compiled import kernel
+from simnav.compiled import helper, kernel
 from simnav.estimators.algebra.whitening import whitening
-from simnav.types import Array, Integers
+from simnav.kernel_types import IntegerVector, Stack
+from simnav.types import Array
 
 __all__ = ["add_motion_noise", "add_noise", "through_motion", "through_one"]
 
 
-@kernel()
+@helper
 def through_one(transition: Array, coupled: int, jacobian: Array, at_node: Array) -> None:
     """Do `through_motion` for the (3, n) Jacobian of one measurement; ``at_node`` (n,) is work space."""
     n = transition.shape[0]
@@ -35,8 +36,8 @@ def through_one(transition: Array, coupled: int, jacobian: Array, at_node: Array
             jacobian[r, c] = at_node[c]
 
 
-@kernel("void(i8, i8[::1], i8, f8[:, :, ::1], f8[:, :, ::1])")
-def through_motion(first: int, row: Integers, coupled: int, transition: Array, jacobian: Array) -> None:
+@kernel
+def through_motion(first: int, row: IntegerVector, coupled: int, transition: Stack, jacobian: Stack) -> None:
     """Convert Jacobians with respect to the states at folds to Jacobians with respect to their nodes, in place.
 
     Parameters
@@ -58,7 +59,7 @@ def through_motion(first: int, row: Integers, coupled: int, transition: Array, j
             through_one(transition[row[i]], coupled, jacobian[i], at_node)
 
 
-@kernel()
+@helper
 def add_noise(H: Array, components: int, Q: Array, noise: Array, whitener: Array, cross: Array) -> None:
     """Do `add_motion_noise` for one measurement; ``cross`` (n,) is work space."""
     n = H.shape[1]
@@ -78,11 +79,17 @@ def add_noise(H: Array, components: int, Q: Array, noise: Array, whitener: Array
     whitening(noise, whitener)
 
 
-@kernel("void(i8, i8[::1], i8[::1], f8[:, :, ::1], f8[:, :, ::1], f8[:, :, ::1], f8[:, :, ::1], i8[::1])")
+@kernel
 def add_motion_noise(
-    first: int, row: Integers, components: Integers, jacobian: Array, motion_noise: Array, noise: Array,
-    whitener: Array, bare: Integers,
-) -> None:  # fmt: skip
+    first: int,
+    row: IntegerVector,
+    components: IntegerVector,
+    jacobian: Stack,
+    motion_noise: Stack,
+    noise: Stack,
+    whitener: Stack,
+    bare: IntegerVector,
+) -> None:
     """Add the noise Q of the motion up to a fold to the noise R of the measurements there, ``R + H Q H'``, once.
 
     Parameters

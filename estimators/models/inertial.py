@@ -478,9 +478,13 @@ class InertialModel(ErrorModel):
         return nis, size
 
     def assimilate_step(
-        self, measurements: Sequence[Measurement], until: float, covariance: Array, correction: Array,
+        self,
+        measurements: Sequence[Measurement],
+        until: float,
+        covariance: Array,
+        correction: Array,
         rule: StepRule | None = None,
-    ) -> list[list[float]] | None:  # fmt: skip
+    ) -> list[list[float]] | None:
         """As `ErrorModel.assimilate_step`, in one kernel, if no instrument has an equation or a clock of its own."""
         if self._packet is None:
             chosen = rule or StepRule(filter_inertial, list(self.noise), ())

@@ -8,22 +8,19 @@ nodes, or attaches all measurements of a step.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from simnav.compiled import kernel
+from simnav.compiled import helper, kernel
 from simnav.estimators.algebra.block_tridiagonal import (
-    ROWS,
-    STEPPED_TYPES,
-    Rows,
     after_step,
     error_after_step,
     whiten_one,
 )
 from simnav.estimators.algebra.whitening import whitening
-from simnav.types import Array, InitialState, Instruments, Integers, Measurement
+from simnav.kernel_types import IntegerVector, Matrix, Stack, Vector
+from simnav.types import Array, InitialState, Instruments, Measurement
 
 from .base import StepRule
 from .chain import STEPPED, Chain, chain_of
@@ -39,9 +36,15 @@ from .propagation import correct_inertial
 __all__ = ["InertialChain"]
 
 
-@kernel("void(f8[:, :, ::1], f8[:, :, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1])")
+@kernel
 def _along_motion(
-    transition: Array, jacobian: Array, residual: Array, begin_shift: Array, end_shift: Array, step: Array, along: Array
+    transition: Stack,
+    jacobian: Stack,
+    residual: Matrix,
+    begin_shift: Matrix,
+    end_shift: Matrix,
+    step: Matrix,
+    along: Matrix,
 ) -> None:
     """A step that follows the motion exactly, from one that solves the linear problem (`Chain.along_motion`).
 
@@ -65,11 +68,16 @@ def _along_motion(
         relative_shift(shift, end_shift[k], along[k + 1])
 
 
-@kernel()
+@helper
 def _move_folds(
-    first: int, end: int, transition: Array, shift: Array, jacobian: Array, predicted: tuple[Array, ...],
+    first: int,
+    end: int,
+    transition: Array,
+    shift: Array,
+    jacobian: Array,
+    predicted: tuple[Array, ...],
     now: tuple[Array, ...],
-) -> None:  # fmt: skip
+) -> None:
     """States of the folds in these rows where their nodes' shifts lead, and their derivatives; see `_linearise`."""
     position, velocity, dcm, bias, calibration = now
     moved, dx = np.empty(shift.shape[1]), np.zeros(15 + calibration.shape[1])
@@ -117,18 +125,35 @@ MOVED = Selection(("nodes", _STATE), ("motions", ("begin_shift", "end_shift")), 
 LEFT = Selection(("nodes", ("predicted", "predicted_shift", "step")), ("aids", ("node",)), ("folds", ("node",)))
 
 
-@kernel(
-    f"void(i8, i8, {ROWS}, UniTuple(i8, 3), Tuple(({_NODE_STATES}, "
-    "Tuple((f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, :, ::1], f8[:, ::1], f8[::1])), "
-    "Tuple((i8[::1], i8[::1], i8[::1], i8[::1], i8[::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[:, :, ::1], "
-    "f8[:, :, ::1], f8[:, ::1], f8[::1])), "
-    "Tuple((i8[::1], f8[:, :, ::1], f8[:, :, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1])), "
-    f"{_STATES}, {_STATES})), Tuple((i8[::1], f8[:, ::1], i8[::1], i8[::1])))"
-)
+@kernel
 def _linearise(
-    what: int, first: int, rows: Rows, fold_rows: tuple[int, int, int], columns: tuple[Any, ...],
-    known: tuple[Integers, Array, Integers, Integers],
-) -> None:  # fmt: skip
+    what: int,
+    first: int,
+    rows: tuple[int, int, int, int, int, int],
+    fold_rows: tuple[int, int, int],
+    columns: tuple[
+        tuple[Matrix, Matrix, Stack, Matrix, Matrix, Matrix],
+        tuple[Matrix, Stack, Matrix, Matrix, Stack, Stack, Matrix, Vector],
+        tuple[
+            IntegerVector,
+            IntegerVector,
+            IntegerVector,
+            IntegerVector,
+            IntegerVector,
+            Matrix,
+            Stack,
+            Matrix,
+            Stack,
+            Stack,
+            Matrix,
+            Vector,
+        ],
+        tuple[IntegerVector, Stack, Stack, Matrix, Stack, Matrix],
+        tuple[Matrix, Matrix, Stack, Matrix, Matrix],
+        tuple[Matrix, Matrix, Stack, Matrix, Matrix],
+    ],
+    known: tuple[IntegerVector, Matrix, IntegerVector, IntegerVector],
+) -> None:
     """Linearise and whiten the factors that have to do with a node or later ones.
 
     Parameters
@@ -197,15 +222,20 @@ def _linearise(
             norm[i] = whiten_one(residual[i], whitener[i], whitened[i])
 
 
-@kernel(
-    f"f8(b1, {ROWS}, UniTuple(i8, 2), f8[:, ::1], "
-    f"Tuple(({_STATES}, UniTuple(f8[:, ::1], 2), Tuple((i8[::1], f8[:, ::1])))), "
-    f"Tuple((f8[:, ::1], f8[::1])), Tuple(({STEPPED_TYPES})))"
-)
+@kernel
 def _retract(
-    keep: bool, rows: Rows, fold_rows: tuple[int, int], step: Array, moved: tuple[Any, Any, Any],
-    prior: tuple[Array, Array], stepped: tuple[Any, Any, Any],
-) -> float:  # fmt: skip
+    keep: bool,
+    rows: tuple[int, int, int, int, int, int],
+    fold_rows: tuple[int, int],
+    step: Matrix,
+    moved: tuple[tuple[Matrix, Matrix, Stack, Matrix, Matrix], tuple[Matrix, Matrix], tuple[IntegerVector, Matrix]],
+    prior: tuple[Matrix, Vector],
+    stepped: tuple[
+        tuple[Matrix, Matrix, Matrix],
+        tuple[Stack, Matrix, Stack, Matrix, Vector, Vector],
+        tuple[IntegerVector, Stack, Matrix, Stack, Matrix, Vector, Vector],
+    ],
+) -> float:
     """Move the nodes by a step, in place.
 
     Parameters
@@ -251,15 +281,14 @@ def _retract(
     return after_step(rows, prior, stepped[0], stepped[1], stepped[2]) if keep else 0.0
 
 
-@kernel(
-    f"UniTuple(i8, 2)(i8, {ROWS}, UniTuple(i8, 2), "
-    "Tuple((Tuple((f8[:, :, ::1], f8[:, ::1], f8[:, ::1])), Tuple((i8[::1],)), Tuple((i8[::1],)))), "
-    "Tuple((f8[:, ::1], f8[::1], f8[:, ::1])))"
-)
+@kernel
 def _marginalise(
-    leaving: int, rows: Rows, fold_rows: tuple[int, int], columns: tuple[Any, Any, Any],
-    prior: tuple[Array, Array, Array],
-) -> tuple[int, int]:  # fmt: skip
+    leaving: int,
+    rows: tuple[int, int, int, int, int, int],
+    fold_rows: tuple[int, int],
+    columns: tuple[tuple[Stack, Matrix, Matrix], tuple[IntegerVector], tuple[IntegerVector]],
+    prior: tuple[Matrix, Vector, Matrix],
+) -> tuple[int, int]:
     """Make the prior of the first node that stays from what was predicted for it.
 
     Parameters

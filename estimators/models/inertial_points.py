@@ -22,22 +22,19 @@ from math import atan2, ceil, cos, sin, sqrt
 
 import numpy as np
 
-from simnav.compiled import kernel
+from simnav.compiled import helper, kernel
 from simnav.geometry.earth import radii_scalar
 from simnav.geometry.rotation import rotate_left, rotation_coefficients
 from simnav.inverse_strapdown import sample_from_motion
+from simnav.kernel_types import Matrix, Vector
 from simnav.strapdown import mechanize_step
 from simnav.types import Array, Measurement
 
 from .inertial import InertialModel
 from .measurements import (
-    AID,
     HEADING,
     NAVIGATION_STATES,
     SPEED_LOG,
-    STATE,
-    Aid,
-    State,
     observe_inertial,
 )
 from .points import PointModel
@@ -48,18 +45,25 @@ __all__ = ["PIECE", "InertialPoints", "observe_points", "propagate_points"]
 PIECE = 0.5
 
 
-@kernel()
+@helper
 def _turn(dcm: Array, r0: float, r1: float, r2: float, turned: Array) -> None:
     """Compute ``turned = exp(r x) dcm``."""
     a, b = rotation_coefficients(r0 * r0 + r1 * r1 + r2 * r2)
     rotate_left(dcm, r0, r1, r2, a, b, turned)
 
 
-@kernel("void(f8[::1], f8[::1], f8[:, ::1], f8[::1], f8[:, ::1], f8, f8, f8, f8[:, ::1])")
+@kernel
 def propagate_points(
-    position: Array, velocity: Array, dcm: Array, next_velocity: Array, next_dcm: Array, interval: float,
-    gyro_decay: float, accelerometer_decay: float, errors: Array,
-) -> None:  # fmt: skip
+    position: Vector,
+    velocity: Vector,
+    dcm: Matrix,
+    next_velocity: Vector,
+    next_dcm: Matrix,
+    interval: float,
+    gyro_decay: float,
+    accelerometer_decay: float,
+    errors: Matrix,
+) -> None:
     """Propagate points through one piece of a state's motion, in place.
 
     Parameters
@@ -138,8 +142,13 @@ def propagate_points(
             errors[k, 12 + j] *= keep_a
 
 
-@kernel(f"void({AID}, {STATE}, f8[:, ::1], f8[:, ::1])")
-def observe_points(aid: Aid, state: State, errors: Array, differences: Array) -> None:
+@kernel
+def observe_points(
+    aid: tuple[int, Vector, int, int],
+    state: tuple[Vector, Vector, Matrix, Vector, Vector, Vector],
+    errors: Matrix,
+    differences: Matrix,
+) -> None:
     """The predicted readings of an instrument at points, minus that at the state.
 
     The readings are linear in position and calibration (see the module). For the other states the nonlinear function of

@@ -8,11 +8,12 @@ from typing import TypeAlias
 import numpy as np
 
 from simnav.compiled import kernel
+from simnav.kernel_types import IntegerMatrix, IntegerVector, Matrix, Vector
 from simnav.types import Array, Integers, Measurement
 
 from .base import NIS, RESULTS, SIZE, AidTable, StepRule
 from .inertial_update import assimilate_inertial
-from .propagation import MOVING, SAMPLES, Moving, Samples, propagate_inertial
+from .propagation import MOVING, SAMPLES, propagate_inertial
 
 __all__ = ["STEP", "Matrices", "Measured", "Others", "Packet", "filter_inertial"]
 
@@ -32,11 +33,17 @@ STEP = (
 )
 
 
-@kernel(f"i8({STEP})")
+@kernel
 def filter_inertial(
-    state: Moving, samples: Samples, first: int, until: float, noise: Array, matrices: Matrices, others: Others,
-    packet: tuple[AidTable, Measured],
-) -> int:  # fmt: skip
+    state: tuple[Vector, Vector, Matrix, Vector, Vector, Vector, Vector],
+    samples: tuple[Vector, Vector, Matrix, Matrix],
+    first: int,
+    until: float,
+    noise: Vector,
+    matrices: tuple[Matrix, Matrix, Matrix],
+    others: tuple[Vector, Vector, Vector, Vector],
+    packet: tuple[tuple[IntegerMatrix, Matrix, Matrix], tuple[IntegerVector, Vector, Matrix, Matrix]],
+) -> int:
     """Do `propagate_inertial` and `assimilate_inertial` for each measurement of a step, and propagate to its end.
 
     Parameters

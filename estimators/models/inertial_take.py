@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from typing import TypeAlias
 
-from simnav.compiled import kernel
+from simnav.compiled import helper, kernel
+from simnav.kernel_types import IntegerMatrix, IntegerVector, Matrix, Stack, Vector
 from simnav.types import Array, Integers
 
-from .base import AidTable
 from .chain import attach_one, begin_motion
 from .columns import Selection
-from .inertial_step import Measured
 from .measurements import HEADING, has_heading
-from .propagation import MOVING, SAMPLES, Moving, Samples, carry_errors, propagate_inertial
+from .propagation import Moving, carry_errors, propagate_inertial
 
 __all__ = ["TAKEN", "take_inertial"]
 
@@ -41,7 +40,7 @@ TAKEN = Selection(
 )
 
 
-@kernel()
+@helper
 def _keep(moving: Moving, calibration: Array, kept: Kept, row: int) -> None:
     """Write the state into a row."""
     position, velocity, dcm, _, bias, _, clock = moving
@@ -56,17 +55,35 @@ def _keep(moving: Moving, calibration: Array, kept: Kept, row: int) -> None:
         kept[5][row, i] = calibration[i]
 
 
-@kernel(
-    f"Tuple((i8, f8, UniTuple(i8, 4)))({MOVING}, {SAMPLES}, UniTuple(f8, 3), f8[::1], UniTuple(f8[:, ::1], 4), "
-    "UniTuple(f8[::1], 3), Tuple((Tuple((i8[:, ::1], f8[:, ::1], f8[:, ::1])), "
-    "Tuple((i8[::1], f8[::1], f8[:, ::1], f8[:, ::1])))), UniTuple(i8, 8), "
-    f"Tuple(({_KEPT}, {_MOTIONS}, {_ATTACHED}, {_FOLDED}, {_KEPT})))"
-)
+@kernel
 def take_inertial(
-    moving: Moving, samples: Samples, times: tuple[float, float, float], noise: Array,
-    matrices: tuple[Array, Array, Array, Array], others: tuple[Array, Array, Array], packet: tuple[AidTable, Measured],
-    numbers: tuple[int, int, int, int, int, int, int, int], columns: tuple[Kept, Motions, Attached, Folded, Kept],
-) -> tuple[int, float, tuple[int, int, int, int]]:  # fmt: skip
+    moving: tuple[Vector, Vector, Matrix, Vector, Vector, Vector, Vector],
+    samples: tuple[Vector, Vector, Matrix, Matrix],
+    times: tuple[float, float, float],
+    noise: Vector,
+    matrices: tuple[Matrix, Matrix, Matrix, Matrix],
+    others: tuple[Vector, Vector, Vector],
+    packet: tuple[tuple[IntegerMatrix, Matrix, Matrix], tuple[IntegerVector, Vector, Matrix, Matrix]],
+    numbers: tuple[int, int, int, int, int, int, int, int],
+    columns: tuple[
+        tuple[Vector, Matrix, Matrix, Stack, Matrix, Matrix, Matrix],
+        tuple[Stack, Stack, Stack, Stack, Matrix, Matrix, Vector, Vector],
+        tuple[
+            IntegerVector,
+            IntegerVector,
+            IntegerVector,
+            IntegerVector,
+            IntegerVector,
+            Vector,
+            Vector,
+            Matrix,
+            Stack,
+            Stack,
+        ],
+        tuple[IntegerVector, Stack, Stack, Stack, Matrix],
+        tuple[Vector, Matrix, Matrix, Stack, Matrix, Matrix, Matrix],
+    ],
+) -> tuple[int, float, tuple[int, int, int, int]]:
     """Do `Chain.take` for the chain of an inertial model.
 
     Parameters

@@ -12,17 +12,23 @@ import numpy as np
 
 from simnav.compiled import kernel
 from simnav.estimators.algebra.joseph import joseph_update, project
-from simnav.types import Array
+from simnav.kernel_types import Matrix, Vector
 
-from .measurements import AID, STATE, Aid, State, observe_inertial
+from .measurements import observe_inertial
 from .propagation import correct_inertial
 
 __all__ = ["absorb_inertial", "assimilate_inertial", "innovate_inertial"]
 
 
-@kernel(f"b1({AID}, f8[::1], {STATE}, f8[:, ::1], f8[::1], f8[:, ::1], f8[:, ::1])")
+@kernel
 def innovate_inertial(
-    aid: Aid, value: Array, state: State, covariance: Array, innovation: Array, cross: Array, predicted: Array
+    aid: tuple[int, Vector, int, int],
+    value: Vector,
+    state: tuple[Vector, Vector, Matrix, Vector, Vector, Vector],
+    covariance: Matrix,
+    innovation: Vector,
+    cross: Matrix,
+    predicted: Matrix,
 ) -> bool:
     """Compute the innovation of a measurement, and the covariance of its prediction.
 
@@ -51,9 +57,15 @@ def innovate_inertial(
     return True
 
 
-@kernel(f"f8(f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[::1], {STATE}, f8[::1])")
+@kernel
 def absorb_inertial(
-    covariance: Array, cross: Array, predicted: Array, noise: Array, innovation: Array, state: State, correction: Array
+    covariance: Matrix,
+    cross: Matrix,
+    predicted: Matrix,
+    noise: Matrix,
+    innovation: Vector,
+    state: tuple[Vector, Vector, Matrix, Vector, Vector, Vector],
+    correction: Vector,
 ) -> float:
     """Correct a state and its covariance by an innovation, in place.
 
@@ -85,9 +97,14 @@ def absorb_inertial(
     return nis
 
 
-@kernel(f"UniTuple(f8, 2)({AID}, f8[::1], {STATE}, f8[:, ::1], f8[:, ::1], f8[::1])")
+@kernel
 def assimilate_inertial(
-    aid: Aid, value: Array, state: State, covariance: Array, noise: Array, correction: Array
+    aid: tuple[int, Vector, int, int],
+    value: Vector,
+    state: tuple[Vector, Vector, Matrix, Vector, Vector, Vector],
+    covariance: Matrix,
+    noise: Matrix,
+    correction: Vector,
 ) -> tuple[float, float]:
     """Do `innovate_inertial` and `absorb_inertial` in one kernel.
 

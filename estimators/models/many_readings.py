@@ -90,9 +90,16 @@ class ManyReadings:
         return np.array([self._channel.get(name, -1) for name in names], dtype=np.intp)
 
     def linearise(
-        self, time: Array, value: Array, channel: NDArray[np.intp], states: Sequence[Array], row: NDArray[np.intp],
-        side: Array, offset: int, out: Array | None = None,
-    ) -> tuple[Array, Array]:  # fmt: skip
+        self,
+        time: Array,
+        value: Array,
+        channel: NDArray[np.intp],
+        states: Sequence[Array],
+        row: NDArray[np.intp],
+        side: Array,
+        offset: int,
+        out: Array | None = None,
+    ) -> tuple[Array, Array]:
         """Innovations and Jacobians of n readings.
 
         Parameters

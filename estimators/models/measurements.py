@@ -24,9 +24,10 @@ from __future__ import annotations
 from math import atan2, cos, sin, sqrt
 from typing import TypeAlias
 
-from simnav.compiled import kernel
+from simnav.compiled import helper, kernel
 from simnav.geometry.earth import ECCENTRICITY_SQUARED, ROTATION_RATE, SEMI_MAJOR_AXIS, radii_scalar
 from simnav.geometry.rotation import cross
+from simnav.kernel_types import Matrix, Vector
 from simnav.types import Array
 
 __all__ = [
@@ -67,13 +68,13 @@ def radii(latitude: float) -> tuple[float, float]:
     return prime * (1.0 - ECCENTRICITY_SQUARED) / x, prime
 
 
-@kernel()
+@helper
 def has_heading(dcm: Array) -> bool:
     """Whether a (3, 3) attitude is far enough from the vertical for a compass."""
     return not dcm[0, 0] * dcm[0, 0] + dcm[1, 0] * dcm[1, 0] < LEAST_LEVEL * LEAST_LEVEL
 
 
-@kernel()
+@helper
 def observe_inertial(aid: Aid, value: Array, state: State, innovation: Array, jacobian: Array) -> int:
     """Compute innovation and Jacobian of one measurement (equations in the module).
 
@@ -193,7 +194,13 @@ def observe_inertial(aid: Aid, value: Array, state: State, innovation: Array, ja
     return d
 
 
-@kernel(f"i8({AID}, f8[::1], {STATE}, f8[::1], f8[:, ::1])")
-def observe(aid: Aid, value: Array, state: State, innovation: Array, jacobian: Array) -> int:
+@kernel
+def observe(
+    aid: tuple[int, Vector, int, int],
+    value: Vector,
+    state: tuple[Vector, Vector, Matrix, Vector, Vector, Vector],
+    innovation: Vector,
+    jacobian: Matrix,
+) -> int:
     """Call `observe_inertial` from Python."""
     return observe_inertial(aid, value, state, innovation, jacobian)

@@ -14,6 +14,7 @@ import numpy as np
 
 from simnav.compiled import kernel
 from simnav.estimators.algebra.block_tridiagonal import error_after_step
+from simnav.kernel_types import Matrix, Stack
 from simnav.types import Array
 
 from .base import ErrorModel
@@ -26,8 +27,8 @@ __all__ = ["MovingChain", "MovingModel"]
 States = tuple[Array, ...]
 
 
-@kernel("void(f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[:, ::1])")
-def _errors_after_step(residual: Array, jacobian: Array, step: Array, after: Array) -> None:
+@kernel
+def _errors_after_step(residual: Matrix, jacobian: Stack, step: Matrix, after: Matrix) -> None:
     """The errors of K motions that a (K + 1, n) step of the nodes leaves, into a (K, n) array."""
     for k in range(residual.shape[0]):
         error_after_step(residual[k], jacobian[k], step[k], step[k + 1], after[k])

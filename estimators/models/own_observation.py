@@ -106,9 +106,16 @@ class OwnObservation:
         return self
 
     def point(
-        self, time: float, position: Array, velocity: Array, dcm: Array, rate: Array, bias: Array, values: Array,
+        self,
+        time: float,
+        position: Array,
+        velocity: Array,
+        dcm: Array,
+        rate: Array,
+        bias: Array,
+        values: Array,
         side: Array = NO_SIDE,
-    ) -> NavigationPoint:  # fmt: skip
+    ) -> NavigationPoint:
         """The state for the function.
 
         Parameters

@@ -19,8 +19,9 @@ from __future__ import annotations
 
 from math import atan2, cos, sqrt
 
-from simnav.compiled import kernel
+from simnav.compiled import helper, kernel
 from simnav.geometry.rotation import cross, rotated, rotation_coefficients
+from simnav.kernel_types import Matrix, Vector
 from simnav.types import Array
 
 __all__ = ["add_shift", "move_shift", "relative_shift", "turn_covariance"]
@@ -29,7 +30,7 @@ __all__ = ["add_shift", "move_shift", "relative_shift", "turn_covariance"]
 SERIES_ANGLE = 0.014
 
 
-@kernel()
+@helper
 def _compose(a0: float, a1: float, a2: float, b0: float, b1: float, b2: float) -> tuple[float, float, float]:
     """Rotation vector of ``exp(a x) exp(b x)``.
 
@@ -57,8 +58,8 @@ def _compose(a0: float, a1: float, a2: float, b0: float, b1: float, b2: float) -
     return ratio * v0, ratio * v1, ratio * v2
 
 
-@kernel("void(f8[:, ::1], f8[::1], f8[::1], f8[:, ::1])")
-def move_shift(F: Array, s: Array, moved: Array, J: Array) -> None:
+@kernel
+def move_shift(F: Matrix, s: Vector, moved: Vector, J: Matrix) -> None:
     """Propagate a shift s of a node through a motion: the shift ``moved`` at its end, and its derivative J.
 
     The equations are those of the module. J must hold F, or the result of an earlier call: only the rows of position,
@@ -131,15 +132,15 @@ def move_shift(F: Array, s: Array, moved: Array, J: Array) -> None:
     moved[6], moved[7], moved[8] = _compose(a0, a1, a2, b0, b1, b2)
 
 
-@kernel("void(f8[::1], f8[::1], f8[::1])")
-def relative_shift(shift: Array, step: Array, out: Array) -> None:
+@kernel
+def relative_shift(shift: Vector, step: Vector, out: Vector) -> None:
     """A shift as seen from where a step leads: rotations compose."""
     for j in range(shift.size):
         out[j] = shift[j] - step[j]
     out[6], out[7], out[8] = _compose(shift[6], shift[7], shift[8], -step[6], -step[7], -step[8])
 
 
-@kernel()
+@helper
 def add_shift(step: Array, shift: Array, out: Array) -> None:
     """A shift and a step after it; ``out`` may be the shift."""
     r0, r1, r2 = _compose(step[6], step[7], step[8], shift[6], shift[7], shift[8])
@@ -148,8 +149,8 @@ def add_shift(step: Array, shift: Array, out: Array) -> None:
     out[6], out[7], out[8] = r0, r1, r2
 
 
-@kernel("void(f8[:, ::1], f8[::1], f8[:, ::1])")
-def turn_covariance(P: Array, shift: Array, out: Array) -> None:
+@kernel
+def turn_covariance(P: Matrix, shift: Vector, out: Matrix) -> None:
     """``J P J'`` with the left Jacobian J of the rotation of a shift (`simnav.geometry.rotation.left_jacobian`)."""
     p0, p1, p2 = shift[6], shift[7], shift[8]
     angle2 = p0 * p0 + p1 * p1 + p2 * p2

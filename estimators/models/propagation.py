@@ -13,7 +13,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from simnav.compiled import kernel
+from simnav.compiled import helper, kernel
 from simnav.estimators.algebra.products import (
     Places,
     add_eight,
@@ -25,6 +25,7 @@ from simnav.estimators.algebra.products import (
 )
 from simnav.geometry.earth import EQUATORIAL_GRAVITY, ROTATION_RATE, SEMI_MAJOR_AXIS, gravity_scalar, radii_scalar
 from simnav.geometry.rotation import rotate_left, rotation_coefficients
+from simnav.kernel_types import Matrix, Vector
 from simnav.strapdown import mechanize_step
 from simnav.types import Array
 
@@ -77,14 +78,14 @@ Moving: TypeAlias = tuple[Array, Array, Array, Array, Array, Array, Array]
 MOVING = "Tuple((f8[::1], f8[::1], f8[:, ::1], f8[::1], f8[::1], f8[::1], f8[::1]))"
 
 
-@kernel()
+@helper
 def _usable(w0: float, w1: float, w2: float, f0: float, f1: float, f2: float) -> bool:
     rate = abs(w0) + abs(w1) + abs(w2)
     force = abs(f0) + abs(f1) + abs(f2)
     return rate < LARGEST_RATE and force < LARGEST_FORCE  # false for NaN
 
 
-@kernel()
+@helper
 def _dynamics(F: Array, block: Array, gyro_decay: float, accelerometer_decay: float) -> None:
     """Compute the system matrix F of the error dynamics for one block."""
     height = block[3]
@@ -134,7 +135,7 @@ def _dynamics(F: Array, block: Array, gyro_decay: float, accelerometer_decay: fl
         F[12 + i, 12 + i] = -accelerometer_decay
 
 
-@kernel()
+@helper
 def _list_elements(F: Array, dt: float, value: Array, half: Array, column: Places, count: Places) -> None:
     """List the elements of ``F dt`` and of ``F dt / 2`` that are not zero, row by row."""
     list_elements(F, half, column, count)
@@ -143,7 +144,7 @@ def _list_elements(F: Array, dt: float, value: Array, half: Array, column: Place
             value[i, q], half[i, q] = half[i, q] * dt, 0.5 * half[i, q] * dt
 
 
-@kernel()
+@helper
 def _advance_rows(value: Array, half: Array, column: Places, count: Places, M: Array, A: Array) -> None:
     """Compute ``M = (I + F dt + F F dt^2 / 2) M`` with the lists of `_list_elements`; A is work space."""
     sparse_product(value, column, count, M, A)
@@ -152,7 +153,7 @@ def _advance_rows(value: Array, half: Array, column: Places, count: Places, M: A
             add_eight(M[i], j, eight_sums(half, column, i, count[i], A, j, eight_of(A[i], j)))
 
 
-@kernel()
+@helper
 def _add_noise(Q: Array, block: Array, noise: Array) -> None:
     """Add half the noise of a block to Q: white, biases, turns, a time without data."""
     dt, held = 0.5 * block[0], 0.5 * block[1]
@@ -171,8 +172,8 @@ def _add_noise(Q: Array, block: Array, noise: Array) -> None:
         Q[12 + i, 12 + i] += noise[5] * dt
 
 
-@kernel("void(f8[:, ::1], i8, f8[::1], f8[:, ::1], f8[:, ::1])")
-def accumulate_error(blocks: Array, count: int, noise: Array, transition: Array, process_noise: Array) -> None:
+@kernel
+def accumulate_error(blocks: Matrix, count: int, noise: Vector, transition: Matrix, process_noise: Matrix) -> None:
     """Compute transition matrix and process noise of the error over successive blocks.
 
     Parameters
@@ -219,7 +220,7 @@ def accumulate_error(blocks: Array, count: int, noise: Array, transition: Array,
             process_noise[i, j] = Q[i, j]
 
 
-@kernel()
+@helper
 def next_stretch(
     clock: Array, samples: Samples, i: int, t: float, until: float, nominal: float
 ) -> tuple[int, float, float, bool]:
@@ -278,9 +279,14 @@ def next_stretch(
     return i, stop, whole, hold
 
 
-@kernel(f"UniTuple(i8, 2)({MOVING}, {SAMPLES}, i8, f8, f8[::1], f8[:, ::1])")
+@kernel
 def advance_inertial(
-    state: Moving, samples: Samples, first: int, until: float, noise: Array, blocks: Array
+    state: tuple[Vector, Vector, Matrix, Vector, Vector, Vector, Vector],
+    samples: tuple[Vector, Vector, Matrix, Matrix],
+    first: int,
+    until: float,
+    noise: Vector,
+    blocks: Matrix,
 ) -> tuple[int, int]:
     """Propagate an inertial state to a time, which need not be the time of a sample, in place.
 
@@ -380,11 +386,16 @@ def advance_inertial(
     return i, count
 
 
-@kernel("void(f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[::1], f8[::1], f8[::1], f8)")
+@kernel
 def propagate_covariance(
-    covariance: Array, transition: Array, process_noise: Array, calibration: Array, rate: Array, density: Array,
+    covariance: Matrix,
+    transition: Matrix,
+    process_noise: Matrix,
+    calibration: Vector,
+    rate: Vector,
+    density: Vector,
     elapsed: float,
-) -> None:  # fmt: skip
+) -> None:
     """Compute ``P = Phi P Phi' + Q`` in place; the states from index m on are independent Gauss-Markov biases.
 
     Parameters
@@ -439,8 +450,8 @@ def propagate_covariance(
         covariance[i, i] += noise[i - m]
 
 
-@kernel("void(f8[:, ::1], f8[::1], f8, f8[:, ::1])")
-def carry_errors(transition: Array, rate: Array, elapsed: float, error: Array) -> None:
+@kernel
+def carry_errors(transition: Matrix, rate: Vector, elapsed: float, error: Matrix) -> None:
     """Propagate errors, the columns of an (n, k) array, in place; for the arguments see `propagate_covariance`."""
     m, columns = transition.shape[0], error.shape[1]
     X = np.zeros((m, columns))
@@ -459,11 +470,17 @@ def carry_errors(transition: Array, rate: Array, elapsed: float, error: Array) -
             error[i, j] *= decay
 
 
-@kernel(f"i8({MOVING}, {SAMPLES}, i8, f8, f8[::1], UniTuple(f8[:, ::1], 3), UniTuple(f8[::1], 3), f8)")
+@kernel
 def propagate_inertial(
-    state: Moving, samples: Samples, first: int, until: float, noise: Array, matrices: tuple[Array, Array, Array],
-    others: tuple[Array, Array, Array], elapsed: float,
-) -> int:  # fmt: skip
+    state: tuple[Vector, Vector, Matrix, Vector, Vector, Vector, Vector],
+    samples: tuple[Vector, Vector, Matrix, Matrix],
+    first: int,
+    until: float,
+    noise: Vector,
+    matrices: tuple[Matrix, Matrix, Matrix],
+    others: tuple[Vector, Vector, Vector],
+    elapsed: float,
+) -> int:
     """Do `advance_inertial`, `accumulate_error` and `propagate_covariance` in one kernel.
 
     Parameters
@@ -492,8 +509,10 @@ def propagate_inertial(
     return first
 
 
-@kernel("void(f8[::1], f8[::1], f8[:, ::1], f8[::1], f8[::1], f8[::1])")
-def correct_inertial(position: Array, velocity: Array, dcm: Array, bias: Array, calibration: Array, dx: Array) -> None:
+@kernel
+def correct_inertial(
+    position: Vector, velocity: Vector, dcm: Matrix, bias: Vector, calibration: Vector, dx: Vector
+) -> None:
     """Add the correction ``dx`` to a state, in place; the attitude is turned by ``exp(dx[6:9] x)`` from the left."""
     meridian, prime = radii_scalar(sin(position[0]))
     position[1] += dx[1] / ((prime + position[2]) * cos(position[0]))

@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simnav.compiled import kernel
-from simnav.types import Array, InitialState, Instruments, Integers
+from simnav.kernel_types import IntegerMatrix, IntegerVector, Matrix, Stack
+from simnav.types import Array, InitialState, Instruments
 
 from .chain import Chain, chain_of
 from .columns import Columns
@@ -23,14 +24,17 @@ from .ship_kernels import VELOCITY, fill_jacobian, residual_of
 __all__ = ["ShipChain"]
 
 
-@kernel(
-    "void(i8, Tuple((i8[::1], i8[::1], f8[:, ::1])), i8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], "
-    "f8[:, :, ::1])"
-)
+@kernel
 def _linearise_aids(
-    first: int, measured: tuple[Integers, Integers, Array], codes: Integers, aids: Array, position: Array, x: Array,
-    residual: Array, jacobian: Array,
-) -> None:  # fmt: skip
+    first: int,
+    measured: tuple[IntegerVector, IntegerVector, Matrix],
+    codes: IntegerMatrix,
+    aids: Matrix,
+    position: Matrix,
+    x: Matrix,
+    residual: Matrix,
+    jacobian: Stack,
+) -> None:
     """Residuals and derivatives of M measurements at the states that they are attached to.
 
     Parameters

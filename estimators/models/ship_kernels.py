@@ -16,8 +16,9 @@ from math import atan2, ceil, cos, exp, sin
 
 import numpy as np
 
-from simnav.compiled import kernel
+from simnav.compiled import helper, kernel
 from simnav.geometry.earth import radii_scalar
+from simnav.kernel_types import IntegerVector, Matrix, Stack, Vector
 from simnav.types import Array, Integers
 
 __all__ = [
@@ -50,7 +51,7 @@ POSITION, HEADING, LOG, VELOCITY, BODY_VELOCITY = range(5)
 STEP = 1.0
 
 
-@kernel()
+@helper
 def steps_of(elapsed: float, turn_time: float) -> tuple[int, float, float]:
     """Number of integration steps of a stretch, their length, and the integral of the decaying turn rate over one."""
     steps = max(1, ceil(elapsed / STEP - 1e-9))
@@ -58,14 +59,14 @@ def steps_of(elapsed: float, turn_time: float) -> tuple[int, float, float]:
     return steps, dt, turn_time * (1.0 - exp(-dt / turn_time))
 
 
-@kernel()
+@helper
 def decay_of(rate: Array, dt: float, decay: Array) -> None:
     """Fill in by what the states shrink in a step. (Loops, here and below: they compile faster than expressions.)"""
     for i in range(rate.size):
         decay[i] = exp(-rate[i] * dt)
 
 
-@kernel()
+@helper
 def set_identity(M: Array) -> None:
     """``M = 1``."""
     for i in range(M.shape[0]):
@@ -74,7 +75,7 @@ def set_identity(M: Array) -> None:
         M[i, i] = 1.0
 
 
-@kernel()
+@helper
 def sail(x: Array, decay: Array, turning: float, dt: float) -> tuple[float, ...]:
     """Move x on by a step; return metres north and east, the speed, and cosine and sine of the mean heading."""
     u, turn = x[U], turning * x[R]
@@ -87,7 +88,7 @@ def sail(x: Array, decay: Array, turning: float, dt: float) -> tuple[float, ...]
     return north, east, u, c, s
 
 
-@kernel()
+@helper
 def displace_ship(position: Array, north: float, east: float) -> None:
     """Move a position by metres, with the radii where it was."""
     meridian, prime = radii_scalar(sin(position[0]))
@@ -95,7 +96,7 @@ def displace_ship(position: Array, north: float, east: float) -> None:
     position[0] += north / (meridian + position[2])
 
 
-@kernel()
+@helper
 def carry_rows(M: Array, decay: Array, turning: float, dt: float, u: float, c: float, s: float) -> None:
     """``M = F M`` in place, F the transition matrix of `sail`'s step."""
     n = M.shape[1]
@@ -111,7 +112,7 @@ def carry_rows(M: Array, decay: Array, turning: float, dt: float, u: float, c: f
                 M[i, j] *= decay[i]
 
 
-@kernel()
+@helper
 def sail_step(
     position: Array, x: Array, transition: Array, decay: Array, turning: float, dt: float
 ) -> tuple[float, float, float]:
@@ -122,11 +123,17 @@ def sail_step(
     return u, c, s
 
 
-@kernel("void(f8[::1], f8[::1], f8[:, ::1], f8[:, ::1], f8[::1], f8[::1], f8, f8)")
+@kernel
 def advance_ship(
-    position: Array, x: Array, covariance: Array, transition: Array, rate: Array, density: Array, turn_time: float,
+    position: Vector,
+    x: Vector,
+    covariance: Matrix,
+    transition: Matrix,
+    rate: Vector,
+    density: Vector,
+    turn_time: float,
     elapsed: float,
-) -> None:  # fmt: skip
+) -> None:
     """Propagate a state and its covariance, in place.
 
     Half of a step's noise is added before it and half after it, which is accurate to second order in its length.
@@ -169,8 +176,8 @@ def advance_ship(
             covariance[i, i] += 0.5 * dt * density[i]
 
 
-@kernel("void(f8[:, ::1], f8[::1], f8, f8)")
-def move_ships(states: Array, rate: Array, turn_time: float, elapsed: float) -> None:
+@kernel
+def move_ships(states: Matrix, rate: Vector, turn_time: float, elapsed: float) -> None:
     """Advance (k, n) states by the same motion; their positions are metres."""
     steps, dt, turning = steps_of(elapsed, turn_time)
     decay = np.empty(rate.size)
@@ -182,10 +189,8 @@ def move_ships(states: Array, rate: Array, turn_time: float, elapsed: float) -> 
             states[k, E] += east
 
 
-@kernel("void(f8[:, ::1], f8[:, ::1], f8[::1], f8[::1], f8, f8[:, :, ::1])")
-def sail_ships(
-    position: Array, x: Array, elapsed: Array, rate: Array, turn_time: float, transition: Array
-) -> None:  # fmt: skip
+@kernel
+def sail_ships(position: Matrix, x: Matrix, elapsed: Vector, rate: Vector, turn_time: float, transition: Stack) -> None:
     """Advance K states, each by a time of its own, in place.
 
     Parameters
@@ -210,8 +215,8 @@ def sail_ships(
             sail_step(position[k], x[k], transition[k], decay, turning, dt)
 
 
-@kernel("void(f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1])")
-def differ_ships(position: Array, x: Array, other: Array, other_x: Array, difference: Array) -> None:
+@kernel
+def differ_ships(position: Matrix, x: Matrix, other: Matrix, other_x: Matrix, difference: Matrix) -> None:
     """Fill in (K, n) by how much K states differ from K others, in metres with the radii of the others."""
     for k in range(x.shape[0]):
         meridian, prime = radii_scalar(sin(other[k, 0]))
@@ -222,7 +227,7 @@ def differ_ships(position: Array, x: Array, other: Array, other_x: Array, differ
             difference[k, i] = x[k, i] - other_x[k, i]
 
 
-@kernel()
+@helper
 def reading(code: Integers, aid: Array, x: Array) -> tuple[float, float]:
     """What an instrument should read, up to two components; a position in metres from that of the state."""
     kind, at, scale = code[0], code[1], code[2]
@@ -251,7 +256,7 @@ def reading(code: Integers, aid: Array, x: Array) -> tuple[float, float]:
     return a, b
 
 
-@kernel()
+@helper
 def fill_jacobian(code: Integers, aid: Array, x: Array, jacobian: Array) -> None:
     """The derivative of `reading`, into a matrix of zeros (or of the same instrument's last one)."""
     kind, at, scale = code[0], code[1], code[2]
@@ -287,7 +292,7 @@ def fill_jacobian(code: Integers, aid: Array, x: Array, jacobian: Array) -> None
             jacobian[1, at + 1] = 1.0
 
 
-@kernel()
+@helper
 def residual_of(
     code: Integers, aid: Array, position: Array, x: Array, first: float, second: float
 ) -> tuple[float, float]:
@@ -305,11 +310,18 @@ def residual_of(
     return first - a, second - b
 
 
-@kernel("void(i8[::1], f8[::1], f8[::1], f8[::1], f8, f8, f8[::1], f8[:, ::1], f8[:, ::1])")
+@kernel
 def observe_ship(
-    code: Integers, aid: Array, position: Array, x: Array, first: float, second: float, residual: Array,
-    jacobian: Array, noise: Array,
-) -> None:  # fmt: skip
+    code: IntegerVector,
+    aid: Vector,
+    position: Vector,
+    x: Vector,
+    first: float,
+    second: float,
+    residual: Vector,
+    jacobian: Matrix,
+    noise: Matrix,
+) -> None:
     """Linearise one measurement.
 
     Parameters
@@ -351,8 +363,8 @@ def observe_ship(
         noise[1, 1] += aid[5] * w * w + aid[6] * v * v + aid[4]
 
 
-@kernel("void(i8[::1], f8[::1], f8[:, ::1], f8[:, ::1])")
-def read_ships(code: Integers, aid: Array, states: Array, readings: Array) -> None:
+@kernel
+def read_ships(code: IntegerVector, aid: Vector, states: Matrix, readings: Matrix) -> None:
     """Fill in (k, m) what an instrument should read at (k, n) states; a position in metres."""
     for k in range(states.shape[0]):
         a, b = reading(code, aid, states[k])
@@ -361,23 +373,23 @@ def read_ships(code: Integers, aid: Array, states: Array, readings: Array) -> No
             readings[k, 1] = b
 
 
-@kernel("void(f8[::1], f8[::1], f8[::1])")
-def correct_ship(position: Array, x: Array, dx: Array) -> None:
+@kernel
+def correct_ship(position: Vector, x: Vector, dx: Vector) -> None:
     """Add the correction ``dx`` (n,) to a state, in place."""
     displace_ship(position, dx[N], dx[E])
     for i in range(2, x.size):
         x[i] += dx[i]
 
 
-@kernel("void(f8[:, ::1], f8[:, ::1], f8[:, ::1])")
-def correct_ships(position: Array, x: Array, steps: Array) -> None:
+@kernel
+def correct_ships(position: Matrix, x: Matrix, steps: Matrix) -> None:
     """Add (K, n) corrections to K states, in place."""
     for k in range(steps.shape[0]):
         correct_ship(position[k], x[k], steps[k])
 
 
-@kernel("void(f8[::1], f8[:, ::1], f8, f8[::1], f8[:, ::1])")
-def describe_ship(x: Array, covariance: Array, sway: float, velocity: Array, out: Array) -> None:
+@kernel
+def describe_ship(x: Vector, covariance: Matrix, sway: float, velocity: Vector, out: Matrix) -> None:
     """Ground velocity of a state, and the covariance of what it says of position, velocity and heading.
 
     Parameters

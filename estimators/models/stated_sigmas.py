@@ -64,9 +64,13 @@ class _Stated(ErrorModel):
         return None if self._states(measurement) else super().assimilate(measurement, covariance, correction)
 
     def assimilate_step(
-        self, measurements: Sequence[Measurement], until: float, covariance: Array, correction: Array,
+        self,
+        measurements: Sequence[Measurement],
+        until: float,
+        covariance: Array,
+        correction: Array,
         rule: StepRule | None = None,
-    ) -> list[list[float]] | None:  # fmt: skip
+    ) -> list[list[float]] | None:
         if rule is not None or any(map(self._states, measurements)):
             return None
         return super().assimilate_step(measurements, until, covariance, correction)

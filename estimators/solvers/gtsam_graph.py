@@ -27,6 +27,7 @@ from simnav.estimators.models.inertial import InertialModel
 from simnav.estimators.models.measurements import DVL, GNSS_POSITION, GNSS_VELOCITY, SPEED_LOG, observe_inertial
 from simnav.estimators.models.stated_sigmas import with_stated_sigmas
 from simnav.geometry.rotation import rpy_from_dcm
+from simnav.kernel_types import Matrix, Vector
 from simnav.types import Array, Estimate, InitialState, Instruments, Measurement
 
 from .gtsam_preintegration import Preintegration
@@ -42,14 +43,16 @@ LEAST_BIAS = 1e-10, 1e-8
 _BIAS_ORDER = [3, 4, 5, 0, 1, 2]
 
 
-@kernel(
-    "i8(Tuple((i8, f8[::1])), f8[::1], f8[::1], f8[:, ::1], Tuple((f8[:, ::1], f8[::1], f8[::1], f8[::1], f8[::1])), "
-    "f8[::1], f8[:, ::1])"
-)
+@kernel
 def observe_tangent(
-    aid: tuple[int, Array], value: Array, origin: Array, axes: Array, state: tuple[Array, Array, Array, Array, Array],
-    error: Array, jacobian: Array,
-) -> int:  # fmt: skip
+    aid: tuple[int, Vector],
+    value: Vector,
+    origin: Vector,
+    axes: Matrix,
+    state: tuple[Matrix, Vector, Vector, Vector, Vector],
+    error: Vector,
+    jacobian: Matrix,
+) -> int:
     """Compute prediction minus measurement, and its Jacobian, for a state in a `TangentFrame`.
 
     Parameters

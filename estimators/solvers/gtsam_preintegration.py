@@ -30,12 +30,11 @@ from simnav.compiled import kernel
 from simnav.estimators.models.propagation import (
     HELD_ATTITUDE,
     HELD_VELOCITY,
-    SAMPLES,
     TURN_TIME,
-    Samples,
     next_stretch,
 )
 from simnav.geometry.rotation import cross
+from simnav.kernel_types import Matrix, Vector
 from simnav.types import Array, ImuSamples
 
 from .tangent_frame import TangentFrame
@@ -53,9 +52,16 @@ HELD_PARTS, HELD_PART = 4, 0.1
 _EYE = np.eye(3)
 
 
-@kernel(f"UniTuple(i8, 2)(f8[::1], f8[::1], f8[::1], {SAMPLES}, i8, f8, f8, f8[:, ::1])")
+@kernel
 def imu_pieces(
-    clock: Array, memory: Array, bias: Array, samples: Samples, first: int, until: float, nominal: float, pieces: Array
+    clock: Vector,
+    memory: Vector,
+    bias: Vector,
+    samples: tuple[Vector, Vector, Matrix, Matrix],
+    first: int,
+    until: float,
+    nominal: float,
+    pieces: Matrix,
 ) -> tuple[int, int]:
     """Cut the stretch up to a time into pieces of constant rate and force, as GTSAM integrates them.
 

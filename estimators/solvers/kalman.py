@@ -262,9 +262,12 @@ class KalmanEstimator(Solver):
         return step_rule(own, self._names, self._first_variances) if isinstance(own, NoiseAdaptation) else None
 
     def _take_step(
-        self, measurements: Sequence[Measurement], until: float, diagnostics: dict[str, float | Array],
+        self,
+        measurements: Sequence[Measurement],
+        until: float,
+        diagnostics: dict[str, float | Array],
         flagged: list[tuple[str, float]],
-    ) -> bool:  # fmt: skip
+    ) -> bool:
         """Use the measurements of a step, and propagate to its end; False if they have to be taken one by one."""
         rule = self._rule
         used = self.model.assimilate_step(measurements, until, self.covariance, self._correction, rule)

@@ -157,9 +157,11 @@ def _moved(end: StepEnd, node: Array) -> Array:
 
 
 def smoothed_rows(
-    model: ErrorModel, lags: Sequence[float], ends: Sequence[tuple[int, float]],
+    model: ErrorModel,
+    lags: Sequence[float],
+    ends: Sequence[tuple[int, float]],
     corrections: Callable[[int], tuple[list[list[Array]], list[Array]]],
-) -> Array:  # fmt: skip
+) -> Array:
     """States of earlier times from a filter's states and the corrections of a smoother, (k, 9).
 
     Parameters

@@ -41,6 +41,7 @@ from simnav.estimators.adaptations.base import Adaptation
 from simnav.estimators.algebra.cholesky import factorise
 from simnav.estimators.models.base import Observation
 from simnav.estimators.models.points import PointModel
+from simnav.kernel_types import Matrix
 from simnav.types import Array, InitialState, Instruments, Measurement
 
 from .kalman import KalmanEstimator
@@ -48,8 +49,8 @@ from .kalman import KalmanEstimator
 __all__ = ["SigmaPointEstimator", "draw_points"]
 
 
-@kernel("void(f8[:, ::1], f8, f8[:, ::1])")
-def draw_points(covariance: Array, spread: float, points: Array) -> None:
+@kernel
+def draw_points(covariance: Matrix, spread: float, points: Matrix) -> None:
     """Rows ``+spread L_j``, then ``-spread L_j``, of the columns of the Cholesky factor of a covariance.
 
     Parameters

@@ -35,7 +35,8 @@ from simnav.compiled import kernel
 from simnav.estimators.adaptations.student_t import normalised_trace
 from simnav.estimators.algebra.joseph import joseph_update, project
 from simnav.estimators.models.base import ErrorModel, Linearised
-from simnav.types import Array, Datasheet, Integers
+from simnav.kernel_types import IntegerVector, Matrix, Stack, Vector
+from simnav.types import Array, Datasheet
 
 from .smoother import Smoother, smoother_gains
 
@@ -54,15 +55,15 @@ class _Used(NamedTuple):
     noise: Array
 
 
-@kernel(
-    "void(f8[:, :, ::1], f8[:, :, ::1], f8[:, ::1], i8[::1], "
-    "Tuple((i8[::1], f8[:, :, ::1], f8[:, ::1], f8[:, :, ::1], f8[::1])), "
-    "Tuple((f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[:, :, ::1])))"
-)
+@kernel
 def _forward(
-    transition: Array, process: Array, moved: Array, first: Integers,
-    used: tuple[Integers, Array, Array, Array, Array], filtered: tuple[Array, Array, Array, Array],
-) -> None:  # fmt: skip
+    transition: Stack,
+    process: Stack,
+    moved: Matrix,
+    first: IntegerVector,
+    used: tuple[IntegerVector, Stack, Matrix, Stack, Vector],
+    filtered: tuple[Matrix, Stack, Matrix, Stack],
+) -> None:
     """Kalman filter over the stops; overwrites ``filtered`` but for the first stop.
 
     Parameters

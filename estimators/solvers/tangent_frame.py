@@ -33,6 +33,7 @@ from simnav.geometry.earth import (
     gravity_scalar,
     radii_scalar,
 )
+from simnav.kernel_types import Matrix, Vector
 from simnav.types import Array
 
 __all__ = ["TangentFrame", "tangent_state"]
@@ -40,14 +41,15 @@ __all__ = ["TangentFrame", "tangent_state"]
 _SECOND_ECCENTRICITY_SQUARED = ECCENTRICITY_SQUARED / (1.0 - ECCENTRICITY_SQUARED)
 
 
-@kernel(
-    "void(f8[::1], f8[:, ::1], Tuple((f8[:, ::1], f8[::1], f8[::1])), Tuple((f8[::1], f8[::1], f8[:, ::1])), "
-    "f8[:, ::1], f8[::1])"
-)
+@kernel
 def tangent_state(
-    origin: Array, axes: Array, local: tuple[Array, Array, Array], state: tuple[Array, Array, Array],
-    error_map: Array, attraction: Array,
-) -> None:  # fmt: skip
+    origin: Vector,
+    axes: Matrix,
+    local: tuple[Matrix, Vector, Vector],
+    state: tuple[Vector, Vector, Matrix],
+    error_map: Matrix,
+    attraction: Vector,
+) -> None:
     """Geodetic state of a state in the frame, and how its error changes.
 
     Parameters

@@ -242,9 +242,13 @@ class WindowEstimator(LooksBack, Solver):
         return estimate
 
     def _take_each(
-        self, admitted: Sequence[Measurement], until: float, samples: Array, diagnostics: dict[str, float | Array],
+        self,
+        admitted: Sequence[Measurement],
+        until: float,
+        samples: Array,
+        diagnostics: dict[str, float | Array],
         flagged: list[tuple[str, float]],
-    ) -> int:  # fmt: skip
+    ) -> int:
         """Make the measurements of a step factors, one by one; their number."""
         attached, by_group = 0, self.adaptation is None and bool(self._owners)
         for group in together(admitted, self._owners) if by_group else [[m] for m in admitted]:

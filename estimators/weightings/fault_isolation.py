@@ -21,7 +21,8 @@ from numpy.typing import NDArray
 from simnav.compiled import kernel
 from simnav.estimators.algebra.chi_square import chi_square_limits
 from simnav.estimators.models.roles import fixes_and_logs
-from simnav.types import Array, Instruments, Integers
+from simnav.kernel_types import IntegerVector, Vector
+from simnav.types import Instruments
 
 from .base import Factors
 
@@ -31,8 +32,8 @@ __all__ = ["FaultIsolation"]
 LOOSE = 1e-6
 
 
-@kernel("Tuple((i8, i8))(f8[::1], f8, f8[::1], i8[::1], f8[::1])")
-def _failing(time: Array, tested: float, norm: Array, components: Integers, limits: Array) -> tuple[int, int]:
+@kernel
+def _failing(time: Vector, tested: float, norm: Vector, components: IntegerVector, limits: Vector) -> tuple[int, int]:
     """Index of the first measurement after a time, and the number of failed tests from there on."""
     first, failing = time.size, 0
     while first > 0 and time[first - 1] > tested:

@@ -38,8 +38,9 @@ import numpy as np
 
 from simnav.compiled import kernel
 from simnav.estimators.models.channels import instrument_of, owners
+from simnav.kernel_types import IntegerVector, Matrix, Vector
 from simnav.kinds import POSITION, VELOCITY
-from simnav.types import Array, Instruments, Integers
+from simnav.types import Array, Instruments
 
 from .base import Factors, Weighting
 
@@ -52,8 +53,8 @@ Shape = tuple[float, float, float]
 _CHI_MEDIAN = np.array([1.0, 0.674490, 1.177410, 1.538172])
 
 
-@kernel("void(f8[::1], i8[::1], i8, f8[::1])")
-def medians(values: Array, group: Integers, fewest: int, out: Array) -> None:
+@kernel
+def medians(values: Vector, group: IntegerVector, fewest: int, out: Vector) -> None:
     """Medians of groups.
 
     Parameters
@@ -81,11 +82,17 @@ def medians(values: Array, group: Integers, fewest: int, out: Array) -> None:
             out[g] = 0.5 * (ordered[(count - 1) // 2] + ordered[count // 2])
 
 
-@kernel("void(f8[::1], f8[::1], i8[::1], i8[::1], f8[:, ::1], Tuple((f8, f8, i8)), f8[::1], f8[::1])")
+@kernel
 def _adapt(
-    norm: Array, kappa: Array, kind: Integers, group: Integers, shapes: Array, settings: tuple[float, float, int],
-    scales: Array, weight: Array,
-) -> None:  # fmt: skip
+    norm: Vector,
+    kappa: Vector,
+    kind: IntegerVector,
+    group: IntegerVector,
+    shapes: Matrix,
+    settings: tuple[float, float, int],
+    scales: Vector,
+    weight: Vector,
+) -> None:
     """Compute the scales of the groups and the weights of their members (eqs. 19-21).
 
     ``kappa`` holds the constant of each norm's type. ``settings`` are epsilon, the smallest scale, and the smallest

@@ -26,8 +26,9 @@ from typing import Any, Literal
 
 import numpy as np
 
-from simnav.compiled import kernel
-from simnav.types import Array, Instruments, Integers
+from simnav.compiled import helper, kernel
+from simnav.kernel_types import IntegerVector, Vector
+from simnav.types import Array, Instruments
 
 from .base import Factors
 from .m_estimators import constants, geman_mcclure, truncated
@@ -40,22 +41,22 @@ __all__ = ["GraduatedNonConvexity", "softened_geman_mcclure", "softened_truncate
 HARD = 10.0
 
 
-@kernel()
+@helper
 def softened_truncated(square: Any, mu: float) -> Any:
     """Weights of truncated least squares of u^2, softened by mu (Yang et al. 2020, eq. 14)."""
     root = np.sqrt(mu * (mu + 1.0) / np.maximum(square, 1e-12)) - mu
     return np.minimum(np.maximum(root, 0.0), 1.0)
 
 
-@kernel()
+@helper
 def softened_geman_mcclure(square: Any, mu: float) -> Any:
     """Geman-McClure weights of u^2, softened by mu (Yang et al. 2020, eq. 12)."""
     return (mu / (square + mu)) ** 2
 
 
-@kernel("Tuple((i8, f8, f8))(f8[::1], f8, f8[::1], i8[::1], f8[::1], f8[::1])")
+@kernel
 def _squares(
-    time: Array, seen: float, norm: Array, components: Integers, scale: Array, square: Array
+    time: Vector, seen: float, norm: Vector, components: IntegerVector, scale: Vector, square: Vector
 ) -> tuple[int, float, float]:
     """Overwrite ``square`` with u^2 of each measurement.
 
@@ -76,8 +77,8 @@ def _squares(
     return first, newest, largest
 
 
-@kernel("void(b1, f8[::1], f8, f8[::1])")
-def _soften(truncated: bool, square: Array, mu: float, weight: Array) -> None:
+@kernel
+def _soften(truncated: bool, square: Vector, mu: float, weight: Vector) -> None:
     """Overwrite the weights of measurements with those of a cost that is softened by mu."""
     for i in range(square.size):
         weight[i] = softened_truncated(square[i], mu) if truncated else softened_geman_mcclure(square[i], mu)

@@ -33,8 +33,9 @@ from typing import Any
 
 import numpy as np
 
-from simnav.compiled import kernel
-from simnav.types import Array, Integers
+from simnav.compiled import helper, kernel
+from simnav.kernel_types import IntegerVector, Vector
+from simnav.types import Array
 
 from .base import Factors
 from .robust_weighting import RobustWeighting
@@ -54,26 +55,26 @@ __all__ = [
 WeightFunction = Callable[[Array], Array]
 
 
-@kernel()
+@helper
 def huber(u: Any) -> Any:
     """Huber's weight ``min(1, 1/u)``."""
     return 1.0 / np.maximum(u, 1.0)
 
 
-@kernel()
+@helper
 def tukey(u: Any) -> Any:
     """The weight of Tukey's biweight: ``(1 - u^2)^2``, and 0 from u = 1 on."""
     v = np.maximum(1.0 - u * u, 0.0)
     return v * v
 
 
-@kernel()
+@helper
 def cauchy(u: Any) -> Any:
     """The weight of Cauchy's cost, ``1 / (1 + u^2)``."""
     return 1.0 / (1.0 + u * u)
 
 
-@kernel()
+@helper
 def geman_mcclure(u: Any) -> Any:
     """The weight of Geman and McClure, ``1 / (1 + u^2)^2``."""
     v = 1.0 + u * u
@@ -84,8 +85,8 @@ def geman_mcclure(u: Any) -> Any:
 COMPILED: tuple[WeightFunction, ...] = (huber, tukey, cauchy, geman_mcclure)
 
 
-@kernel("void(i8, f8[::1], i8[::1], f8[::1], f8[::1])")
-def _weigh(function: int, norm: Array, components: Integers, scale: Array, weight: Array) -> None:
+@kernel
+def _weigh(function: int, norm: Vector, components: IntegerVector, scale: Vector, weight: Vector) -> None:
     """Weights of M measurements by a function in `COMPILED`; ``scale`` has 1/c for each number of components."""
     for i in range(norm.size):
         u = norm[i] * scale[components[i]]

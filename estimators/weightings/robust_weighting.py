@@ -12,7 +12,7 @@ from abc import abstractmethod
 from functools import cache
 
 from simnav.compiled import kernel
-from simnav.types import Array
+from simnav.kernel_types import Vector
 
 from .base import Factors, Weighting
 
@@ -25,8 +25,8 @@ def _quantile(n: int) -> float:
     return float(n**0.5 * (1.0 - 2.0 / (9.0 * n) + 3.0902 * (2.0 / (9.0 * n)) ** 0.5) ** 1.5)
 
 
-@kernel("void(f8, f8[::1], f8[::1], f8, f8[::1])")
-def _weigh_motion(quantile: float, norm: Array, weight: Array, smallest: float, aid_weight: Array) -> None:
+@kernel
+def _weigh_motion(quantile: float, norm: Vector, weight: Vector, smallest: float, aid_weight: Vector) -> None:
     """Set the weights of motion factors (`weigh_motion`); raise those of measurements to the smallest."""
     for k in range(norm.size):
         u = quantile / max(norm[k], quantile)

@@ -56,7 +56,7 @@ class PaperSetting:
 
 def setting_of(
     scenario: str, what: str, source: Source, printed: str = "", key: str = "", ours: str = ""
-) -> PaperSetting:  # fmt: skip
+) -> PaperSetting:
     """A setting of a paper whose keys are all those of one scenario."""
     return PaperSetting(what, source, printed, scenario if key else "", key, ours)
 

@@ -123,9 +123,15 @@ class CostReport(Shown):
 
 
 def costs_of(
-    mine: Sequence[EstimatorRequest], beside: Sequence[EstimatorRequest], scenario: str, recording: Recording,
-    epochs: int, rounds: int, multiples: MultipleReport, progress: Callable[..., None] | None = None,
-) -> CostReport:  # fmt: skip
+    mine: Sequence[EstimatorRequest],
+    beside: Sequence[EstimatorRequest],
+    scenario: str,
+    recording: Recording,
+    epochs: int,
+    rounds: int,
+    multiples: MultipleReport,
+    progress: Callable[..., None] | None = None,
+) -> CostReport:
     """Measure the costs; see `simnav.leaderboard.interface.bench`."""
     everyone = {r.label: r.make for r in [*mine, *beside]}
     with mistakes(ValueError):

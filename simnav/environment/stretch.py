@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from simnav.compiled import Integers, kernel
+from simnav.compiled import Integers, helper, kernel
 from simnav.geometry.earth import ECCENTRICITY_SQUARED, SEMI_MAJOR_AXIS
+from simnav.kernel_types import Hypermatrix, IntegerMatrix, IntegerVector, Matrix, Stack
 from simnav.timing import TIME_TOLERANCE
 from simnav.types import KINDS, Array
 
@@ -62,7 +63,7 @@ def _draws(kind: str) -> bool:
     return KINDS[kind].role == "fix" and KINDS[kind].geodetic
 
 
-@kernel()
+@helper
 def _row(latitude: float, longitude: float, height: float, heading: float, out: Array) -> None:
     """One row of `rows_of`."""
     s, up = np.sin(latitude), height
@@ -76,18 +77,18 @@ def _row(latitude: float, longitude: float, height: float, heading: float, out: 
     out[5] = heading
 
 
-@kernel(
-    "i8(UniTuple(i8[::1], 2), f8[:, ::1], Tuple((i8[::1], f8[:, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, :, ::1])), "
-    "Tuple((i8[::1], i8[:, ::1], f8[:, ::1], f8[:, :, ::1])), UniTuple(i8[:, ::1], 2), "
-    "Tuple((f8[:, ::1], f8[:, ::1], i1[:, ::1], f8[:, :, ::1], f8[:, :, ::1])), "
-    "Tuple((f8[:, :, ::1], i1[:, :, ::1], f8[:, :, :, ::1])), f8[:, :, ::1], f8[:, ::1])"
-)
+@kernel
 def keep(
-    which: tuple[Integers, Integers], truth: Array, imu: tuple[Integers, Array, Array, Array, Array],
-    delivered: tuple[Integers, Integers, Array, Array], slots: tuple[Integers, Integers],
-    samples: tuple[Array, Array, NDArray[np.int8], Array, Array], aids: tuple[Array, NDArray[np.int8], Array],
-    states: Array, rows: Array,
-) -> int:  # fmt: skip
+    which: tuple[IntegerVector, IntegerVector],
+    truth: Matrix,
+    imu: tuple[IntegerVector, Matrix, Matrix, Stack, Stack],
+    delivered: tuple[IntegerVector, IntegerMatrix, Matrix, Stack],
+    slots: tuple[IntegerMatrix, IntegerMatrix],
+    samples: tuple[Matrix, Matrix, Annotated[NDArray[np.int8], "int8[:, ::1]"], Stack, Stack],
+    aids: tuple[Stack, Annotated[NDArray[np.int8], "int8[:, :, ::1]"], Hypermatrix],
+    states: Stack,
+    rows: Matrix,
+) -> int:
     """Put the last step of each of q runs into a row of padded arrays.
 
     Return -1, or the number of the first run with too many measurements of an instrument, times the length of a row of
@@ -373,8 +374,12 @@ def pack(block: Block, begin: float, most: Mapping[str, int]) -> Stretch:
     return Stretch(intervals, columns, states, rows_of(truth.position, truth.attitude), aids, cuts)
 
 
-@kernel("void(f8[:, :], f8[:, :], f8[:, ::1])")
-def _rows(position: Array, attitude: Array, out: Array) -> None:
+@kernel
+def _rows(
+    position: Annotated[NDArray[np.float64], "float64[:, :]"],
+    attitude: Annotated[NDArray[np.float64], "float64[:, :]"],
+    out: Matrix,
+) -> None:
     for i in range(out.shape[0]):
         _row(position[i, 0], position[i, 1], position[i, 2], attitude[i, 2], out[i])
 

@@ -12,7 +12,7 @@ from math import cos, sin, sqrt
 
 import numpy as np
 
-from simnav.compiled import Array, kernel
+from simnav.compiled import Array, helper
 
 __all__ = [
     "ECCENTRICITY_SQUARED",
@@ -55,7 +55,7 @@ _GRADIENT_SIN2 = 4.0 * FLATTENING / SEMI_MAJOR_AXIS
 _CURVATURE = 3.0 / SEMI_MAJOR_AXIS**2
 
 
-@kernel()
+@helper
 def radii_scalar(sin_latitude: float) -> tuple[float, float]:
     """Meridian and prime-vertical radius [m] at a sine of latitude (Groves eqs. 2.105-2.106)."""
     x = 1.0 - ECCENTRICITY_SQUARED * sin_latitude * sin_latitude
@@ -65,7 +65,7 @@ def radii_scalar(sin_latitude: float) -> tuple[float, float]:
     return prime_vertical * (1.0 - ECCENTRICITY_SQUARED) * scaled * scaled, prime_vertical
 
 
-@kernel()
+@helper
 def gravity_scalar(sin_latitude: float, height: float) -> float:
     """Normal gravity [m/s^2], positive down: Somigliana with height terms (Groves eqs. 2.134, 2.139)."""
     s2 = sin_latitude * sin_latitude
@@ -73,7 +73,7 @@ def gravity_scalar(sin_latitude: float, height: float) -> float:
     return surface * (1.0 - (_GRADIENT - _GRADIENT_SIN2 * s2) * height + _CURVATURE * height * height)
 
 
-@kernel()
+@helper
 def displace_scalar(
     latitude: float, longitude: float, height: float, north: float, east: float, down: float
 ) -> tuple[float, float, float]:

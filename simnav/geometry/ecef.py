@@ -14,7 +14,7 @@ from math import cos, sin, sqrt
 
 import numpy as np
 
-from simnav.compiled import Array, kernel
+from simnav.compiled import Array, helper
 from simnav.geometry.earth import ECCENTRICITY_SQUARED, FLATTENING, SEMI_MAJOR_AXIS, SEMI_MINOR_AXIS
 
 __all__ = ["ecef_from_geodetic", "ecef_from_geodetic_scalar", "geodetic_from_ecef", "ned_from_ecef"]
@@ -22,7 +22,7 @@ __all__ = ["ecef_from_geodetic", "ecef_from_geodetic_scalar", "geodetic_from_ece
 _SECOND_ECCENTRICITY_SQUARED = ECCENTRICITY_SQUARED / (1.0 - ECCENTRICITY_SQUARED)
 
 
-@kernel()
+@helper
 def ecef_from_geodetic_scalar(latitude: float, longitude: float, height: float) -> tuple[float, float, float]:
     """`ecef_from_geodetic` for one position."""
     s, c = sin(latitude), cos(latitude)

@@ -13,7 +13,7 @@ from math import cos, sin, sqrt
 
 import numpy as np
 
-from simnav.compiled import Array, kernel
+from simnav.compiled import Array, helper
 
 __all__ = [
     "cross",
@@ -46,7 +46,7 @@ def wrap_angle(angle: Array | float) -> Array:
     return np.remainder(np.asarray(angle) + np.pi, 2.0 * np.pi) - np.pi
 
 
-@kernel()
+@helper
 def wrap_scalar(angle: float) -> float:
     """`wrap_angle` for one angle."""
     return (angle + np.pi) % (2.0 * np.pi) - np.pi
@@ -247,13 +247,13 @@ def quaternion_from_dcm(dcm: Array) -> Array:
     return unit
 
 
-@kernel()
+@helper
 def cross(a0: float, a1: float, a2: float, b0: float, b1: float, b2: float) -> tuple[float, float, float]:
     """Vector product of two 3-vectors of scalars."""
     return a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0
 
 
-@kernel()
+@helper
 def small_rotation_coefficients(angle2: float) -> tuple[float, float]:
     """`rotation_coefficients` by their series, exact to rounding for ``angle2`` below 1e-3."""
     # Reciprocals are folded when compiled: a division costs as much as five products.
@@ -262,7 +262,7 @@ def small_rotation_coefficients(angle2: float) -> tuple[float, float]:
     return a, b
 
 
-@kernel()
+@helper
 def rotation_coefficients(angle2: float) -> tuple[float, float]:
     """The coefficients sin(x)/x and (1 - cos(x))/x^2 for x^2 = ``angle2``, exact to rounding."""
     if angle2 < 1e-3:
@@ -271,7 +271,7 @@ def rotation_coefficients(angle2: float) -> tuple[float, float]:
     return sin(angle) / angle, (1.0 - cos(angle)) / angle2
 
 
-@kernel()
+@helper
 def rotated(
     r0: float, r1: float, r2: float, a: float, b: float, v0: float, v1: float, v2: float
 ) -> tuple[float, float, float]:
@@ -281,14 +281,14 @@ def rotated(
     return v0 + a * x0 + b * y0, v1 + a * x1 + b * y1, v2 + a * x2 + b * y2
 
 
-@kernel()
+@helper
 def rotate_left(dcm: Array, r0: float, r1: float, r2: float, a: float, b: float, turned: Array) -> None:
     """``turned = exp(r x) dcm``, with the coefficients a, b of `rotation_coefficients`; it may be the dcm itself."""
     for j in range(3):
         turned[0, j], turned[1, j], turned[2, j] = rotated(r0, r1, r2, a, b, dcm[0, j], dcm[1, j], dcm[2, j])
 
 
-@kernel()
+@helper
 def rotate_right(dcm: Array, r0: float, r1: float, r2: float, a: float, b: float) -> None:
     """``dcm = dcm exp(r x)`` in place, with the coefficients a, b of `rotation_coefficients`."""
     for i in range(3):

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from math import cos, exp, pi, sin
 
-from simnav.compiled import Array, kernel
+from simnav.compiled import Array, helper
 from simnav.satellites.orbit import SPEED_OF_LIGHT
 
 __all__ = ["HUMIDITY", "ionosphere_scalar", "mapping_coefficients", "mapping_scalar", "zenith_delay_scalar"]
@@ -39,7 +39,7 @@ _NIELL = (
 _HEIGHT_A, _HEIGHT_B, _HEIGHT_C = 2.53e-5, 5.49e-3, 1.14e-3
 
 
-@kernel()
+@helper
 def ionosphere_scalar(
     coefficients: Array, second_of_day: float, latitude: float, longitude: float, azimuth: float, elevation: float
 ) -> float:
@@ -79,7 +79,7 @@ def ionosphere_scalar(
     return SPEED_OF_LIGHT * slant * delay
 
 
-@kernel()
+@helper
 def zenith_delay_scalar(latitude: float, height: float, humidity: float) -> tuple[float, float]:
     """Saastamoinen's hydrostatic and wet delay at the zenith [m], at a latitude [rad], height [m] and humidity [-]."""
     h = max(height, 0.0)
@@ -90,13 +90,13 @@ def zenith_delay_scalar(latitude: float, height: float, humidity: float) -> tupl
     return dry, 0.002277 * (1255.0 / temperature + 0.05) * vapour
 
 
-@kernel()
+@helper
 def _fraction(s: float, a: float, b: float, c: float) -> float:
     """Marini's continued fraction, 1 at the zenith."""
     return (1.0 + a / (1.0 + b / (1.0 + c))) / (s + a / (s + b / (s + c)))
 
 
-@kernel()
+@helper
 def _between(row: int, degrees: float) -> float:
     """A coefficient at a latitude [deg]: linear between the latitudes of the table, constant beyond them."""
     place = min(max((degrees - 15.0) / 15.0, 0.0), 4.0)
@@ -107,7 +107,7 @@ def _between(row: int, degrees: float) -> float:
     return first + share * (second - first)
 
 
-@kernel()
+@helper
 def mapping_coefficients(day_of_year: float, latitude: float) -> tuple[float, float, float, float, float, float]:
     """Niell's coefficients a, b, c of the hydrostatic and of the wet mapping function.
 
@@ -126,7 +126,7 @@ def mapping_coefficients(day_of_year: float, latitude: float) -> tuple[float, fl
     return a, b, c, _between(6, degrees), _between(7, degrees), _between(8, degrees)
 
 
-@kernel()
+@helper
 def mapping_scalar(
     coefficients: tuple[float, float, float, float, float, float], height: float, elevation: float
 ) -> tuple[float, float]:

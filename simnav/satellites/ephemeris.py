@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from simnav.compiled import Array, Flags, Integers, kernel
+from simnav.compiled import Array, Flags, Integers, helper, kernel
+from simnav.kernel_types import IntegerVector, Matrix, Stack, Vector
 from simnav.satellites.orbit import ELEMENTS, satellite_scalar
 from simnav.satellites.time_scales import GpsTime
 from simnav.spec import SpecError
@@ -183,7 +184,7 @@ class Ephemerides:
         return SatelliteStates(out[..., 0:3], out[..., 3:6], out[..., 6], out[..., 7])
 
 
-@kernel()
+@helper
 def nearest(numbers: Array, first: int, last: int, reach: float, time: float) -> int:
     """Index of the message in [first, last) with the nearest reference time; -1 if that is more than ``reach`` away."""
     best, least = -1, reach
@@ -194,8 +195,8 @@ def nearest(numbers: Array, first: int, last: int, reach: float, time: float) ->
     return best
 
 
-@kernel("void(f8[:, ::1], i8[::1], f8[::1], f8[::1], f8[:, :, ::1])")
-def _states(numbers: Array, begin: Integers, reach: Array, time: Array, out: Array) -> None:
+@kernel
+def _states(numbers: Matrix, begin: IntegerVector, reach: Vector, time: Vector, out: Stack) -> None:
     """Overwrite the (n, c, 8) ``out`` with `satellite_scalar` of each time and satellite."""
     for i in range(out.shape[0]):
         for j in range(out.shape[1]):

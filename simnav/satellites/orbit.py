@@ -22,7 +22,7 @@ from __future__ import annotations
 
 from math import atan2, cos, pi, sin, sqrt
 
-from simnav.compiled import Array, kernel
+from simnav.compiled import Array, helper
 
 __all__ = ["ELEMENTS", "SPEED_OF_LIGHT", "satellite_scalar"]
 
@@ -40,7 +40,7 @@ ELEMENTS = (
 _TILT = -5.0 / 180.0 * pi
 
 
-@kernel()
+@helper
 def satellite_scalar(q: Array, time: float) -> tuple[float, float, float, float, float, float, float, float]:
     """Position, velocity and clock of a satellite at one time.
 

@@ -18,9 +18,10 @@ from math import asin, atan2, cos, sin, sqrt
 
 import numpy as np
 
-from simnav.compiled import Array, Integers, kernel
+from simnav.compiled import Array, helper, kernel
 from simnav.geometry.earth import ROTATION_RATE
 from simnav.geometry.ecef import ecef_from_geodetic_scalar
+from simnav.kernel_types import IntegerVector, Matrix, Stack, Vector
 from simnav.satellites.atmosphere import (
     HUMIDITY,
     ionosphere_scalar,
@@ -121,7 +122,7 @@ class Sky:
         return Sight(out[..., 0:3], out[..., 3:6], *(out[..., k] for k in range(6, _COLUMNS)))
 
 
-@kernel()
+@helper
 def _apparent(q: Array, time: float, antenna: tuple[float, float, float], out: Array) -> float:
     """Write apparent position, velocity without the change of the delay, and clock into a row; return tau [s].
 
@@ -145,9 +146,13 @@ def _apparent(q: Array, time: float, antenna: tuple[float, float, float], out: A
     return sqrt(dx * dx + dy * dy + dz * dz) / SPEED_OF_LIGHT
 
 
-@kernel("void(Tuple((f8[:, ::1], i8[::1], f8[::1], f8[::1], f8[::1])), f8[::1], f8[:, ::1], f8[:, ::1], f8[:, :, ::1])")
+@kernel
 def _look(
-    sky: tuple[Array, Integers, Array, Array, Array], time: Array, position: Array, velocity: Array, out: Array
+    sky: tuple[Matrix, IntegerVector, Vector, Vector, Vector],
+    time: Vector,
+    position: Matrix,
+    velocity: Matrix,
+    out: Stack,
 ) -> None:
     """Overwrite ``out`` with the columns of `Sight`, in its order, for n times and c satellites.
 

@@ -9,13 +9,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from simnav.compiled import kernel, ready
+from simnav.compiled import helper, kernel, ready
 from simnav.geometry.earth import displace_scalar
 from simnav.geometry.ecef import ecef_from_geodetic_scalar
+from simnav.kernel_types import IntegerVector, Matrix, Stack, Vector
 from simnav.kinds import Component, Datasheet, NavigationPoint, NavigationPoints
 from simnav.satellites.signal_errors import amplification, noise_factor, range_error
 from simnav.sensors.one_of_many import one_of_many
-from simnav.types import Array, Integers
+from simnav.types import Array
 
 __all__ = ["DENSITY_RATIO", "SIDE", "observe", "observe_all", "reading_sigma"]
 
@@ -40,7 +41,7 @@ ELEVATION, DENSITY_RATIO, IONOSPHERE, TROPOSPHERE, MAPPING = 6, 8, 9, 10, 11
 _CLOCK = np.eye(2)
 
 
-@kernel()
+@helper
 def _antenna(position: Array, dcm: Array, rate: Array, arm: Array, antenna: Array) -> None:
     """Overwrite what all satellites have in common at a state; arguments as of `NavigationPoint`.
 
@@ -61,7 +62,7 @@ def _antenna(position: Array, dcm: Array, rate: Array, arm: Array, antenna: Arra
     antenna[11], antenna[12] = np.sin(longitude), np.cos(longitude)
 
 
-@kernel()
+@helper
 def _predict(antenna: Array, velocity: Array, side: Array, reading: Array, jacobian: Array) -> None:
     """Overwrite range, rate of the range, and their (2, 9) Jacobian; the antenna is that of `_antenna`."""
     a, swing, u, v = antenna[:3], antenna[3:6], np.empty(3), np.empty(3)
@@ -92,7 +93,7 @@ def _predict(antenna: Array, velocity: Array, side: Array, reading: Array, jacob
     jacobian[1, 8] += -(swing[0] * u[1] - swing[1] * u[0])
 
 
-@kernel()
+@helper
 def _equal(x: Array, y: Array) -> bool:
     for k in range(x.size):  # noqa: SIM110 (compiled)
         if x[k] != y[k]:
@@ -100,14 +101,17 @@ def _equal(x: Array, y: Array) -> bool:
     return True
 
 
-@kernel(
-    "void(Tuple((f8[:, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1])), f8[::1], f8[:, ::1], i8[::1], f8[::1], "
-    "UniTuple(f8[:, ::1], 4), f8[:, ::1], UniTuple(f8[:, :, ::1], 4))"
-)
+@kernel
 def _predict_all(
-    states: tuple[Array, Array, Array, Array], arm: Array, side: Array, channel: Integers, sigma: Array,
-    blocks: tuple[Array, Array, Array, Array], reading: Array, jacobians: tuple[Array, Array, Array, Array],
-) -> None:  # fmt: skip
+    states: tuple[Matrix, Matrix, Stack, Matrix],
+    arm: Vector,
+    side: Matrix,
+    channel: IntegerVector,
+    sigma: Vector,
+    blocks: tuple[Matrix, Matrix, Matrix, Matrix],
+    reading: Matrix,
+    jacobians: tuple[Stack, Stack, Stack, Stack],
+) -> None:
     """Predict n readings, and their Jacobians.
 
     Parameters

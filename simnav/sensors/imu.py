@@ -26,7 +26,9 @@ from typing import Any, ClassVar, Literal, Self, TypeAlias
 import numpy as np
 from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
+from simnav import kernel_types
 from simnav.compiled import kernel, ready
+from simnav.kernel_types import Matrix
 from simnav.normal_variates import NormalVariates
 from simnav.sensors.imu_effects import Effects, ImuEffects
 from simnav.sensors.imu_models import GRADES, Grade, ImuModel, imu_model
@@ -256,14 +258,18 @@ Triad: TypeAlias = tuple[Array, Array, float, float, float]
 _HELD = "Tuple((f8[:, ::1], i8, f8))"
 
 
-@kernel(
-    "void(f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[::1], f8[::1], Tuple((f8[:, ::1], f8[::1], f8, f8, f8)), "
-    f"{_HELD}, {_HELD}, f8[::1])"
-)
+@kernel
 def triad_errors(
-    ideal: Array, variates: Array, out: Array, time: Array, interval: Array, triad: Triad, in_run: Held, walk: Held,
-    residual: Array,
-) -> None:  # fmt: skip
+    ideal: Matrix,
+    variates: Matrix,
+    out: Matrix,
+    time: kernel_types.Vector,
+    interval: kernel_types.Vector,
+    triad: tuple[Matrix, kernel_types.Vector, float, float, float],
+    in_run: tuple[Matrix, int, float],
+    walk: tuple[Matrix, int, float],
+    residual: kernel_types.Vector,
+) -> None:
     """Add the errors of one triad (see the module).
 
     Parameters

@@ -12,8 +12,9 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from simnav.compiled import Flags, kernel
+from simnav.compiled import helper, kernel
 from simnav.geometry.earth import ECCENTRICITY_SQUARED, ROTATION_RATE, SEMI_MAJOR_AXIS, displace_scalar
+from simnav.kernel_types import FlagVector, Matrix, Vector
 from simnav.sensors.instrument import AidSpec, Instrument
 from simnav.types import Array, TapStates
 
@@ -45,7 +46,7 @@ SIGMA, SIGMA_SQUARED, SPEED_NOISE_SQUARED = 17, 20, 23
 NUMBERS = 24
 
 
-@kernel()
+@helper
 def _to_ned(roll: float, pitch: float, yaw: float, x: float, y: float, z: float) -> tuple[float, float, float]:
     """Turn one vector from body axes to north-east-down, as `simnav.sensors.instrument.turn_to_ned`."""
     sr, cr, sp, cp, sy, cy = sin(roll), cos(roll), sin(pitch), cos(pitch), sin(yaw), cos(yaw)
@@ -54,7 +55,7 @@ def _to_ned(roll: float, pitch: float, yaw: float, x: float, y: float, z: float)
     return cy * x - sy * y, sy * x + cy * y, z
 
 
-@kernel()
+@helper
 def _to_body(roll: float, pitch: float, yaw: float, x: float, y: float, z: float) -> tuple[float, float, float]:
     """Turn one vector from north-east-down to body axes, as `simnav.sensors.instrument.turn_to_body`."""
     sr, cr, sp, cp, sy, cy = sin(roll), cos(roll), sin(pitch), cos(pitch), sin(yaw), cos(yaw)
@@ -63,7 +64,7 @@ def _to_body(roll: float, pitch: float, yaw: float, x: float, y: float, z: float
     return x, cr * y + sr * z, cr * z - sr * y
 
 
-@kernel()
+@helper
 def observe_one(code: int, q: Array, tap: Array, value: Array) -> bool:
     """Compute one reading without bias and noise.
 
@@ -143,7 +144,7 @@ def observe_one(code: int, q: Array, tap: Array, value: Array) -> bool:
     return True
 
 
-@kernel()
+@helper
 def noise_scalar(q: Array, value: Array, j: int) -> float:
     """Standard deviation of the white noise of component j of a reading, from the reading without bias and noise."""
     if q[SPEED_NOISE_SQUARED] == 0.0:
@@ -153,8 +154,8 @@ def noise_scalar(q: Array, value: Array, j: int) -> float:
     return sqrt(q[SIGMA_SQUARED + j] + q[SPEED_NOISE_SQUARED] * (x * x + y * y + z * z))
 
 
-@kernel("void(i8, f8[::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], b1[::1])")
-def observe_rows(code: int, q: Array, taps: Array, values: Array, sigmas: Array, there: Flags) -> None:
+@kernel
+def observe_rows(code: int, q: Vector, taps: Matrix, values: Matrix, sigmas: Matrix, there: FlagVector) -> None:
     """Compute n readings by `observe_one` and `noise_scalar`.
 
     Overwritten are the (n, d) ``values``, the (n, d) ``sigmas``, and the (n,) mask ``there`` of delivered readings.

@@ -14,14 +14,15 @@ from math import exp, expm1, floor, isinf, pi, sqrt
 
 import numpy as np
 
-from simnav.compiled import kernel, ready
+from simnav.compiled import helper, kernel, ready
 from simnav.declared_process import oscillation
+from simnav.kernel_types import Matrix, Stack, Vector
 from simnav.types import Array
 
 __all__ = ["GaussMarkov", "HeldGaussMarkov", "SecondOrder", "quantize_scalar"]
 
 
-@kernel()
+@helper
 def quantize_scalar(increment: float, step: float, residual: float) -> tuple[float, float]:
     """The multiple of ``step`` nearest to increment + residual, and the new residual for the next sample."""
     total = increment + residual
@@ -29,9 +30,9 @@ def quantize_scalar(increment: float, step: float, residual: float) -> tuple[flo
     return output, total - output
 
 
-@kernel("b1(f8[:, ::1], f8[::1], f8[::1], f8[::1], f8, f8)")
+@kernel
 def _gauss_markov(
-    variates: Array, state: Array, sigma: Array, time: Array, previous: float, correlation_time: float
+    variates: Matrix, state: Vector, sigma: Vector, time: Vector, previous: float, correlation_time: float
 ) -> bool:
     """Convert (n, d) unit variates w into the process x, in place. Return False if the times are not ascending.
 
@@ -60,9 +61,9 @@ def _gauss_markov(
     return True
 
 
-@kernel("b1(f8[:, :, ::1], f8[:, ::1], f8[::1], f8, f8, f8)")
+@kernel
 def _second_order(
-    variates: Array, state: Array, time: Array, previous: float, frequency: float, damping: float
+    variates: Stack, state: Matrix, time: Vector, previous: float, frequency: float, damping: float
 ) -> bool:
     """Convert (n, d, 2) unit variates into value and rate / w of the process x, in place. False as of `_gauss_markov`.
 

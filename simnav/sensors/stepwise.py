@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from math import sqrt
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 
-from simnav.compiled import Array, Flags, Integers, kernel
+from simnav.compiled import Array, helper, kernel
+from simnav.kernel_types import FlagVector, Hypermatrix, IntegerMatrix, IntegerStack, IntegerVector, Matrix, Stack
 from simnav.kinds import add_error_scalar
 from simnav.sensors.faults.layer import ADDS, DROPS, HOLDS, STEPS_NOISE, ZEROES
 from simnav.sensors.imu import triad_errors
@@ -27,10 +29,12 @@ UNTOUCHED = -2
 BLOCKS, COMPILED, INERTIAL, DUE = 1, 2, 4, 8
 
 
-@kernel("i8(b1[::1], Tuple((b1[::1], b1[::1], i8[::1], i8[::1])), UniTuple(b1[::1], 3))")
+@kernel
 def sort_out(
-    active: Flags, runs: tuple[Flags, Flags, Integers, Integers], which: tuple[Flags, Flags, Flags]
-) -> int:  # fmt: skip
+    active: FlagVector,
+    runs: tuple[FlagVector, FlagVector, IntegerVector, IntegerVector],
+    which: tuple[FlagVector, FlagVector, FlagVector],
+) -> int:
     """Find what each of b runs needs in a step.
 
     Parameters
@@ -63,11 +67,13 @@ def sort_out(
     return found
 
 
-@kernel("i8(b1[::1], Tuple((i8[:, ::1], i8[::1])), UniTuple(i8[::1], 3), UniTuple(i8[::1], 3))")
+@kernel
 def begin_step(
-    compiled: Flags, stretch: tuple[Integers, Integers], counters: tuple[Integers, Integers, Integers],
-    limits: tuple[Integers, Integers, Integers],
-) -> int:  # fmt: skip
+    compiled: FlagVector,
+    stretch: tuple[IntegerMatrix, IntegerVector],
+    counters: tuple[IntegerVector, IntegerVector, IntegerVector],
+    limits: tuple[IntegerVector, IntegerVector, IntegerVector],
+) -> int:
     """Begin a step of b runs. Return the largest number of times in a step at which the state is needed.
 
     Parameters
@@ -96,17 +102,17 @@ def begin_step(
     return most
 
 
-@kernel(
-    "void(b1[::1], i8[::1], i8[::1], Tuple((f8[:, :, :, ::1], f8[:, :, ::1], f8[:, :, ::1], f8[:, :, ::1])), "
-    "Tuple((f8[:, :, :, ::1], f8[:, :, :, ::1], f8[:, :, :, ::1], i8[:, :, ::1])), "
-    "Tuple((b1[:, :, ::1], f8[:, :, :, ::1])), f8[:, ::1], "
-    "Tuple((f8[:, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, :, ::1])))"
-)
+@kernel
 def sense_imu(
-    active: Flags, at: Integers, samples: Integers, triads: tuple[Array, Array, Array, Array],
-    drawn: tuple[Array, Array, Array, Integers], disturbances: tuple[Flags, Array], clock: Array,
-    imu: tuple[Array, Array, Array, Array],
-) -> None:  # fmt: skip
+    active: FlagVector,
+    at: IntegerVector,
+    samples: IntegerVector,
+    triads: tuple[Hypermatrix, Stack, Stack, Stack],
+    drawn: tuple[Hypermatrix, Hypermatrix, Hypermatrix, IntegerStack],
+    disturbances: tuple[Annotated[NDArray[np.bool_], "boolean[:, :, ::1]"], Hypermatrix],
+    clock: Matrix,
+    imu: tuple[Matrix, Matrix, Stack, Stack],
+) -> None:
     """Add the errors and disturbances of the IMUs of b runs, for one step of each run.
 
     The random numbers of several steps, a stretch of s samples, were drawn in advance.
@@ -159,18 +165,16 @@ def sense_imu(
                         force[b, i, j] += disturbance[b, d, begin + i, 3 + j]
 
 
-@kernel(
-    "void(b1[::1], Tuple((i8[::1], i8[::1], f8[:, ::1], f8[:, :, ::1], i8[:, ::1])), "
-    "Tuple((f8[:, :, ::1], f8[:, :, ::1], i8[:, :, ::1], f8[:, :, :, ::1])), Tuple((i8[:, :, ::1], f8[:, :, ::1])), "
-    "Tuple((i8[::1], i8[:, :, ::1], f8[:, :, :, ::1], f8[:, :, :, ::1])), "
-    "Tuple((i8[::1], i8[:, ::1], f8[:, ::1], f8[:, :, ::1], u4[:, ::1])), f8[:, ::1])"
-)
+@kernel
 def sense(
-    active: Flags, samples: tuple[Integers, Integers, Array, Array, Integers],
-    drawn: tuple[Array, Array, Integers, Array], instruments: tuple[Integers, Array],
-    layers: tuple[Integers, Integers, Array, Array],
-    delivered: tuple[Integers, Integers, Array, Array, NDArray[np.uint32]], truth: Array,
-) -> None:  # fmt: skip
+    active: FlagVector,
+    samples: tuple[IntegerVector, IntegerVector, Matrix, Stack, IntegerMatrix],
+    drawn: tuple[Stack, Stack, IntegerStack, Hypermatrix],
+    instruments: tuple[IntegerStack, Stack],
+    layers: tuple[IntegerVector, IntegerStack, Hypermatrix, Hypermatrix],
+    delivered: tuple[IntegerVector, IntegerMatrix, Matrix, Stack, Annotated[NDArray[np.uint32], "uint32[:, ::1]"]],
+    truth: Matrix,
+) -> None:
     """Compute the measurements of the aiding instruments of b runs, with faults, for one step of each run.
 
     The random numbers of several steps, a stretch of s samples, were drawn in advance.
@@ -267,7 +271,7 @@ def sense(
         count[b] = known
 
 
-@kernel()
+@helper
 def _hold(held: Array, number: int, reading: Array, d: int) -> bool:
     """Replace a reading within an interval by the last one before it (or the first within). Return whether it did."""
     if number >= 0 and held[NUMBER] != number + 1.0:

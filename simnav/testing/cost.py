@@ -148,9 +148,12 @@ def measure(
 
 
 def _time_a_round(
-    estimators: Mapping[str, Factory], recording: Recording, steps: Sequence[Measurements], least: Mapping[str, Array],
+    estimators: Mapping[str, Factory],
+    recording: Recording,
+    steps: Sequence[Measurements],
+    least: Mapping[str, Array],
     failed: dict[str, Cost],
-) -> None:  # fmt: skip
+) -> None:
     """Run all estimators once in turns, and update the smallest times ``least`` [s] of the epochs."""
     running: dict[str, tuple[Estimator, list[Measurements]]] = {}
     for label, factory in estimators.items():

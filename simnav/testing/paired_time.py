@@ -133,9 +133,15 @@ def _estimate(times: Array) -> Multiple:
 
 
 def _round(
-    pair: tuple[Factory, Factory], recording: Recording, packets: bytes, timed_from: int, smooth: bool,
-    clock: Callable[[], float], *, turned: bool,
-) -> Array:  # fmt: skip
+    pair: tuple[Factory, Factory],
+    recording: Recording,
+    packets: bytes,
+    timed_from: int,
+    smooth: bool,
+    clock: Callable[[], float],
+    *,
+    turned: bool,
+) -> Array:
     """Run both once over the steps in turns; the processor times [s], shape (turns, 2). The smoothers are one turn.
 
     ``turned``: the second begins. Who begins changes from turn to turn, because the caches hold the data of the other.

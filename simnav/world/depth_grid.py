@@ -18,8 +18,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from simnav.compiled import Flags, kernel, ready
+from simnav.compiled import helper, kernel, ready
 from simnav.geometry.earth import principal_radii, relative_position
+from simnav.kernel_types import FlagVector, Matrix, Vector
 from simnav.types import Array
 
 __all__ = ["DepthGrid", "grid_of"]
@@ -177,7 +178,7 @@ def grid_of(chart: Mapping[str, Any]) -> DepthGrid:
     return grid
 
 
-@kernel()
+@helper
 def _between(place: float, spacing: float, last: int) -> tuple[int, float, float]:
     """The node before a place, the part of the way to the next one, and the derivative of that: zero beyond an edge."""
     way = place / spacing + 0.5 * last
@@ -187,7 +188,7 @@ def _between(place: float, spacing: float, last: int) -> tuple[int, float, float
     return first, way - first, slope
 
 
-@kernel()
+@helper
 def _weights(t: float) -> tuple[float, float, float, float]:
     """Weights of the nodes -1 to 2 at a place between the nodes 0 and 1, of Keys."""
     t2 = t * t
@@ -195,14 +196,14 @@ def _weights(t: float) -> tuple[float, float, float, float]:
     return -0.5 * t3 + t2 - 0.5 * t, 1.5 * t3 - 2.5 * t2 + 1.0, -1.5 * t3 + 2.0 * t2 + 0.5 * t, 0.5 * t3 - 0.5 * t2
 
 
-@kernel()
+@helper
 def _slopes(t: float) -> tuple[float, float, float, float]:
     """Derivatives of `_weights`."""
     t2 = t * t
     return -1.5 * t2 + 2.0 * t - 0.5, 4.5 * t2 - 5.0 * t, -4.5 * t2 + 4.0 * t + 0.5, 1.5 * t2 - t
 
 
-@kernel()
+@helper
 def _depth(nodes: Array, spacing_n: float, spacing_e: float, north: float, east: float) -> tuple[float, float, float]:
     """Depth and its derivatives at one place; all are NaN where the place is."""
     if isnan(north) or isnan(east):
@@ -225,18 +226,25 @@ def _depth(nodes: Array, spacing_n: float, spacing_e: float, north: float, east:
     return depth, gradient_n * by_north, gradient_e * by_east
 
 
-@kernel("void(f8[:, ::1], f8, f8, f8[:, ::1], f8[::1], f8[:, ::1])")
-def _depths(nodes: Array, spacing_n: float, spacing_e: float, offset: Array, depth: Array, gradient: Array) -> None:
+@kernel
+def _depths(nodes: Matrix, spacing_n: float, spacing_e: float, offset: Matrix, depth: Vector, gradient: Matrix) -> None:
     """`DepthGrid.at`; the last two arrays are overwritten."""
     for i in range(offset.shape[0]):
         depth[i], gradient[i, 0], gradient[i, 1] = _depth(nodes, spacing_n, spacing_e, offset[i, 0], offset[i, 1])
 
 
-@kernel("void(f8[:, ::1], f8, f8, f8[:, ::1], f8[::1], f8[:, ::1], f8[::1], f8[:, ::1], b1[::1])")
+@kernel
 def _distances(
-    nodes: Array, spacing_n: float, spacing_e: float, offset: Array, depth: Array, ray: Array,
-    distance: Array, gradient: Array, met: Flags,
-) -> None:  # fmt: skip
+    nodes: Matrix,
+    spacing_n: float,
+    spacing_e: float,
+    offset: Matrix,
+    depth: Vector,
+    ray: Matrix,
+    distance: Vector,
+    gradient: Matrix,
+    met: FlagVector,
+) -> None:
     """`DepthGrid.distance`; the last three arrays are overwritten."""
     for i in range(offset.shape[0]):
         north, east, down = ray[i, 0], ray[i, 1], ray[i, 2]

@@ -13,9 +13,10 @@ from math import atan2, cos, exp, inf, sin
 
 import numpy as np
 
-from simnav.compiled import Array, Flags, Integers, kernel
+from simnav.compiled import Array, Integers, helper, kernel
 from simnav.geometry.rotation import wrap_scalar
 from simnav.inverse_strapdown import AXES, BLOCK, BLOCK_COLUMNS, INTERVAL, POSITION, VELOCITY, ideal_samples
+from simnav.kernel_types import FlagVector, IntegerMatrix, IntegerVector, Matrix, Stack, Vector
 from simnav.strapdown import Triple
 from simnav.world.manoeuvres import ACCELERATE, COLUMNS, DEPTH, HOLD, TURN, WAYPOINTS, ZIGZAG
 from simnav.world.manoeuvring.dynamics import HULL, RATE, RATE_CHANGE, SAIL, SPEED, SPEED_CHANGE, SWAY, sail
@@ -94,7 +95,7 @@ Course = tuple[float, float, float, float, float, float, float, float, float, fl
 Composed = tuple[Triple, float, float, float, float]
 
 
-@kernel(borrows=True)
+@helper(borrows=True)
 def _lag(x: float, dx: float, command: float, dt: float, tau: float, decay: float) -> tuple[float, float]:
     """Exact step of a critically damped second-order lag under a constant command.
 
@@ -106,7 +107,7 @@ def _lag(x: float, dx: float, command: float, dt: float, tau: float, decay: floa
     return command + (y + b * dt) * decay, (dx - b * dt / tau) * decay
 
 
-@kernel(borrows=True)
+@helper(borrows=True)
 def _waypoint(points: Array, j: int, relative: float, x: Array) -> tuple[float, float]:
     """Waypoint j as distances north and east of the start of the run [m]."""
     a, b = points[j, 0], points[j, 1]
@@ -116,7 +117,7 @@ def _waypoint(points: Array, j: int, relative: float, x: Array) -> tuple[float, 
     return a, b
 
 
-@kernel(borrows=True)
+@helper(borrows=True)
 def _guide(x: Array, index: Integers, p: Array, rows: Array, points: Array, time: float) -> float:
     """Execute the manoeuvre table: store the references in the state, and return the commanded yaw rate [rad/s]."""
     psi = x[PSI] + x[ERROR_HEADING] - x[TO_TRACK]
@@ -210,7 +211,7 @@ def _guide(x: Array, index: Integers, p: Array, rows: Array, points: Array, time
     return rate_command
 
 
-@kernel(borrows=True)
+@helper(borrows=True)
 def _compose(course: Course, water: tuple[float, float], yaw_answer: float, p: Array, waves: Responses) -> Composed:
     """Velocity, roll, pitch, and cosine and sine of the heading of the bow, with current and waves added."""
     w0, w1, w2, w3, w4, w5, w6 = waves
@@ -234,7 +235,7 @@ def _compose(course: Course, water: tuple[float, float], yaw_answer: float, p: A
     return (v0, v1, v2), roll, pitch, ch, sh
 
 
-@kernel(borrows=True)
+@helper(borrows=True)
 def _course(x: Array) -> Course:
     """The course of a state."""
     return (
@@ -243,7 +244,7 @@ def _course(x: Array) -> Course:
     )  # fmt: skip
 
 
-@kernel(borrows=True)
+@helper(borrows=True)
 def _course_at(block: Array, k: int) -> Course:
     """The course at the end of interval k."""
     return (
@@ -252,7 +253,7 @@ def _course_at(block: Array, k: int) -> Course:
     )  # fmt: skip
 
 
-@kernel(borrows=True)
+@helper(borrows=True)
 def _through_water(p: Array, course: Course) -> tuple[float, float]:
     """Velocity through the water, north and east [m/s], without the waves."""
     u, _, _, cp, sp, _, cg, _, _, sway = course
@@ -264,7 +265,7 @@ def _through_water(p: Array, course: Course) -> tuple[float, float]:
     return north, east
 
 
-@kernel(borrows=True)
+@helper(borrows=True)
 def _water(x: Array, p: Array, eddies: Array, time: float) -> None:
     """Store the velocity of the surface water at the vessel's position in the state."""
     north, east = p[CURRENT_N], p[CURRENT_E]
@@ -275,7 +276,7 @@ def _water(x: Array, p: Array, eddies: Array, time: float) -> None:
     x[WATER_NORTH], x[WATER_EAST] = north, east
 
 
-@kernel(borrows=True)
+@helper(borrows=True)
 def _sail(x: Array, p: Array, rate_command: float, time: float, decay: tuple[float, float]) -> None:
     """Advance speed, sway, yaw rate and heading of a hull with three degrees of freedom by one sample."""
     dt, h = p[DT], x[HULL_STATE:STATE]
@@ -288,8 +289,8 @@ def _sail(x: Array, p: Array, rate_command: float, time: float, decay: tuple[flo
     )  # fmt: skip
 
 
-@kernel("void(f8[::1], f8[::1], f8[:, ::1], f8[:, ::1], f8[:, ::1])")
-def initialise(x: Array, p: Array, phase: Array, table: Array, eddies: Array) -> None:
+@kernel
+def initialise(x: Vector, p: Vector, phase: Matrix, table: Matrix, eddies: Matrix) -> None:
     """Complete the state at time 0: velocity and attitude with the waves and the current of that time."""
     _water(x, p, eddies, 0.0)
     x[COS_PSI], x[SIN_PSI], x[COS_GAMMA], x[SIN_GAMMA] = cos(x[PSI]), sin(x[PSI]), cos(x[GAMMA]), sin(x[GAMMA])
@@ -309,7 +310,7 @@ def initialise(x: Array, p: Array, phase: Array, table: Array, eddies: Array) ->
     x[ROLL], x[PITCH] = roll, pitch
 
 
-@kernel(borrows=True)
+@helper(borrows=True)
 def _steer(x: Array, index: Integers, p: Array, plan: tuple[Array, Array], block: Array, first: int, last: int) -> None:
     """Guidance and the dynamics of the vessel in intervals of a block: store the course at their ends.
 
@@ -350,11 +351,17 @@ def _steer(x: Array, index: Integers, p: Array, plan: tuple[Array, Array], block
         ) = _course(x)  # fmt: skip
 
 
-@kernel(borrows=True)
+@helper(borrows=True)
 def _drift(
-    x: Array, time: int, p: Array, water: tuple[Array, Array, Array], by: Transitions, block: Array, first: int,
+    x: Array,
+    time: int,
+    p: Array,
+    water: tuple[Array, Array, Array],
+    by: Transitions,
+    block: Array,
+    first: int,
     last: int,
-) -> None:  # fmt: skip
+) -> None:
     """Add waves and current to the course in intervals of a block: velocity, roll and pitch at their ends.
 
     ``time`` is the number of the sample at the start of the block, ``by`` moves the oscillators by a step. The other
@@ -380,11 +387,18 @@ def _drift(
         x[EAST] += 0.5 * dt * (block[VELOCITY + 1, k] + v[1])
 
 
-@kernel(borrows=True)
+@helper(borrows=True)
 def _advance_one(
-    x: Array, index: Integers, p: Array, plan: tuple[Array, Array], water: tuple[Array, Array, Array],
-    tap_time: Array, taps: Array, imu: tuple[Array, Array], block: Array,
-) -> None:  # fmt: skip
+    x: Array,
+    index: Integers,
+    p: Array,
+    plan: tuple[Array, Array],
+    water: tuple[Array, Array, Array],
+    tap_time: Array,
+    taps: Array,
+    imu: tuple[Array, Array],
+    block: Array,
+) -> None:
     """Advance one world by as many samples as ``imu`` has room for. The arguments are those of `advance`."""
     rate, force = imu
     dt, tap = p[DT], 0
@@ -431,16 +445,17 @@ def _advance_one(
         x[ROLL], x[PITCH] = block[ANGLES, n], block[ANGLES + 1, n]
 
 
-@kernel(
-    "void(b1[::1], Tuple((f8[:, ::1], i8[:, ::1])), f8[:, ::1], i8[:, ::1], UniTuple(f8[:, ::1], 2), "
-    "UniTuple(f8[:, ::1], 3), Tuple((f8[:, ::1], i8[::1], i8[::1], f8[:, :, ::1])), "
-    "Tuple((i8[::1], f8[:, :, ::1], f8[:, :, ::1])))"
-)
+@kernel
 def advance(
-    active: Flags, state: tuple[Array, Integers], p: Array, sizes: Integers, plan: tuple[Array, Array],
-    water: tuple[Array, Array, Array], wanted: tuple[Array, Integers, Integers, Array],
-    imu: tuple[Integers, Array, Array],
-) -> None:  # fmt: skip
+    active: FlagVector,
+    state: tuple[Matrix, IntegerMatrix],
+    p: Matrix,
+    sizes: IntegerMatrix,
+    plan: tuple[Matrix, Matrix],
+    water: tuple[Matrix, Matrix, Matrix],
+    wanted: tuple[Matrix, IntegerVector, IntegerVector, Stack],
+    imu: tuple[IntegerVector, Stack, Stack],
+) -> None:
     """Advance w worlds, each by its own number of samples.
 
     There is one kernel for one world and for many. The compiler may reorder the sum over waves, so a second copy of it
@@ -492,8 +507,8 @@ def advance(
         )  # fmt: skip
 
 
-@kernel("void(b1[::1], f8[:, ::1], f8[::1], f8[::1], f8[::1])")
-def command(active: Flags, x: Array, wrong: Array, heading: Array, speed: Array) -> None:
+@kernel
+def command(active: FlagVector, x: Matrix, wrong: Vector, heading: Vector, speed: Vector) -> None:
     """Command heading and speed of w worlds without manoeuvres.
 
     Parameters

@@ -10,7 +10,7 @@ from math import atan2, cos, sin
 
 import numpy as np
 
-from simnav.compiled import Array, kernel
+from simnav.compiled import Array, helper
 from simnav.inverse_strapdown import (
     AXES,
     EARTH,
@@ -45,14 +45,14 @@ ANGLES, BOW, COURSE, DEPTHS, FLOW = (SAMPLE_ROWS + k for k in (0, 2, 4, 12, 14))
 BLOCK_ROWS = SAMPLE_ROWS + 16
 
 
-@kernel(borrows=True)
+@helper(borrows=True)
 def wrapped(angle: float) -> float:
     """The angle in [-pi, pi)."""
     angle = angle - 2.0 * np.pi * np.floor((angle + np.pi) / (2.0 * np.pi))
     return angle
 
 
-@kernel(borrows=True)
+@helper(borrows=True)
 def _small_cosine_sine(angle: float) -> tuple[float, float]:
     """Cosine and sine by their series, exact to rounding up to 0.3 rad."""
     a = angle * angle
@@ -63,7 +63,7 @@ def _small_cosine_sine(angle: float) -> tuple[float, float]:
     return c, s * angle
 
 
-@kernel(borrows=True)
+@helper(borrows=True)
 def cosine_sine(angle: float) -> tuple[float, float]:
     """Cosine and sine. For small angles, as roll and pitch mostly are, by their series."""
     if abs(angle) > 0.3:
@@ -71,7 +71,7 @@ def cosine_sine(angle: float) -> tuple[float, float]:
     return _small_cosine_sine(angle)
 
 
-@kernel(borrows=True)
+@helper(borrows=True)
 def matrix(cr: float, sr: float, ct: float, st: float, ch: float, sh: float) -> Nine:
     """Direction cosine matrix of the body axes by rows, from cosines and sines of roll, pitch and heading."""
     return (
@@ -81,14 +81,14 @@ def matrix(cr: float, sr: float, ct: float, st: float, ch: float, sh: float) -> 
     )  # fmt: skip
 
 
-@kernel(borrows=True)
+@helper(borrows=True)
 def _put_matrix(block: Array, k: int, c: Nine) -> None:
     block[AXES, k], block[AXES + 1, k], block[AXES + 2, k] = c[0], c[1], c[2]
     block[AXES + 3, k], block[AXES + 4, k], block[AXES + 5, k] = c[3], c[4], c[5]
     block[AXES + 6, k], block[AXES + 7, k], block[AXES + 8, k] = c[6], c[7], c[8]
 
 
-@kernel(borrows=True)
+@helper(borrows=True)
 def orient(block: Array, n: int) -> None:
     """The direction cosine matrices at the ends of n intervals."""
     large = 0
@@ -105,7 +105,7 @@ def orient(block: Array, n: int) -> None:
             _put_matrix(block, k + 1, matrix(cr, sr, ct, st, block[BOW, k], block[BOW + 1, k]))
 
 
-@kernel(borrows=True)
+@helper(borrows=True)
 def body_rate(block: Array, k: int, rate: Array) -> Triple:
     """Mean angular rate of the body relative to north-east-down over interval k, body axes [rad/s]."""
     e0, e2 = block[EARTH, k], block[EARTH + 1, k]
@@ -116,7 +116,7 @@ def body_rate(block: Array, k: int, rate: Array) -> Triple:
     )
 
 
-@kernel(borrows=True)
+@helper(borrows=True)
 def tap_at(out: Array, a: float, block: Array, k: int, turning: tuple[Triple, Triple], shear: float) -> None:
     """State at the fraction a of sample interval k: velocity and angles are linear, position is their integral.
 

@@ -25,8 +25,9 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, SerializerFunctionWrapHandler, ValidationError, model_serializer, model_validator
 
-from simnav.compiled import Array, Flags, Integers, kernel
+from simnav.compiled import Array, Integers, helper, kernel
 from simnav.geometry.earth import relative_position
+from simnav.kernel_types import FlagMatrix, IntegerVector, Matrix
 from simnav.spec import Positive, Spec, SpecError, quantity, without_later
 from simnav.world.geojson import read_buildings
 from simnav.world.surroundings import SurroundingSpec, register_surrounding
@@ -238,7 +239,7 @@ def _area(corners: Array) -> float:
     return float(0.5 * np.sum(north * np.roll(east, -1) - np.roll(north, -1) * east))
 
 
-@kernel()
+@helper
 def _within(walls: Array, first: int, last: int, north: float, east: float) -> bool:
     """Whether a point is inside a polygon (the number of walls to the north of it is odd)."""
     inside = False
@@ -251,11 +252,14 @@ def _within(walls: Array, first: int, last: int, north: float, east: float) -> b
     return inside
 
 
-@kernel()
+@helper
 def _meets(
-    scene: tuple[Array, Integers, Array], skip: int, point: tuple[float, float, float],
-    ray: tuple[float, float, float], reach: float,
-) -> bool:  # fmt: skip
+    scene: tuple[Array, Integers, Array],
+    skip: int,
+    point: tuple[float, float, float],
+    ray: tuple[float, float, float],
+    reach: float,
+) -> bool:
     """Whether a ray meets a face within a distance; ``skip`` is a wall that does not count."""
     walls, first, heights = scene
     n, e, h = point
@@ -282,14 +286,17 @@ def _meets(
     return False
 
 
-@kernel(
-    "i8(Tuple((f8[:, ::1], i8[::1], f8[:, ::1])), f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], b1[:, ::1], "
-    "f8[:, ::1], f8[:, ::1])"
-)
+@kernel
 def _trace(
-    scene: tuple[Array, Integers, Array], place: Array, velocity: Array, elevation: Array, azimuth: Array,
-    blocked: Flags, excess: Array, rate: Array,
-) -> int:  # fmt: skip
+    scene: tuple[Matrix, IntegerVector, Matrix],
+    place: Matrix,
+    velocity: Matrix,
+    elevation: Matrix,
+    azimuth: Matrix,
+    blocked: FlagMatrix,
+    excess: Matrix,
+    rate: Matrix,
+) -> int:
     """Overwrite the last three arrays with the fields of `Paths`.
 
     ``scene`` holds walls (w, 4): both ends, north and east; the first wall of each obstacle; bottom and top of each.

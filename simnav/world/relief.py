@@ -24,9 +24,13 @@ __all__ = ["relief"]
 
 
 def relief(
-    shape: tuple[int, int], spacing: tuple[float, float], sigma: float, scale: float, hurst: float,
+    shape: tuple[int, int],
+    spacing: tuple[float, float],
+    sigma: float,
+    scale: float,
+    hurst: float,
     rng: np.random.Generator,
-) -> Array:  # fmt: skip
+) -> Array:
     """A relief at the nodes of a grid, with the mean zero.
 
     Parameters

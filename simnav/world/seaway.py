@@ -5,7 +5,7 @@ See `simnav.world.sea` for the model and for the arrays of components. `simnav.w
 
 from __future__ import annotations
 
-from simnav.compiled import Array, kernel
+from simnav.compiled import Array, helper
 from simnav.declared_process import oscillation
 from simnav.world.sea import YAW
 
@@ -20,7 +20,7 @@ _UNCHANGED: Transition = (1.0, 0.0, 0.0, 1.0)
 _STILL: Transitions = (_UNCHANGED, _UNCHANGED, _UNCHANGED, _UNCHANGED)
 
 
-@kernel(borrows=True, fastmath={"reassoc", "contract", "nsz", "arcp"})
+@helper(borrows=True, fastmath={"reassoc", "contract", "nsz", "arcp"})
 def wave_responses(phase: Array, table: Array, north: float, east: float, dt: float) -> Responses:
     """Advance the phases of the wave components by one step, and sum the seven responses.
 
@@ -52,7 +52,7 @@ def wave_responses(phase: Array, table: Array, north: float, east: float, dt: fl
     return s0, s1, s2, s3, s4, s5, s6
 
 
-@kernel(borrows=True)
+@helper(borrows=True)
 def transitions(p: Array, dt: float) -> Transitions:
     """Transition matrices of the oscillators over a step.
 
@@ -71,7 +71,7 @@ def transitions(p: Array, dt: float) -> Transitions:
     )  # fmt: skip
 
 
-@kernel(borrows=True)
+@helper(borrows=True)
 def _oscillate(x: Array, p: Array, force: float, dt: float, transition: Transition) -> float:
     """Exact step of an oscillator under a force that is linear within the step. Return its new value.
 
@@ -87,7 +87,7 @@ def _oscillate(x: Array, p: Array, force: float, dt: float, transition: Transiti
     return value
 
 
-@kernel(borrows=True)
+@helper(borrows=True)
 def answers(
     x: Array, p: Array, waves: Responses, cp: float, sp: float, phase: Array, table: Array, dt: float, by: Transitions
 ) -> Responses:

@@ -9,6 +9,7 @@ from typing import ClassVar, Protocol
 import numpy as np
 
 from simnav.compiled import kernel
+from simnav.kernel_types import Matrix
 from simnav.types import Array, NavigationStates
 
 __all__ = ["Follower", "PlannedTrack"]
@@ -16,8 +17,8 @@ __all__ = ["Follower", "PlannedTrack"]
 _EXTENDING = Lock()
 
 
-@kernel("Tuple((f8, i8))(f8[:, ::1], i8, i8, f8, f8)")
-def _aside(points: Array, at: int, window: int, north: float, east: float) -> tuple[float, int]:
+@kernel
+def _aside(points: Matrix, at: int, window: int, north: float, east: float) -> tuple[float, int]:
     """The distance of a position to starboard of the nearest point [m], and the index of this point."""
     low, high = max(0, at - window), min(points.shape[0] - 1, at + window)
     least = np.inf

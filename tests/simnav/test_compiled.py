@@ -14,12 +14,13 @@ import numpy as np
 import pytest
 
 from simnav import cache_folder, compiled
+from simnav.kernel_types import Vector
 
 HELPER = """
-from simnav.compiled import kernel
+from simnav.compiled import helper as inlined
 OFFSET = {offset}
 
-@kernel()
+@inlined
 def helper(x):
     return {factor} * x + OFFSET
 """
@@ -32,8 +33,8 @@ from {package}.inner import helper
 
 TABLE = np.array([{table}])
 
-@kernel("f8(f8)")
-def caller(x):
+@kernel
+def caller(x: float) -> float:
     return helper(x) + TABLE[0] + inner.OFFSET
 """
 
@@ -197,7 +198,7 @@ def test_prune_keeps_what_is_in_use(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     assert [p.name for p in root.iterdir()] == ["young"]
 
 
-@compiled.kernel("f8(f8)")
+@compiled.kernel
 def at_module_level(x: float) -> float:
     return x + 1.0
 
@@ -207,7 +208,7 @@ def test_a_kernel_in_a_closure_and_its_pickle() -> None:
         def made(x: float) -> float:
             return float(scale * inner(x))
 
-        return compiled.Kernel(made, "f8(f8)", False)
+        return compiled.Kernel(made, typed=True)
 
     assert make(at_module_level, 2.0)(3.0) == 8.0
     assert make(at_module_level, 3.0)(3.0) == 12.0
@@ -217,54 +218,54 @@ def test_a_kernel_in_a_closure_and_its_pickle() -> None:
 
 def test_the_first_kernel_that_the_cache_lacks_is_announced(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(compiled.Kernel, "_jit", lambda self, directory: self.function)
-    monkeypatch.setattr(compiled.Kernel, "directory", lambda self: tmp_path / self.signature)
-    (tmp_path / "f8(f8)" / "there").mkdir(parents=True)
-    (tmp_path / "f8(f8)" / "there" / "one.nbi").touch()
+    monkeypatch.setattr(compiled.Kernel, "directory", lambda self: tmp_path / self.__name__)
+    (tmp_path / "_doubled" / "there").mkdir(parents=True)
+    (tmp_path / "_doubled" / "there" / "one.nbi").touch()
     said: list[str] = []
     with compiled.announced(lambda: said.append("compiling")):
-        compiled.Kernel(surroundings, "f8(f8)", False).compile()
+        compiled.Kernel(_doubled, typed=True).compile()
         assert said == []
-        for signature in ("f8()", "f4()"):
-            compiled.Kernel(surroundings, signature, False).compile()
+        for function in (surroundings, write):
+            compiled.Kernel(function, typed=True).compile()
         assert said == ["compiling"]
-    compiled.Kernel(surroundings, "i8()", False).compile()
+    compiled.Kernel(run, typed=True).compile()
     assert said == ["compiling"]
 
 
 def test_a_helper_that_python_calls_is_not_compiled_for_it(monkeypatch: pytest.MonkeyPatch) -> None:
     """A confined estimator could not write what is compiled at its first epoch."""
     monkeypatch.setattr(compiled.Kernel, "compile", lambda self: pytest.fail(f"{self} was compiled"))
-    assert compiled.Kernel(lambda x: 2.0 * x, None, False)(3.0) == 6.0
+    assert compiled.Kernel(lambda x: 2.0 * x, typed=False)(3.0) == 6.0
 
 
 def test_a_kernel_is_entered_without_a_check_also_where_nothing_is_compiled(monkeypatch: pytest.MonkeyPatch) -> None:
     """`NUMBA_DISABLE_JIT` makes a kernel its plain function."""
-    assert compiled.Kernel(_doubled, "f8(f8)", False).unchecked(3.0) == 6.0
+    assert compiled.Kernel(_doubled, typed=True).unchecked(3.0) == 6.0
     monkeypatch.setattr(compiled.Kernel, "_jit", lambda self, directory: self.function)
-    assert compiled.Kernel(_doubled, "f8(f8)", False).unchecked(3.0) == 6.0
+    assert compiled.Kernel(_doubled, typed=True).unchecked(3.0) == 6.0
 
 
 def _doubled(x: float) -> float:
     return 2.0 * x
 
 
-@compiled.kernel("f8(f8[::1])")
-def sum_of_squares(values: compiled.Array) -> float:
+@compiled.kernel
+def sum_of_squares(values: Vector) -> float:
     total = 0.0
     for k in range(values.size):
         total += values[k] * values[k]
     return total
 
 
-@compiled.kernel("f8(f8[::1])")
-def root_of_squares(values: compiled.Array) -> float:
+@compiled.kernel
+def root_of_squares(values: Vector) -> float:
     if values.size == 0:
         raise ValueError("nothing")
     return float(np.sqrt(sum_of_squares(values)))
 
 
-@compiled.kernel("f8(f8[::1])")
-def twice_the_root(values: compiled.Array) -> float:
+@compiled.kernel
+def twice_the_root(values: Vector) -> float:
     return 2.0 * root_of_squares(values)
 
 
@@ -284,14 +285,14 @@ def test_a_kernel_calls_another_one_and_has_no_copy_of_it(tmp_path: Path, monkey
     assert loaded.stdout == "10.0\n"
 
 
-def _total(values: compiled.Array) -> float:
+def _total(values: Vector) -> float:
     return values[0] + values[1]
 
 
-_helper = compiled.Kernel(_total, None, False, borrows=True)
+_helper = compiled.Kernel(_total, typed=False, borrows=True)
 
 
-def _twice(values: compiled.Array) -> float:
+def _twice(values: Vector) -> float:
     return 2.0 * _helper(values)
 
 
@@ -310,14 +311,14 @@ def test_how_helpers_are_compiled(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(CompilerBase, "compile_extra", record)
     monkeypatch.setattr(compiled, "cache_directory", lambda: None)
     before = config.SLP_VECTORIZE
-    caller = compiled.Kernel(_twice, "f8(f8[::1])", False)
+    caller = compiled.Kernel(_twice, typed=True)
     assert caller(np.array([1.0, 2.0])) == 6.0
     # A helper is in the cache for all its callers, whichever of them compiled it first.
     assert sorted(allowed) == [("_total", False), ("_twice", True)]
     assert before == config.SLP_VECTORIZE
 
 
-def _room(n: int) -> compiled.Array:
+def _room(n: int) -> Vector:
     return np.empty(n)
 
 
@@ -326,4 +327,4 @@ def test_a_helper_that_borrows_its_arrays_makes_none(monkeypatch: pytest.MonkeyP
 
     monkeypatch.setattr(compiled, "cache_directory", lambda: None)
     with pytest.raises(NumbaError, match="array passed into the function"):
-        compiled.Kernel(_room, "f8[::1](i8)", False, borrows=True).compile()
+        compiled.Kernel(_room, typed=True, borrows=True).compile()

@@ -8,10 +8,11 @@ import pytest
 from simnav.compiled import Array, kernel
 from simnav.geometry.rotation import dcm_from_rpy
 from simnav.inverse_strapdown import BLOCK, increments, sample_from_motion
+from simnav.kernel_types import Matrix, Stack, Vector
 
 
-@kernel("void(f8[::1], f8[:, ::1], f8[:, :, ::1], f8[::1], f8[:, ::1], f8[:, ::1])")
-def one_by_one(time: Array, velocity: Array, dcm: Array, memory: Array, position: Array, samples: Array) -> None:
+@kernel
+def one_by_one(time: Vector, velocity: Matrix, dcm: Stack, memory: Vector, position: Matrix, samples: Matrix) -> None:
     """`increments` by `sample_from_motion`: positions, and (n, 6) angular rates and specific forces."""
     for k in range(time.size - 1):
         v, w, c, d = velocity[k], velocity[k + 1], dcm[k], dcm[k + 1]

@@ -17,14 +17,14 @@ from tests.cases.packages import install
 FILES = {
     "simnav_plugin/__init__.py": "import simnav_plugin.kernels\n",
     "simnav_plugin/kernels.py": """
-from simnav.compiled import kernel
+from simnav.compiled import helper, kernel
 
-@kernel()
+@helper
 def inner(x):
     return x + 1.0
 
-@kernel("f8(f8)")
-def outer(x):
+@kernel
+def outer(x: float) -> float:
     return 2.0 * inner(x)
 """,
     "broken_plugin.py": "raise RuntimeError('never works')\n",
@@ -65,9 +65,10 @@ def test_plug_ins_are_warm_too_and_a_broken_one_is_named(tmp_path: Path) -> None
 
 # Made without the decorator: no other test of the process should come across them. The last one calls the others.
 SEVERAL = "from simnav.compiled import Kernel\n" + "\n".join(
-    f"def k{i}(x):\n    return x + {i}.0\nk{i} = Kernel(k{i}, 'f8(f8)', False)\n" for i in range(4)
+    f"def k{i}(x: float) -> float:\n    return x + {i}.0\nk{i} = Kernel(k{i}, typed=True)\n" for i in range(4)
 )
-SEVERAL += "def k4(x):\n    return k0(x) * k1(x) - k2(x) * k3(x) + 3.0 * x + 7.0\nk4 = Kernel(k4, 'f8(f8)', False)\n"
+SEVERAL += "def k4(x: float) -> float:\n"
+SEVERAL += "    return k0(x) * k1(x) - k2(x) * k3(x) + 3.0 * x + 7.0\nk4 = Kernel(k4, typed=True)\n"
 
 
 @pytest.mark.parametrize("processes", [1, 2])

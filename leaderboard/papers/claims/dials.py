@@ -74,9 +74,16 @@ def lags_given(settings: Sequence[Setting]) -> list[Setting]:
 
 
 def parameter_dial(
-    name: str, title: str, whose: str, parameter: str, values: Sequence[float], *, unit: str = "",
-    ours: float | None = None, why: str = "",
-) -> Dial:  # fmt: skip
+    name: str,
+    title: str,
+    whose: str,
+    parameter: str,
+    values: Sequence[float],
+    *,
+    unit: str = "",
+    ours: float | None = None,
+    why: str = "",
+) -> Dial:
     """A parameter of ``row``, of ``than`` or of ``both``."""
 
     def with_it(setting: Setting, value: Choice) -> Setting:
@@ -87,9 +94,13 @@ def parameter_dial(
 
 
 def choice_dial(
-    name: str, title: str, choices: Mapping[str, Callable[[Setting], Setting]], *, ours: str | None = None,
+    name: str,
+    title: str,
+    choices: Mapping[str, Callable[[Setting], Setting]],
+    *,
+    ours: str | None = None,
     why: str = "",
-) -> Dial:  # fmt: skip
+) -> Dial:
     """Settings that have a name and no number."""
     return Dial(name, title, "", tuple(choices), lambda setting, value: choices[str(value)](setting), ours, why)
 
@@ -105,9 +116,16 @@ def of_rows(row: str = "", than: str = "") -> Callable[[Setting], Setting]:
 
 
 def scenario_dial(
-    name: str, title: str, unit: str, values: Sequence[float], keys: Callable[[float], Mapping[str, object]], *,
-    whose: str = "both", ours: float | None = None, why: str = "",
-) -> Dial:  # fmt: skip
+    name: str,
+    title: str,
+    unit: str,
+    values: Sequence[float],
+    keys: Callable[[float], Mapping[str, object]],
+    *,
+    whose: str = "both",
+    ours: float | None = None,
+    why: str = "",
+) -> Dial:
     """Values in the file of the scenario.
 
     Parameters

@@ -202,9 +202,13 @@ def _excess(shares: Array, quantile: float) -> Array:
 
 
 def _statistics(
-    x: Array, stratum: NDArray[np.int64], cluster: NDArray[np.int64], count: int, first: NDArray[np.int64],
+    x: Array,
+    stratum: NDArray[np.int64],
+    cluster: NDArray[np.int64],
+    count: int,
+    first: NDArray[np.int64],
     second: NDArray[np.int64],
-) -> tuple[NDArray[np.float32], NDArray[np.float32]]:  # fmt: skip
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Signed statistics (P,) of the pairs as they are, and their sizes (P, B) in each draw.
 
     Rows that have the same runs are treated together, so that the draws are one product of matrices.
@@ -306,9 +310,12 @@ def _step_down(observed: NDArray[np.float32], drawn: NDArray[np.float32]) -> Arr
 
 
 def _confidence_set(
-    n: int, observed: NDArray[np.float32], drawn: NDArray[np.float32], first: NDArray[np.int64],
+    n: int,
+    observed: NDArray[np.float32],
+    drawn: NDArray[np.float32],
+    first: NDArray[np.int64],
     second: NDArray[np.int64],
-) -> NDArray[np.bool_]:  # fmt: skip
+) -> NDArray[np.bool_]:
     """Which rows may be the best: the worst of the most different pair goes while the rest are not equally good."""
     gone: list[int] = []  # in which order they would go, if all did
     steps: list[np.float32] = []

@@ -28,7 +28,8 @@ from __future__ import annotations
 
 from math import atan2, cos, exp, sin, sqrt
 
-from simnav.compiled import Array, kernel
+from simnav.compiled import Array, helper, kernel
+from simnav.kernel_types import Matrix, Vector
 
 __all__ = ["GUSTS", "HULL", "SAIL", "TERMS", "integrate_hull", "propeller_for", "sail", "trial"]
 
@@ -65,7 +66,7 @@ Three = tuple[float, float, float]
 Six = tuple[float, float, float, float, float, float]
 
 
-@kernel(borrows=True)
+@helper(borrows=True)
 def _wind_force(h: Array, time: float, psi: float, north: float, east: float) -> Three:
     """Surge and sway force [N] and yaw moment [N m] of the wind on a hull that moves north and east over ground."""
     gust = 1.0
@@ -92,7 +93,7 @@ def _wind_force(h: Array, time: float, psi: float, north: float, east: float) ->
     return x, -side * y, -side * y * lever * h[A_LENGTH]
 
 
-@kernel(borrows=True)
+@helper(borrows=True)
 def _hull_force(h: Array, u: float, v: float, r: float) -> Three:
     """Hydrodynamic surge and sway force [N] and yaw moment [N m]."""
     speed = sqrt(u * u + v * v)
@@ -117,14 +118,14 @@ def _hull_force(h: Array, u: float, v: float, r: float) -> Three:
     return x, y, n
 
 
-@kernel(borrows=True)
+@helper(borrows=True)
 def _thrust(h: Array, n: float, u: float) -> float:
     """Thrust of the propeller [N]."""
     thrust: float = h[T_NN] * n * abs(n) + h[T_NU] * abs(n) * u
     return thrust
 
 
-@kernel(borrows=True)
+@helper(borrows=True)
 def _change(h: Array, water: tuple[float, float], time: float, command: tuple[float, float], s: Six) -> Six:
     """Rates of change of u, v, r, heading, propeller and steering."""
     u, v, r, psi, n, steer = s
@@ -148,7 +149,7 @@ def _change(h: Array, water: tuple[float, float], time: float, command: tuple[fl
     )
 
 
-@kernel(borrows=True)
+@helper(borrows=True)
 def _ahead(s: Six, change: Six, dt: float) -> Six:
     return (
         s[0] + dt * change[0], s[1] + dt * change[1], s[2] + dt * change[2],
@@ -156,7 +157,7 @@ def _ahead(s: Six, change: Six, dt: float) -> Six:
     )  # fmt: skip
 
 
-@kernel(borrows=True)
+@helper(borrows=True)
 def propeller_for(h: Array, thrust: float, u: float) -> float:
     """Propeller rate that gives a thrust [N] at a speed [m/s], within its limits.
 
@@ -171,7 +172,7 @@ def propeller_for(h: Array, thrust: float, u: float) -> float:
     return rate
 
 
-@kernel(borrows=True)
+@helper(borrows=True)
 def integrate_hull(
     h: Array, s: Six, command: tuple[float, float], water: tuple[float, float], time: float, dt: float
 ) -> Six:
@@ -203,11 +204,16 @@ def integrate_hull(
     return s
 
 
-@kernel(borrows=True)
+@helper(borrows=True)
 def sail(
-    h: Array, x: Array, state: tuple[float, float, float], constants: tuple[float, float],
-    water: tuple[float, float], time: float, dt: float,
-) -> tuple[float, float, float, float, float]:  # fmt: skip
+    h: Array,
+    x: Array,
+    state: tuple[float, float, float],
+    constants: tuple[float, float],
+    water: tuple[float, float],
+    time: float,
+    dt: float,
+) -> tuple[float, float, float, float, float]:
     """Advance a hull by one step of its autopilot.
 
     Parameters
@@ -251,8 +257,8 @@ def sail(
     return s[0], (s[0] - u) / dt, s[2], (s[2] - r) / dt, s[3]
 
 
-@kernel("void(f8[::1], f8[:, ::1], f8[:, ::1], f8, f8[::1])")
-def trial(h: Array, states: Array, commands: Array, dt: float, water: Array) -> None:
+@kernel
+def trial(h: Vector, states: Matrix, commands: Matrix, dt: float, water: Vector) -> None:
     """Integrate a hull under given commands, without an autopilot.
 
     Parameters

@@ -29,7 +29,7 @@ def test_what_a_row_calls_is_loaded(name: str, beginning: Recording, monkeypatch
     assert unchecked is not None
 
     def watched(self: Kernel[..., Any], *args: Any) -> Any:
-        if self.signature is not None:
+        if self.typed:
             called.add(self)
         return plain(self, *args)
 
