@@ -67,8 +67,8 @@ def numba_type(annotation: Any) -> Any:
     import numba
 
     numba_types: Any = numba.types
-    if annotation in _PLAIN:
-        return getattr(numba_types, _PLAIN[annotation])
+    if annotation is None or annotation in _PLAIN:
+        return getattr(numba_types, _PLAIN[type(None) if annotation is None else annotation])
     origin, inner = typing.get_origin(annotation), typing.get_args(annotation)
     if origin is Annotated:
         return eval(inner[1], {"__builtins__": {}}, vars(numba_types))

@@ -14,8 +14,9 @@ from simnav.kernel_types import Matrix, Vector
 from simnav.types import Array, Instruments
 
 from .base import Innovation
-from .noise import NoiseAdaptation, Posterior, copied
+from .noise import NoiseAdaptation, Posterior
 from .robust import igg3
+from .rules import copied
 
 __all__ = ["FACTORS", "AdaptiveFactor", "adkf_noise", "exponential", "three_segment", "two_segment"]
 
@@ -70,7 +71,7 @@ def _printed_residual(residual: Vector, predicted: Matrix, noise: Matrix) -> flo
 PRINTED, FUNCTION, C0, C1, TWO, SMALLEST = range(6)
 
 
-@kernel
+@kernel(passed=True)
 def adkf_noise(
     settings: Vector,
     memory: Vector,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import ClassVar, NamedTuple
 
 from simnav.types import Array, Instruments, Measurement
@@ -80,12 +79,6 @@ class Adaptation:
     def adapt(self, innovation: Innovation) -> Array | None:
         """Return the (m, m) noise to use, or None to reject the measurement, which is then flagged as faulty."""
         return innovation.noise
-
-    def noted(self, name: str, row: Sequence[float]) -> None:
-        """Take note of what a kernel chose for an instrument in place of `adapt`.
-
-        The row is that of `simnav.estimators.models.base.StepRule`.
-        """
 
     def diagnostics(self) -> dict[str, float | Array]:
         """Named values of the last step, which are recorded at each epoch."""

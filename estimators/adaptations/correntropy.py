@@ -10,9 +10,7 @@ import numpy as np
 from simnav.compiled import kernel
 from simnav.estimators.algebra.direct_update import posterior
 from simnav.kernel_types import Matrix, Vector
-from simnav.types import Array
 
-from .base import Innovation
 from .noise import WeightedNoise
 
 __all__ = ["MaximumCorrentropy", "correntropy_noise", "correntropy_rule"]
@@ -72,7 +70,7 @@ def correntropy_noise(
     return least
 
 
-@kernel
+@kernel(passed=True)
 def correntropy_rule(
     settings: Vector,
     memory: Vector,
@@ -135,7 +133,3 @@ class MaximumCorrentropy(WeightedNoise):
     def settings_of(self, longer: float) -> list[float]:
         """As `NoiseAdaptation.settings_of`."""
         return [self.bandwidth, self.smallest, self.iterations, self.begin == "update"]
-
-    def choose(self, innovation: Innovation) -> Array:
-        """The noise divided by the weights; the smallest weight is reported."""
-        return self.weighted(correntropy_rule, innovation)

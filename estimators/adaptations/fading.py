@@ -4,19 +4,16 @@ from __future__ import annotations
 
 from math import exp, isnan
 
-import numpy as np
-
 from simnav.compiled import kernel
 from simnav.kernel_types import Matrix, Vector
-from simnav.types import Array
 
-from .base import Innovation
-from .noise import INFLATION, OWN, TIME, NoiseAdaptation, copied
+from .noise import NoiseAdaptation
+from .rules import INFLATION, OWN, TIME, copied
 
 __all__ = ["FadingMemory", "fading_noise"]
 
 
-@kernel
+@kernel(passed=True)
 def fading_noise(
     settings: Vector,
     memory: Vector,
@@ -59,8 +56,3 @@ class FadingMemory(NoiseAdaptation):
     def settings_of(self, longer: float) -> list[float]:
         """As `NoiseAdaptation.settings_of`."""
         return [self.memory]
-
-    def choose(self, innovation: Innovation) -> Array:
-        """The nominal noise."""
-        self.ask(fading_noise, innovation, np.empty_like(innovation.noise))
-        return innovation.noise

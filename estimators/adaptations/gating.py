@@ -14,7 +14,8 @@ from simnav.kernel_types import Matrix, Vector
 from simnav.types import Array, Instruments, Measurement
 
 from .base import Innovation
-from .noise import REJECT, TIME, NoiseAdaptation, copied
+from .noise import NoiseAdaptation
+from .rules import REJECT, TIME, copied
 
 __all__ = ["ChiSquareGate", "gate_noise"]
 
@@ -24,7 +25,7 @@ PATIENCE, LIMITS = range(2)
 HEARD, FAILING = range(2)
 
 
-@kernel
+@kernel(passed=True)
 def gate_noise(
     settings: Vector,
     memory: Vector,

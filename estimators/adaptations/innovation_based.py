@@ -13,7 +13,8 @@ from simnav.kernel_types import Matrix, Vector
 from simnav.types import Array
 
 from .base import Innovation
-from .noise import EstimatedNoise, Scope, bound, copied
+from .noise import EstimatedNoise, Scope
+from .rules import bound, copied
 
 __all__ = ["FixedWindow", "InnovationBased", "adaptive_window", "innovation_noise"]
 
@@ -176,7 +177,7 @@ def _contradicted(settings: Array, place: int, estimate: Array, nominal: Array, 
     return False
 
 
-@kernel
+@kernel(passed=True)
 def innovation_noise(
     settings: Vector,
     memory: Vector,
@@ -304,18 +305,17 @@ class InnovationBased(EstimatedNoise):
         return np.zeros(ROWS + round(self.longest * longer) * (m + 3 * m * m))
 
     def estimate(self, innovation: Innovation) -> Array:
-        """The bounded estimate."""
+        """The bounded estimate of a full matrix, or the nominal noise."""
         m, residual, predicted, nominal, *_ = innovation
-        own, noise = self.memory_of(m.instrument), np.empty_like(nominal)
-        found = self.ask(innovation_noise, innovation, noise)
+        own, noise = self.memory_of(m.instrument), nominal
+        found = self.ask(innovation_noise, innovation, np.empty_like(nominal))
         self.report(self._further[m.instrument], self.said(found))
-        if self.full:
-            if found < 0.0:
-                elements = own[1][ESTIMATE : ESTIMATE + nominal.size]
-                noise = self.bounded(elements.reshape(nominal.shape), nominal)
-            if self.source == "residual":
-                _remember(*own, residual, predicted, noise)
-        return noise if found < 0.0 else nominal
+        if found < 0.0:
+            elements = own[1][ESTIMATE : ESTIMATE + nominal.size]
+            noise = self.bounded(elements.reshape(nominal.shape), nominal)
+        if self.source == "residual":
+            _remember(*own, residual, predicted, noise)
+        return noise
 
     def said(self, number: float) -> float:
         """The length of the window; the number has a sign."""

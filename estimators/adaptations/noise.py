@@ -2,78 +2,25 @@
 
 from __future__ import annotations
 
-from abc import abstractmethod
 from collections.abc import Sequence
-from math import sqrt
 from typing import ClassVar, Literal
 
 import numpy as np
 
-from simnav.compiled import Kernel, helper, kernel
+from simnav.compiled import Kernel
 from simnav.estimators.algebra.direct_update import posterior
-from simnav.estimators.models.base import SIGMA, SIZE
-from simnav.kernel_types import Matrix
+from simnav.estimators.models.filtering import Prediction, room_for
 from simnav.types import KINDS, Array, Instruments
 
 from .base import Adaptation, Innovation
+from .choice import Choice, choose_noise
 from .prediction import PredictionTest
+from .rules import INFLATION, OWN, REJECT, TIME, bound, scale
 
-__all__ = [
-    "INFLATION", "OWN", "REJECT", "RULE", "TIME", "EstimatedNoise", "NoiseAdaptation", "Posterior", "Scope",
-    "WeightedNoise", "bound", "copied", "scale", "scaled",
-]  # fmt: skip
-
-#: Signature of a kernel that chooses a noise, from settings and memory of an instrument (which it updates), what is
-#: shared by all instruments, innovation (m,), H P H' (m, m) and the nominal R (m, m). It overwrites the last array
-#: (m, m), and returns a number to be reported (`NoiseAdaptation.reported`), or 0.
-RULE = "f8(f8[::1], f8[::1], f8[::1], f8[::1], f8[:, ::1], f8[:, ::1], f8[:, ::1])"
-#: Places in what is shared: time of the measurement [s]; what a rule may overwrite, the factor on P (before it is 1)
-#: and whether the measurement is rejected (0); and a number of its own, at first NaN.
-TIME, INFLATION, REJECT, OWN = range(4)
+__all__ = ["EstimatedNoise", "NoiseAdaptation", "Posterior", "Scope", "WeightedNoise", "scaled"]
 
 Scope = Literal["fixes", "all"]
-
-
-@kernel
-def scale(noise: Matrix, f0: float, f1: float, f2: float, product: Matrix) -> None:
-    r0, r1, r2 = sqrt(f0), sqrt(f1), sqrt(f2)
-    for i in range(noise.shape[0]):
-        a = r0 if i == 0 else r1 if i == 1 else r2
-        for j in range(noise.shape[0]):
-            product[i, j] = noise[i, j] * a * (r0 if j == 0 else r1 if j == 1 else r2)
-
-
-@kernel
-def bound(estimate: Matrix, nominal: Matrix, low: float, high: float, bounded: Matrix) -> None:
-    for i in range(nominal.shape[0]):
-        bounded[i, i] = sqrt(min(max(estimate[i, i] / nominal[i, i], low), high))
-    for i in range(nominal.shape[0]):
-        for j in range(i):
-            bounded[i, j] = bounded[j, i] = nominal[i, j] * bounded[i, i] * bounded[j, j]
-    for i in range(nominal.shape[0]):
-        bounded[i, i] *= nominal[i, i] * bounded[i, i]
-
-
-@helper
-def copied(noise: Array, used: Array) -> None:
-    """Copy an (m, m) array into another; a slice would take seconds to compile."""
-    for i in range(noise.shape[0]):
-        for j in range(noise.shape[0]):
-            used[i, j] = noise[i, j]
-
-
-@kernel
-def _sigmas(noise: Matrix) -> tuple[float, float, float]:
-    m = noise.shape[0]
-    return sqrt(noise[0, 0]), sqrt(noise[1, 1]) if m > 1 else 0.0, sqrt(noise[2, 2]) if m > 2 else 0.0
-
-
-def _trace(matrix: Array) -> float:
-    """The trace of a small matrix: the method of an array takes several times as long."""
-    total = 0.0
-    for x in matrix.diagonal().tolist():
-        total += x
-    return total
+_NO_COVARIANCE = np.empty((0, 0))
 
 
 class Posterior:
@@ -118,10 +65,10 @@ def scaled(noise: Array, factors: list[float]) -> Array:
 
 class NoiseAdaptation(Adaptation):
     """An adaptation that reports the sigma that it used: ``sigma_<component>.<instrument>``, for example
-    ``sigma_north.gnss``; a subclass defines `choose`.
+    ``sigma_north.gnss``. A subclass says its rule, or defines `choose` in Python.
 
     Before the first measurement of an instrument, the sigma of its datasheet is reported. If the prediction is wrong
-    (`PredictionTest`), the nominal noise is used and `choose` is not called: the filter is then the plain one.
+    (`PredictionTest`), the nominal noise is used and the rule is not asked: the filter is then the plain one.
 
     Attributes
     ----------
@@ -133,11 +80,13 @@ class NoiseAdaptation(Adaptation):
     """
 
     together = 3
-    #: The kernel that chooses, or that estimates (`RULE`); None if there is none, as for a subclass that chooses in its
-    #: own way.
+    #: The kernel that chooses (`simnav.estimators.adaptations.rules`); None if there is none, as for a subclass that
+    #: chooses in its own way.
     rule: ClassVar[Kernel[..., float] | None] = None
     #: What the number that the rule returns is reported as.
     reported: ClassVar[str] = ""
+    #: Whether the rule estimates the noise, so that the last one stands while a prediction is poor.
+    estimates: ClassVar[bool] = False
 
     def __init_subclass__(cls) -> None:
         super().__init_subclass__()
@@ -149,11 +98,9 @@ class NoiseAdaptation(Adaptation):
         self.prediction = PredictionTest(instruments, self.together)
         self._labels = {n: [f"sigma_{e}.{n}" for e in KINDS[s.kind].errors] for n, s in instruments.items()}
         self._report: dict[str, float | Array] = {}
-        self._noisy: dict[str, Array] = {}  # a noise found above zero, and the one reported last
-        self._reported: dict[str, Array] = {}
         for name, sheet in instruments.items():
             self._report.update(zip(self._labels[name], map(float, sheet.sigma)))
-        self._noted: dict[str, Sequence[float]] = {}
+        self._noted: dict[str, tuple[Sequence[float], float]] = {}
         self._further = {name: f"{self.reported}.{name}" for name in instruments}
         self.instruments, self.index = instruments, {name: i for i, name in enumerate(instruments)}
         self.longer = {name: max(sheet.rate, 1.0) for name, sheet in instruments.items()}
@@ -162,6 +109,8 @@ class NoiseAdaptation(Adaptation):
         self.rule_first = np.cumsum([0, *map(len, begun)])
         self.rule_memory = np.concatenate([*begun, np.empty(0)])
         self.rule_shared = np.full(OWN + 1, np.nan)
+        self._choice: Choice | None = None
+        self._reading = room_for(1)
 
     @property
     def ruled(self) -> bool:
@@ -181,58 +130,79 @@ class NoiseAdaptation(Adaptation):
         i = self.index[name]
         return self.rule_settings[i], self.rule_memory[self.rule_first[i] : self.rule_first[i + 1]]
 
-    def ask(self, rule: Kernel[..., float], innovation: Innovation, noise: Array) -> float:
-        """What a rule returns for a measurement; it overwrites the noise, and its inflation is set."""
-        m, residual, predicted, nominal, *_ = innovation
-        shared = self.rule_shared
-        shared[TIME], shared[INFLATION], shared[REJECT] = m.time, 1.0, 0.0
-        found = rule(*self.memory_of(m.instrument), shared, residual, predicted, nominal, noise)
-        self.inflation = float(shared[INFLATION])
-        return found
-
     def in_scope(self, kind: str) -> bool:
         """Whether the noise of a kind of instrument is chosen; otherwise it is the nominal one."""
         return True
 
-    def noted(self, name: str, row: Sequence[float]) -> None:
-        """Report the sigmas that a kernel chose for an instrument, and the further number if it is not 0."""
-        chosen = row[SIGMA:SIZE]
-        if chosen[0] == chosen[0] and chosen != self._noted.get(name):
-            self._noted[name] = chosen
-            self._report.update(zip(self._labels[name], chosen))
-            if chosen[-1] and self.reported:
-                self._report[self._further[name]] = self.said(chosen[-1])
+    def choice(self, names: Sequence[str], size: int) -> Choice:
+        """How the noise of the readings of some instruments is chosen, in a model of so many states."""
+        sheets = [self.instruments[name] for name in names]
+        return Choice(
+            rule=self.rule if self.rule is not None and self.ruled else self._ask, estimates=self.estimates,
+            inflates_disturbed=self.inflates or self.inflates_motion,
+            index=np.array([self.index[name] for name in names], dtype=np.int64),
+            in_scope=np.array([self.in_scope(sheet.kind) for sheet in sheets], dtype=np.bool_),
+            last=np.zeros((len(names), 9)), settings=self.rule_settings.reshape(len(self.index), -1),
+            memories=self.rule_memory, first=self.rule_first, shared=self.rule_shared,
+            **self.prediction.arrays(size),
+        )  # fmt: skip
+
+    def adapt(self, innovation: Innovation) -> Array | None:
+        """Choose the noise of one measurement (`choose_noise`). An instrument without noise is not adapted."""
+        m, residual, predicted, nominal, covariance, cross = innovation
+        if self._choice is None:
+            self._choice = self.choice(list(self.index), 0 if covariance is None else len(covariance))
+        reading, row = self._reading, self.index[m.instrument]
+        reading.instrument[0], reading.time[0], reading.inflation[0], reading.reported[0] = row, m.time, 1.0, 0.0
+        reading.rejected[0], reading.sigma[0, 0] = False, np.nan
+        self._innovation, self.inflation = innovation, 1.0
+        empty = np.empty((0, len(residual)))
+        prediction = Prediction(residual, empty if cross is None else cross, predicted, nominal, np.empty_like(nominal))
+        choose = choose_noise if self._choice.compiled else choose_noise.function
+        choose(self._choice, _NO_COVARIANCE if covariance is None else covariance, reading, 0, prediction)
+        self.inflation = float(reading.inflation[0])
+        if reading.rejected[0]:
+            return None
+        self.noted(m.instrument, reading.sigma[0].tolist(), float(reading.reported[0]))
+        return prediction.noise
+
+    def _ask(
+        self, settings: Array, memory: Array, shared: Array, residual: Array, predicted: Array, nominal: Array,
+        noise: Array,
+    ) -> float:  # fmt: skip
+        """The rule of an adaptation that chooses in Python."""
+        chosen = self.choose(self._innovation)
+        shared[INFLATION], shared[REJECT] = self.inflation, chosen is None
+        if chosen is not None:
+            noise[...] = chosen
+        return 0.0
+
+    def ask(self, rule: Kernel[..., float], innovation: Innovation, noise: Array) -> float:
+        """What a kernel of a rule returns for a measurement; it overwrites the noise."""
+        m, residual, predicted, nominal, *_ = innovation
+        shared = self.rule_shared
+        shared[TIME], shared[INFLATION], shared[REJECT] = m.time, 1.0, 0.0
+        return rule(*self.memory_of(m.instrument), shared, residual, predicted, nominal, noise)
+
+    def choose(self, innovation: Innovation) -> Array | None:
+        """The (m, m) noise to use, or None to reject the measurement; for an adaptation without a rule."""
+        raise NotImplementedError(f"{type(self).__name__} has neither a rule nor a method choose")
+
+    def noted(self, name: str, sigma: Sequence[float], number: float) -> None:
+        """Report the sigmas that were chosen for an instrument, and the number of the rule if it is not 0."""
+        if sigma[0] == sigma[0] and (sigma, number) != self._noted.get(name):
+            self._noted[name] = sigma, number
+            self._report.update(zip(self._labels[name], sigma))
+            if number and self.reported:
+                self._report[self._further[name]] = self.said(number)
 
     def said(self, number: float) -> float:
         """The number that a rule returns, as it is reported."""
         return number
 
-    @abstractmethod
-    def choose(self, innovation: Innovation) -> Array | None:
-        """The (m, m) noise to use, or None to reject the measurement."""
-
     def report(self, label: str, value: float) -> None:
         """Set a diagnostic. It keeps its value until the next call."""
         self._report[label] = value
-
-    def adapt(self, innovation: Innovation) -> Array | None:
-        """Call `choose` and record the sigma of its result. An instrument without noise is not adapted."""
-        self.inflation = 1.0
-        name = innovation.measurement.instrument
-        if innovation.noise is not self._noisy.get(name):
-            if min(innovation.noise.diagonal().tolist()) <= 0.0:
-                return innovation.noise
-            self._noisy[name] = innovation.noise
-        if self.prediction.fails(innovation):
-            noise: Array | None = innovation.noise
-            if self.prediction.disturbed and (self.inflates or self.inflates_motion):
-                self.inflation = self.prediction.inflation(innovation)
-        else:
-            noise = self.choose(innovation)
-        if noise is not None and noise is not self._reported.get(name):
-            self._reported[name] = noise
-            self._report.update(zip(self._labels[name], _sigmas(noise)))
-        return noise
 
     def diagnostics(self) -> dict[str, float | Array]:
         """The sigmas last used, and other reported values."""
@@ -244,15 +214,10 @@ class WeightedNoise(NoiseAdaptation):
 
     reported = "weight"
 
-    def weighted(self, rule: Kernel[..., float], innovation: Innovation) -> Array:
-        """The noise that a kernel (`RULE`) chooses for a measurement, and report its weight."""
-        noise: Array = np.empty_like(innovation.noise)
-        self.report(self._further[innovation.measurement.instrument], self.ask(rule, innovation, noise))
-        return noise
-
 
 class EstimatedNoise(NoiseAdaptation):
-    """Base class of adaptations that estimate R and keep it within bounds. A subclass defines `estimate`.
+    """Base class of adaptations that estimate R and keep it within bounds. A subclass says its rule,
+    or defines `estimate` in Python.
 
     An innovation has the covariance ``H P H' + R``. It contains little information on R if the prediction is less
     certain than the measurement: after a start with a poor heading, in an outage, or with positions of centimetre
@@ -278,6 +243,8 @@ class EstimatedNoise(NoiseAdaptation):
         If the bounds are not 0 < lowest <= highest, or the scope is unknown.
     """
 
+    estimates = True
+
     def __init__(self, lowest: float, highest: float, full: bool = False, scope: Scope = "all"):
         if not 0.0 < lowest <= highest:
             raise ValueError(f"lowest = {lowest:g} and highest = {highest:g}: it must be 0 < lowest <= highest")
@@ -290,21 +257,16 @@ class EstimatedNoise(NoiseAdaptation):
         """As `NoiseAdaptation.ruled`; a full matrix is bounded by NumPy."""
         return super().ruled and not self.full
 
-    @abstractmethod
     def estimate(self, innovation: Innovation) -> Array:
-        """The (m, m) estimate of the noise within the bounds, including this innovation."""
+        """The (m, m) estimate of the noise within the bounds, including this innovation; where no rule does it."""
+        raise NotImplementedError(f"{type(self).__name__} has neither a rule nor a method estimate")
 
     def in_scope(self, kind: str) -> bool:
         """Whether the noise of a kind of instrument is estimated, by the scope."""
         return self.scope == "all" or KINDS[kind].role == "fix"
 
     def choose(self, innovation: Innovation) -> Array:
-        """The estimate; for an instrument out of scope the nominal noise; for a poor prediction the last noise."""
-        if not self.in_scope(innovation.measurement.kind):
-            return innovation.noise
-        before = self._reported.get(innovation.measurement.instrument, innovation.noise)
-        if _trace(innovation.predicted) > _trace(before):
-            return before
+        """The estimate."""
         return self.estimate(innovation)
 
     def bounded(self, estimate: Array, nominal: Array) -> Array:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from math import sqrt
+from typing import Any
 
 import numpy as np
 
@@ -252,9 +253,13 @@ class PredictionTest:
         self._tests = bool(group or against)
         self._kept = np.zeros(FIRST)
 
-    def arrays(self, n: int) -> tuple[bool, Array, tuple[Integers, Array, Flags], Array, Array]:
+    def arrays(self, n: int) -> dict[str, Any]:
         """Whether a test is made, the last three arguments of `judge_prediction`, and what is kept for n states."""
-        return self._tests, self._settings, self._known, self._memory, self._kept_of(n)
+        sort, recent, witness = self._known
+        return {
+            "tests": self._tests, "limits": self._settings, "sort": sort, "recent": recent, "witness": witness,
+            "memory": self._memory, "kept": self._kept_of(n),
+        }  # fmt: skip
 
     def _kept_of(self, n: int) -> Array:
         if len(self._kept) == FIRST:

@@ -10,8 +10,9 @@ from simnav.kernel_types import Matrix, Vector
 from simnav.types import Array
 
 from .base import Innovation
-from .noise import WeightedNoise, copied, scale, scaled
+from .noise import WeightedNoise, scaled
 from .prediction import standardised
+from .rules import copied, scale
 
 __all__ = ["EquivalentWeights", "HuberWeights", "Igg3Weights", "huber", "huber_noise", "igg3", "igg3_noise"]
 
@@ -65,7 +66,7 @@ def _weigh(w0: float, w1: float, w2: float, smallest: float, nominal: Array, noi
     return least
 
 
-@kernel
+@kernel(passed=True)
 def huber_noise(
     settings: Vector,
     memory: Vector,
@@ -81,7 +82,7 @@ def huber_noise(
     return _weigh(huber(u0, k), huber(u1, k), huber(u2, k), settings[1], nominal, noise)
 
 
-@kernel
+@kernel(passed=True)
 def igg3_noise(
     settings: Vector,
     memory: Vector,

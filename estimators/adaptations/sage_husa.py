@@ -9,7 +9,8 @@ from simnav.kernel_types import Matrix, Vector
 from simnav.types import Array
 
 from .base import Innovation
-from .noise import EstimatedNoise, Scope, bound, copied
+from .noise import EstimatedNoise, Scope
+from .rules import bound, copied
 
 __all__ = ["SageHusa", "sage_husa_noise"]
 
@@ -20,7 +21,7 @@ FADING, LOWEST, HIGHEST = range(3)
 COUNT, BEGUN, ESTIMATE = range(3)
 
 
-@kernel
+@kernel(passed=True)
 def sage_husa_noise(
     settings: Vector,
     memory: Vector,
@@ -99,11 +100,8 @@ class SageHusa(EstimatedNoise):
         return np.array([round(self.prior * longer), *np.zeros(1 + m * m)])
 
     def estimate(self, innovation: Innovation) -> Array:
-        """The bounded estimate, this innovation included."""
+        """The bounded estimate of a full matrix, this innovation included."""
         nominal = innovation.noise
-        noise = np.empty_like(nominal)
-        self.ask(sage_husa_noise, innovation, noise)
-        if not self.full:
-            return noise
+        self.ask(sage_husa_noise, innovation, np.empty_like(nominal))
         _, memory = self.memory_of(innovation.measurement.instrument)
         return self.bounded(memory[ESTIMATE : ESTIMATE + nominal.size].reshape(nominal.shape), nominal)

@@ -10,7 +10,6 @@ from simnav.estimators.algebra.direct_update import posterior
 from simnav.kernel_types import Matrix, Vector
 from simnav.types import Array
 
-from .base import Innovation
 from .noise import WeightedNoise
 
 __all__ = ["StudentT", "normalised_trace", "student_t_noise", "student_weight"]
@@ -77,7 +76,7 @@ def student_weight(innovation: Vector, predicted: Matrix, noise: Matrix, dof: fl
     return weight
 
 
-@kernel
+@kernel(passed=True)
 def student_t_noise(
     settings: Vector,
     memory: Vector,
@@ -133,7 +132,3 @@ class StudentT(WeightedNoise):
     def settings_of(self, longer: float) -> list[float]:
         """As `NoiseAdaptation.settings_of`."""
         return [self.dof, self.turns]
-
-    def choose(self, innovation: Innovation) -> Array:
-        """The noise divided by the weight, which is reported."""
-        return self.weighted(student_t_noise, innovation)

@@ -11,7 +11,6 @@ from simnav.estimators.algebra.direct_update import posterior
 from simnav.kernel_types import Matrix, Vector
 from simnav.types import Array
 
-from .base import Innovation
 from .noise import EstimatedNoise, Scope
 
 __all__ = ["VariationalBayes", "variational_bayes_noise", "variational_noise"]
@@ -71,7 +70,7 @@ FORGETTING, ITERATIONS, LOWEST, HIGHEST = range(4)
 SHAPE, SCALES = range(2)
 
 
-@kernel
+@kernel(passed=True)
 def variational_bayes_noise(
     settings: Vector,
     memory: Vector,
@@ -147,9 +146,3 @@ class VariationalBayes(EstimatedNoise):
     def begun(self, longer: float, m: int) -> Array:
         """As `EstimatedNoise.begun`: shape and scales of the datasheet's noise."""
         return np.full(1 + m, 0.5 * self.prior * longer)
-
-    def estimate(self, innovation: Innovation) -> Array:
-        """The noise of the last iteration, bounded."""
-        noise: Array = np.empty_like(innovation.noise)
-        self.ask(variational_bayes_noise, innovation, noise)
-        return noise

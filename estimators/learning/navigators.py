@@ -15,10 +15,13 @@ from numpy.typing import NDArray
 from simnav.compiled import kernel
 from simnav.estimator import Estimator
 from simnav.estimators.models.inertial import InertialModel
-from simnav.estimators.models.inertial_update import assimilate_inertial
+from simnav.estimators.models.inertial_functions import use_reading
+from simnav.estimators.models.measurements import Aid, State
 from simnav.estimators.models.propagation import (
     BLOCK,
     BLOCK_COLUMNS,
+    Motion,
+    Samples,
     accumulate_error,
     advance_inertial,
     propagate_covariance,
@@ -204,8 +207,8 @@ def navigate(
             if elapsed > 0.0:
                 s = samples[b]
                 first, blocks_used = advance_inertial(
-                    (position[b], velocity[b], dcm[b], memory[b], bias[b], turn[b], clock[b]),
-                    (imu_time[b, :s], imu_interval[b, :s], rate[b, :s], force[b, :s]), first, stop, sensors[b], blocks,
+                    Motion(position[b], velocity[b], dcm[b], bias[b], memory[b], turn[b], clock[b]),
+                    Samples(imu_time[b, :s], imu_interval[b, :s], rate[b, :s], force[b, :s]), first, stop, sensors[b], blocks,
                 )  # fmt: skip
                 accumulate_error(blocks, blocks_used, sensors[b], transition, process_noise)
                 now[b] = stop
@@ -214,9 +217,9 @@ def navigate(
                     P, transition, process_noise, calibration[b, :more], decay[b, :more], density[b, :more], elapsed
                 )
             if i >= 0:
-                assimilate_inertial(
-                    (code, arms[b, i], codes[b, i, 2], codes[b, i, 3]), value[b, j, :d],
-                    (position[b], velocity[b], dcm[b], clock[b, 12:15], bias[b], calibration[b, : n - 15]), P,
+                use_reading(
+                    Aid(code, arms[b, i], codes[b, i, 2], codes[b, i, 3]), value[b, j, :d],
+                    State(position[b], velocity[b], dcm[b], clock[b, 12:15], bias[b], calibration[b, : n - 15]), P,
                     noises[b, i, : d * d].reshape((d, d)), correction,
                 )  # fmt: skip
         for k in range(3):

@@ -20,9 +20,11 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 
 from simnav.estimators.models.base import Linearised
+from simnav.estimators.models.filtering import Dynamics, Prediction, Readings
+from simnav.estimators.models.propagation import Samples
 from simnav.estimators.models.suitable import Suitable
-from simnav.estimators.solvers.kalman import KalmanEstimator
-from simnav.types import Array, Estimate, Flags, InitialState, Instruments, Integers, Measurement, Measurements
+from simnav.estimators.solvers.kalman import FilterFunctions, KalmanEstimator
+from simnav.types import Array, Estimate, Flags, InitialState, Instruments, Integers, Measurements
 
 __all__ = ["LARGEST_MEASUREMENT", "Events", "Linear", "ReferenceFilter"]
 
@@ -114,8 +116,6 @@ class ReferenceFilter(KalmanEstimator):
         Of the state at the start of the run.
     """
 
-    assimilates = False
-
     def __init__(self, names: list[str]) -> None:
         super().__init__(Suitable())
         self._number = {name: i for i, name in enumerate(names)}
@@ -143,24 +143,32 @@ class ReferenceFilter(KalmanEstimator):
         if self._moved is not None:
             self._append()
 
-    def _propagate(self, until: float) -> None:
+    def functions(self) -> FilterFunctions:
+        """Every motion and every correction is noted."""
+        return super().functions()._replace(propagate=self.propagate, predict=self.predict, retract=self.retract)
+
+    def propagate(self, dynamics: Dynamics, samples: Samples, until: float) -> None:
+        """Advance the filter, and note its transition matrix and process noise."""
         elapsed = until - self.model.time
         if elapsed <= 0.0:
             return
         self._end()  # a measurement was skipped: two propagations in a row
         before = self.covariance.copy()
-        super()._propagate(until)
+        super().propagate(dynamics, samples, until)
         transition = np.eye(self.model.size)
         self.model.carry(transition, elapsed)
         noise = self.covariance - transition @ before @ transition.T
         self._moved = transition, 0.5 * (noise + noise.T)
 
-    def _take(self, m: Measurement, diagnostics: dict[str, float | Array], flagged: list[tuple[str, float]]) -> None:
-        found = self.model.measure(m)
-        if found is None or self._absorb(found.project(self.covariance)) < 0.0:
-            self._admission.skipped += 1
-            return
-        self._append(self._number[m.instrument], m.time, found)
+    def predict(self, dynamics: Dynamics, readings: Readings, k: int, prediction: Prediction) -> bool:
+        """Linearise a measurement, which is noted if it is used."""
+        self._measurement = self._measurements[k]
+        return super().predict(dynamics, readings, k, prediction)
+
+    def retract(self, dynamics: Dynamics) -> None:
+        """Correct the state, and note the measurement."""
+        super().retract(dynamics)
+        self._append(self._number[self._measurement.instrument], self._measurement.time, self._linearised)
 
     def _append(self, instrument: int = -1, time: float = 0.0, found: Linearised | None = None) -> None:
         """An event: the propagation since the last one, and a measurement that was used."""
@@ -177,5 +185,5 @@ class ReferenceFilter(KalmanEstimator):
         linear.instrument[e], linear.time[e], linear.size[e], linear.correction[e] = instrument, time, 0, 0.0
         if found is not None:
             d = len(found.innovation)
-            linear.size[e], linear.correction[e] = d, self._correction
+            linear.size[e], linear.correction[e] = d, self.dynamics.correction
             linear.innovation[e, :d], linear.jacobian[e, :d], linear.noise[e, :d, :d] = found

@@ -5,14 +5,12 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
-from typing import Any, ClassVar, NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from simnav.compiled import Kernel
 from simnav.estimator.needs import Needs
 from simnav.estimators.algebra.inflation import inflate_motion
-from simnav.estimators.algebra.joseph import joseph_update, project
 from simnav.geometry.rotation import left_jacobian
 from simnav.types import (
     NO_SIDE,
@@ -22,52 +20,21 @@ from simnav.types import (
     ImuSamples,
     InitialState,
     Instruments,
-    Integers,
     Measurement,
 )
 
+from .filtering import AidTable, Dynamics, ModelFunctions
 from .many_readings import ManyReadings
 from .own_observation import OwnObservation
+from .propagation import Samples
 
-__all__ = ["AidTable", "ErrorModel", "Linearised", "Observation", "StepRule"]
+__all__ = ["NO_SAMPLES", "ErrorModel", "Linearised", "Observation"]
 
+#: Of a step without an IMU.
+NO_SAMPLES = Samples(np.empty(0), np.empty(0), np.empty((0, 3)), np.empty((0, 3)))
 #: A measurement of m components with the covariance P of n states: innovation (m,), P H' (n, m), H P H' (m, m) and
 #: noise (m, m).
 Observation = tuple[Array, Array, Array, Array]
-
-
-#: Places in a row of results of a step, see `StepRule`.
-NIS, INNOVATION, SIGMA, REPORT, SIZE, RESULTS = 0, 1, 4, 7, 8, 9
-#: Instead of the normalised innovation squared: the measurement was set aside.
-REJECTED = -2.0
-
-
-#: The instruments of a filter: their codes, numbers of components, and places of bias and scale factor (i, 4); lever
-#: arms (i, 3) [m]; and the elements of their noise (i, 9).
-AidTable = tuple[Integers, Array, Array]
-
-
-class StepRule(NamedTuple):
-    """How a kernel uses all measurements of a step and chooses the noise of each.
-
-    For each measurement it overwrites a row of results: from `NIS` on the normalised innovation squared, -1 if nothing
-    was changed, or `REJECTED`; from `INNOVATION` on the innovation (3,); from `SIGMA` on the square roots of the
-    variances that were used (3,), NaN if none was chosen; at `REPORT` a further number to be reported, or 0; and at
-    `SIZE` the norm of the innovation, NaN if it is to be computed from the components.
-
-    Attributes
-    ----------
-    kernel : Kernel
-        It takes the arguments of `simnav.estimators.models.inertial_step.filter_inertial` and ``arrays``.
-    names : sequence of str
-        The instruments, in the order in which the arrays have them.
-    arrays : tuple of arrays
-        What the rule knows.
-    """
-
-    kernel: Kernel[..., int]
-    names: Sequence[str]
-    arrays: tuple[Any, ...]
 
 
 class Linearised(NamedTuple):
@@ -86,13 +53,6 @@ class Linearised(NamedTuple):
     innovation: Array
     jacobian: Array
     noise: Array
-
-    def project(self, covariance: Array) -> Observation:
-        """The measurement with ``P H'`` and ``H P H'`` of an (n, n) ``covariance`` P."""
-        d, n = self.jacobian.shape
-        cross, predicted = np.empty((n, d)), np.empty((d, d))
-        project(covariance, np.ascontiguousarray(self.jacobian, dtype=np.float64), cross, predicted)
-        return self.innovation, cross, predicted, self.noise
 
 
 class ErrorModel(ABC):
@@ -119,6 +79,8 @@ class ErrorModel(ABC):
     #: Whether `estimate` reports all states of instruments (`simnav.types.Estimate.states`), or only the blocks that
     #: instruments bring along.
     reports_all: bool = False
+    #: The IMU samples of the step, for `functions`.
+    samples: Samples = NO_SAMPLES
     #: Names of the arrays that `correct` changes.
     state: ClassVar[tuple[str, ...]] = ()
     #: Names of further arrays that `propagate` keeps from one call to the next.
@@ -220,101 +182,31 @@ class ErrorModel(ABC):
         """
         return None
 
-    def step_table(self, names: Sequence[str]) -> AidTable | None:
-        """What a kernel knows of instruments that uses all measurements of a step with their nominal noise.
+    def functions(self) -> ModelFunctions | None:
+        """The equations as kernels over `dynamics`; None where a filter has to call the methods of the model."""
+        return None
+
+    def dynamics(self, covariance: Array, names: Sequence[str]) -> Dynamics:
+        """The state, its covariance, and what `functions` need to know of them and of the instruments.
 
         Parameters
         ----------
+        covariance : (n, n) array
+            Covariance of the error.
         names : sequence of str
-            Instruments, in the order in which the kernel counts them.
-
-        Returns
-        -------
-        AidTable or None
-            None if the model's measurements have to be used one by one, for a whole run.
+            The instruments of the filter, in the order of their rows.
         """
-        return None
+        nothing, none = np.empty(0), np.empty((0, 0))
+        return Dynamics(
+            numbers=nothing, covariance=covariance, transition=none, process_noise=none, constants=nothing,
+            decay=nothing, density=nothing, first_variances=covariance.diagonal().copy(),
+            correction=np.empty(len(covariance)), next_sample=np.zeros(1, np.int64),
+            aids=AidTable(np.empty((0, 4), np.int64), np.empty((0, 3)), np.empty((0, 9))),
+        )  # fmt: skip
 
     @abstractmethod
     def correct(self, dx: Array) -> None:
         """Add a correction to the state."""
-
-    def innovate(self, measurement: Measurement, covariance: Array) -> Observation | None:
-        """Linearise a measurement and project the covariance; a model may have a faster implementation."""
-        linearised = self.measure(measurement)
-        return None if linearised is None else linearised.project(covariance)
-
-    def absorb(self, observation: Observation, covariance: Array, correction: Array) -> float:
-        """Correct the state and its covariance by a measurement.
-
-        Parameters
-        ----------
-        observation : tuple
-            The linearised measurement, with the noise that is used.
-        covariance : (n, n) array
-            Covariance of the model's error, updated.
-        correction : (n,) array
-            Overwritten with the correction of the state.
-
-        Returns
-        -------
-        float
-            Normalised innovation squared; -1 if the innovation covariance is singular, and then nothing is changed.
-        """
-        innovation, cross, predicted, noise = observation
-        nis: float = joseph_update(covariance, cross, predicted + noise, innovation, correction)
-        if nis >= 0.0:
-            self.correct(correction)
-        return nis
-
-    def assimilate(self, measurement: Measurement, covariance: Array, correction: Array) -> tuple[float, float] | None:
-        """Use a measurement with its nominal noise: `innovate` and `absorb` in one step.
-
-        Parameters
-        ----------
-        measurement : Measurement
-            The measurement to be used.
-        covariance : (n, n) array
-            Covariance of the model's error, updated.
-        correction : (n,) array
-            Overwritten with the correction of the state.
-
-        Returns
-        -------
-        (float, float) or None
-            Normalised innovation squared (-1 if nothing was changed), and the norm of the innovation. None if the
-            model has no faster implementation than `innovate` and `absorb`.
-        """
-        return None
-
-    def assimilate_step(
-        self,
-        measurements: Sequence[Measurement],
-        until: float,
-        covariance: Array,
-        correction: Array,
-        rule: StepRule | None = None,
-    ) -> list[list[float]] | None:
-        """Use the measurements of a step, each at its time, and propagate to the step's end.
-
-        Parameters
-        ----------
-        measurements : sequence of Measurement
-            In order of their times; one that is later than ``until`` is used then.
-        until : float
-            End of the step [s].
-        covariance, correction
-            As of `assimilate`; the correction is that by the last measurement.
-        rule : StepRule, optional
-            Chooses the noise of each measurement, the same in all steps of a run; None: the nominal noise.
-
-        Returns
-        -------
-        list of list of float, or None
-            For each measurement, a row of results (`StepRule`). None if the model has no faster implementation than
-            `propagate` and `assimilate`; with a rule this is so for a whole run.
-        """
-        return None
 
     def assimilate_together(
         self, measurements: Sequence[Measurement], covariance: Array, correction: Array
@@ -325,14 +217,16 @@ class ErrorModel(ABC):
         ----------
         measurements : sequence of Measurement
             Readings of channels of one instrument (`many`).
-        covariance, correction
-            As of `assimilate`; the correction is that by all of them.
+        covariance : (n, n) array
+            Covariance of the model's error, updated.
+        correction : (n,) array
+            Overwritten with the correction of the state by all of them.
 
         Returns
         -------
         nis, size : (k,) array
-            As of `assimilate`, each given the measurements before it. None in place of both where the measurements have
-            to be taken one by one.
+            Normalised innovation squared and norm of each innovation, given the measurements before it; -1 for one that
+            was not used. None in place of both where the measurements have to be used one by one.
         """
         return None
 

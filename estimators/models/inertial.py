@@ -57,12 +57,12 @@ from simnav.types import (
     Measurement,
 )
 
-from .base import AidTable, ErrorModel, Linearised, Observation, StepRule
+from .base import NO_SAMPLES, ErrorModel, Linearised
 from .declared_errors import CURRENT, bias_of, bias_of_triad
 from .delayed import is_delayed
 from .equations import EQUATIONS, equation_of
-from .inertial_step import Packet, filter_inertial
-from .inertial_update import absorb_inertial, assimilate_inertial, innovate_inertial
+from .filtering import AidTable, Dynamics, ModelFunctions
+from .inertial_functions import INERTIAL_FUNCTIONS
 from .levered import is_own, with_lever_arms
 from .many_readings import of_instruments
 from .measurements import (
@@ -74,11 +74,12 @@ from .measurements import (
 )
 from .own_observation import OwnObservation
 from .propagation import (
+    MOTION_NUMBERS,
     TURN_TIME,
-    Moving,
     Samples,
     carry_errors,
     correct_inertial,
+    motion_of,
     propagate_inertial,
 )
 from .state_blocks import StateBlocks
@@ -88,7 +89,6 @@ __all__ = ["InertialModel", "roll_pitch_yaw"]
 
 #: Components of the error without calibration states, and without the biases of the IMU.
 _NAV, _MOTION = 15, 9
-_NO_TIMES, _NO_VECTORS = np.empty(0), np.empty((0, 3))
 _GRAVITY = 9.81
 
 
@@ -131,11 +131,11 @@ class InertialModel(ErrorModel):
 
     delayed: bool = False
     state = ("position", "velocity", "dcm", "bias", "calibration")
-    memory = ("_memory", "_turn", "_clock")
+    memory = ("numbers",)
     attitude_at = 6
     moving = (slice(0, 6), slice(6, 9))
-    #: True if the kernels of `simnav.estimators.models.inertial_update` may replace `measure` and `correct`, and
-    #: `inflate_motion` `loosen`. A model with another form of one of these methods sets it to False.
+    #: True if the kernels of `simnav.estimators.models.inertial_functions` may replace `measure`, `correct` and
+    #: `loosen`. A model with another form of one of these methods sets it to False.
     fused: ClassVar[bool] = True
 
     def __init_subclass__(cls) -> None:
@@ -153,13 +153,26 @@ class InertialModel(ErrorModel):
         return (IMU, AID)
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        """A copy: its last sample is in the clock that was copied with it."""
+        """A copy: the named blocks of its state are views of the flat one."""
         vars(self).update(state)
-        if "_clock" in state:
+        if "numbers" in state:
             self._bind()
 
     def _bind(self) -> None:
-        self.raw_rate, self.raw_force = self._clock[12:15], self._clock[6:9]
+        """Name the blocks of the flat state."""
+        self.motion = motion = motion_of.function(self.numbers)
+        self.position, self.velocity, self.dcm, self.bias = motion.position, motion.velocity, motion.dcm, motion.bias
+        self.calibration = self.numbers[MOTION_NUMBERS:]
+        self.raw_rate, self.raw_force = motion.clock[12:15], motion.clock[6:9]
+
+    @property
+    def time(self) -> float:
+        """Time of the state [s]."""
+        return float(self.motion.clock[0])
+
+    @time.setter
+    def time(self, time: float) -> None:
+        self.motion.clock[0] = time
 
     def choose(self, instruments: Instruments, name: str) -> ErrorModel:
         """Itself; UnsuitableScenario without an IMU or without anything to aid it."""
@@ -177,24 +190,19 @@ class InertialModel(ErrorModel):
         if imu is None:
             raise UnsuitableScenario("it needs an IMU")
         self.instruments = instruments = with_lever_arms(instruments)
-        self.time = start.time
-        self.position = np.array(start.position, dtype=np.float64)
-        self.velocity = np.array(start.velocity, dtype=np.float64)
-        self.dcm = np.ascontiguousarray(dcm_from_rpy(start.attitude))
-        self.bias, self._memory, self._turn = np.zeros(6), np.zeros(6), np.zeros(3)
-        self._clock = np.zeros(15)
-        self._clock[0], self._clock[1] = start.time, -1e9
-        self._bind()
         self.transition, self.process_noise = np.empty((_NAV, _NAV)), np.empty((_NAV, _NAV))
+        self.next_sample, self._since = np.zeros(1, np.int64), start.time
         self.load(None)
-        self._packet: Packet | None = None
         self.blocks = StateBlocks(_MOTION)
         self._imu(imu)
         self._aids()
         n = self.size = self.blocks.size
         variance, decay, density = self.blocks.columns(_MOTION)
         self._decay, self._density = decay[6:], density[6:]
-        self.calibration = np.zeros(n - _NAV)
+        self.numbers = np.zeros(MOTION_NUMBERS + n - _NAV)
+        self._bind()
+        self.position[:], self.velocity[:], self.dcm[:] = start.position, start.velocity, dcm_from_rpy(start.attitude)
+        self.motion.clock[:2] = start.time, -1e9
         self._jacobians = {name: np.empty((len(noise), n)) for name, noise in self.noise.items()}
         covariance = np.zeros((n, n))
         covariance[:_MOTION, :_MOTION] = start.covariance
@@ -248,7 +256,7 @@ class InertialModel(ErrorModel):
                 if "scale" in states:
                     self.uncalibrated.add(sheet.name)
             self.noise[sheet.name] = equation.white_noise(sheet, white, self._rate_variance)
-            self.aid_parameters[sheet.name] = (
+            self.aid_parameters[sheet.name] = Aid(
                 equation.code, np.array(sheet.lever_arm, dtype=np.float64),
                 self.bias_at.get(sheet.name, -1), self.scale_at.get(sheet.name, -1),
             )  # fmt: skip
@@ -257,7 +265,7 @@ class InertialModel(ErrorModel):
         if self.calibrate:
             self.blocks.bring(own)
         for sheet in own:
-            self.own[sheet.name] = OwnObservation(sheet, self.blocks.places(sheet.name, _NAV), self.time)
+            self.own[sheet.name] = OwnObservation(sheet, self.blocks.places(sheet.name, _NAV), self._since)
         self.delayed = any(is_delayed(sheet) for sheet in own)
         self.many = of_instruments(self.own, self.bias_at)
         self._many_of = {name: many for many in self.many for name in many.sources}
@@ -304,15 +312,24 @@ class InertialModel(ErrorModel):
             if name in self.noise:
                 limits[i, : len(self.noise[name])] = KINDS[self.instruments[name].kind].limits
         return {
-            "position": self.position, "velocity": self.velocity, "dcm": self.dcm, "memory": self._memory,
-            "bias": self.bias, "turn": self._turn, "clock": self._clock, "sensors": self._noise,
+            "position": self.position, "velocity": self.velocity, "dcm": self.dcm, "memory": self.motion.increments,
+            "bias": self.bias, "turn": self.motion.turn, "clock": self.motion.clock, "sensors": self._noise,
             "calibration": self.calibration, "decay": self._decay, "density": self._density,
             "codes": codes, "arms": arms, "noises": noises, "limits": limits,
         }  # fmt: skip
 
-    def step_table(self, names: Sequence[str]) -> AidTable | None:
-        """As `ErrorModel.step_table`; None if an instrument has an equation or a clock of its own."""
-        return self.table(names) if self._fused == set(self.noise) and not self.blocks.clocks else None
+    def functions(self) -> ModelFunctions | None:
+        """As `ErrorModel.functions`; None if an instrument has an equation or a clock of its own."""
+        return INERTIAL_FUNCTIONS if self._fused == set(self.noise) and not self.blocks.clocks else None
+
+    def dynamics(self, covariance: Array, names: Sequence[str]) -> Dynamics:
+        """As `ErrorModel.dynamics`."""
+        return Dynamics(
+            numbers=self.numbers, covariance=covariance, transition=self.transition, process_noise=self.process_noise,
+            constants=self._noise, decay=self._decay, density=self._density,
+            first_variances=covariance.diagonal().copy(), correction=np.empty(self.size), next_sample=self.next_sample,
+            aids=self.table(names),
+        )  # fmt: skip
 
     def table(self, names: Sequence[str]) -> AidTable:
         """The instruments in the order of their names; zeros for one that is not observed."""
@@ -323,43 +340,27 @@ class InertialModel(ErrorModel):
                 code, arms[i], bias_at, scale_at = self.aid_parameters[name]
                 d = len(self.noise[name])
                 codes[i], noises[i, : d * d] = (code, d, bias_at, scale_at), self.noise[name].ravel()
-        return codes, arms, noises
+        return AidTable(codes, arms, noises)
 
     def load(self, imu: ImuSamples | None) -> None:
         """Take the IMU samples of the step that follows."""
-        self._first = 0
-        self._samples: Samples
+        self.next_sample[0] = 0
         if imu is None or len(imu) == 0:
-            self._samples = (_NO_TIMES, _NO_TIMES, _NO_VECTORS, _NO_VECTORS)
+            self.samples = NO_SAMPLES
         else:
-            self._samples = ready(imu.time), ready(imu.interval), ready(imu.angular_rate), ready(imu.specific_force)
-
-    def carried(self) -> tuple[Moving, Samples, int, Array, tuple[Array, Array, Array]]:
-        """What a kernel takes that propagates the state.
-
-        Returns
-        -------
-        state, samples, first, noise, others
-            The arguments of `simnav.estimators.models.propagation.propagate_inertial`.
-        """
-        state = self.position, self.velocity, self.dcm, self._memory, self.bias, self._turn, self._clock
-        return state, self._samples, self._first, self._noise, (self.calibration, self._decay, self._density)
-
-    def arrived(self, first: int) -> None:
-        """Note that a kernel has propagated the state, and the index of the first sample that it did not use up."""
-        self._first, self.time = first, float(self._clock[0])
+            self.samples = Samples(
+                ready(imu.time), ready(imu.interval), ready(imu.angular_rate), ready(imu.specific_force)
+            )
 
     def propagate(self, covariance: Array, until: float) -> None:
         """Advance the state and its covariance through the samples loaded."""
         elapsed = until - self.time
         if elapsed <= 0.0:
             return
-        self._first = propagate_inertial(
-            (self.position, self.velocity, self.dcm, self._memory, self.bias, self._turn, self._clock), self._samples,
-            self._first, until, self._noise, (self.transition, self.process_noise, covariance),
-            (self.calibration, self._decay, self._density), elapsed,
+        self.next_sample[0] = propagate_inertial(
+            self.motion, self.samples, int(self.next_sample[0]), until, self._noise,
+            (self.transition, self.process_noise, covariance), (self.calibration, self._decay, self._density), elapsed,
         )  # fmt: skip
-        self.time = until
         if self.blocks.clocks:
             self.blocks.carry_values(self.calibration, _NAV, elapsed)
             self.blocks.carry_covariance(covariance, elapsed)
@@ -379,7 +380,7 @@ class InertialModel(ErrorModel):
     @property
     def held(self) -> float:
         """Seconds without usable IMU data so far."""
-        return float(self._clock[2])
+        return float(self.motion.clock[2])
 
     def measure(self, measurement: Measurement) -> Linearised | None:
         """Linearise one measurement (`simnav.estimators.models.measurements`)."""
@@ -401,14 +402,14 @@ class InertialModel(ErrorModel):
         return Linearised(innovation, jacobian, noise)
 
     def _state(self) -> State:
-        return self.position, self.velocity, self.dcm, self.raw_rate, self.bias, self.calibration
+        return State(self.position, self.velocity, self.dcm, self.raw_rate, self.bias, self.calibration)
 
     def state_of_own(self) -> State:
         """The state for `observe_own`: with delays among the states, the rate has the specific force behind it."""
         if not self.delayed:
             return self._state()
         inertial = np.concatenate([self.raw_rate, self.raw_force])
-        return self.position, self.velocity, self.dcm, inertial, self.bias, self.calibration
+        return State(self.position, self.velocity, self.dcm, inertial, self.bias, self.calibration)
 
     def observe_own(
         self, name: str, time: float, value: Array, state: tuple[Array, ...], side: Array = NO_SIDE
@@ -440,67 +441,6 @@ class InertialModel(ErrorModel):
         many = self._many_of.get(name)
         more = None if many is None else many.more_noise([m.side for m in measurements])
         return None if more is None else self.noise[name] + more
-
-    def innovate(self, measurement: Measurement, covariance: Array) -> Observation | None:
-        """Linearise a measurement and project the covariance (`simnav.estimators.models.inertial_update`)."""
-        name = measurement.instrument
-        if name not in self._fused:
-            return super().innovate(measurement, covariance)
-        noise, value = self.noise[name], measurement.value.astype(np.float64)
-        d = len(noise)
-        innovation, cross, predicted = np.empty(d), np.empty((self.size, d)), np.empty((d, d))
-        if not innovate_inertial(
-            self.aid_parameters[name], value, self._state(), covariance, innovation, cross, predicted
-        ):
-            return None
-        return innovation, cross, predicted, noise
-
-    def absorb(self, observation: Observation, covariance: Array, correction: Array) -> float:
-        """Correct the state and its covariance (`simnav.estimators.models.inertial_update`)."""
-        if not self._fused:
-            return super().absorb(observation, covariance, correction)
-        innovation, cross, predicted, noise = observation
-        nis: float = absorb_inertial(
-            covariance, cross, predicted, np.ascontiguousarray(noise, dtype=np.float64), innovation, self._state(),
-            correction,
-        )  # fmt: skip
-        return nis
-
-    def assimilate(self, measurement: Measurement, covariance: Array, correction: Array) -> tuple[float, float] | None:
-        """Use a measurement with its nominal noise (`simnav.estimators.models.inertial_update`)."""
-        name = measurement.instrument
-        if name not in self._fused:
-            return None
-        nis, size = assimilate_inertial(
-            self.aid_parameters[name], measurement.value.astype(np.float64), self._state(), covariance,
-            self.noise[name], correction,
-        )  # fmt: skip
-        return nis, size
-
-    def assimilate_step(
-        self,
-        measurements: Sequence[Measurement],
-        until: float,
-        covariance: Array,
-        correction: Array,
-        rule: StepRule | None = None,
-    ) -> list[list[float]] | None:
-        """As `ErrorModel.assimilate_step`, in one kernel, if no instrument has an equation or a clock of its own."""
-        if self._packet is None:
-            chosen = rule or StepRule(filter_inertial, list(self.noise), ())
-            if not self._fused == set(self.noise) == set(chosen.names) or self.blocks.clocks:
-                return None
-            self._packet = Packet(self.table(chosen.names), chosen)
-        measured, chosen = self._packet.fill(measurements), self._packet.rule
-        self._first = chosen.kernel.unchecked(
-            (self.position, self.velocity, self.dcm, self._memory, self.bias, self._turn, self._clock), self._samples,
-            self._first, until, self._noise, (self.transition, self.process_noise, covariance),
-            (self.calibration, self._decay, self._density, correction), (self._packet.aids, measured),
-            *chosen.arrays,
-        )  # fmt: skip
-        self.time = float(self._clock[0])
-        used: list[list[float]] = measured[3][: len(measurements)].tolist()
-        return used
 
     def assimilate_together(
         self, measurements: Sequence[Measurement], covariance: Array, correction: Array

@@ -22,14 +22,13 @@ from simnav.estimators.algebra.whitening import whitening
 from simnav.kernel_types import IntegerVector, Matrix, Stack, Vector
 from simnav.types import Array, InitialState, Instruments, Measurement
 
-from .base import StepRule
 from .chain import STEPPED, Chain, chain_of
 from .columns import Columns, Selection
+from .filtering import ReadingsOfSteps
 from .folds import add_noise, through_one
 from .inertial import InertialModel
-from .inertial_step import Packet, filter_inertial
 from .inertial_take import TAKEN, take_inertial
-from .measurements import OWN, observe_inertial
+from .measurements import OWN, Aid, State, observe_inertial
 from .preintegrated import add_shift, move_shift, relative_shift, turn_covariance
 from .propagation import correct_inertial
 
@@ -198,11 +197,11 @@ def _linearise(
         s, f = instrument[i], fold0 + fold[i] - fold_base
         if what & READINGS and codes[s] != OWN:
             k = k0 + node[i] - base
-            state = position[k], velocity[k], dcm[k], rate[k], bias[k], calibration[k]
+            state = State(position[k], velocity[k], dcm[k], rate[k], bias[k], calibration[k])
             if fold[i] >= 0:
-                state = now[0][f], now[1][f], now[2][f], fold_rate[f], now[3][f], now[4][f]
+                state = State(now[0][f], now[1][f], now[2][f], fold_rate[f], now[3][f], now[4][f])
             d = observe_inertial(
-                (codes[s], arms[s], bias_at[s], scale_at[s]), value[i], state, innovation,
+                Aid(codes[s], arms[s], bias_at[s], scale_at[s]), value[i], state, innovation,
                 jacobian[i] if n >= 15 else wide,
             )  # fmt: skip
             components[i] = d
@@ -344,7 +343,7 @@ class InertialChain(Chain):
         """One node, at the start; its covariance. UnsuitableScenario without an IMU."""
         covariance = super().begin(start, instruments)
         front = self.front
-        nothing = (0, np.zeros(3), -1, -1)
+        nothing = Aid(0, np.zeros(3), -1, -1)
         known = [front.aid_parameters.get(name, nothing) for name in self.names]
         self._known = (
             np.array([OWN if name in front.own else code for name, (code, *_) in zip(self.names, known)], np.int64),
@@ -352,30 +351,27 @@ class InertialChain(Chain):
             np.array([at for *_, at, _ in known], dtype=np.int64),
             np.array([at for *_, at in known], dtype=np.int64),
         )
-        table = front.step_table(self.names)
-        self._packet = None if table is None else Packet(table, StepRule(filter_inertial, list(self.names), ()))
+        self._dynamics = None if front.functions() is None else front.dynamics(covariance, self.names)
+        self._readings = ReadingsOfSteps(self.names)
         return covariance
 
     def take(self, measurements: Sequence[Measurement], until: float, spacing: float) -> tuple[int, int] | None:
         """As `Chain.take`, if no instrument has an equation or a clock of its own."""
         nodes, motions, aids, folds = self.nodes, self.motions, self.aids, self.folds
-        count, packet, front = len(measurements), self._packet, self.front
-        if packet is None or count > aids.free:
+        count, dynamics = len(measurements), self._dynamics
+        if dynamics is None or count > aids.free:
             return None
         for columns in (nodes, motions, folds):
             columns.reserve(count)
-        state, samples, first, noise, others = front.carried()
-        first, self.ahead, (new, attached, folded, unused) = take_inertial.unchecked(
-            state, samples, (until, spacing, self.ahead), noise,
-            (front.transition, front.process_noise, self._transition, self._noise), others,
-            (packet.aids, packet.fill(measurements)),
+        self.ahead, (new, attached, folded, unused) = take_inertial.unchecked(
+            dynamics, self.front.samples, self._readings.fill(measurements), count, (until, spacing, self.ahead),
+            (self._transition, self._noise),
             (
-                first, nodes.last, motions.last, aids.last, folds.last, self.base + len(nodes) - 1,
+                nodes.last, motions.last, aids.last, folds.last, self.base + len(nodes) - 1,
                 self.fold_base + len(folds), len(folds),
             ),
             self.whole(TAKEN),
         )  # fmt: skip
-        front.arrived(first)
         for columns, rows in ((nodes, new), (motions, new), (aids, attached), (folds, folded)):
             if rows:
                 columns.grow(rows)

@@ -35,6 +35,8 @@ from .measurements import (
     HEADING,
     NAVIGATION_STATES,
     SPEED_LOG,
+    Aid,
+    State,
     observe_inertial,
 )
 from .points import PointModel
@@ -144,8 +146,8 @@ def propagate_points(
 
 @kernel
 def observe_points(
-    aid: tuple[int, Vector, int, int],
-    state: tuple[Vector, Vector, Matrix, Vector, Vector, Vector],
+    aid: Aid,
+    state: State,
     errors: Matrix,
     differences: Matrix,
 ) -> None:
@@ -184,8 +186,8 @@ def observe_points(
             _turn(dcm, errors[k, 6], errors[k, 7], errors[k, 8], m)
         full = k == -2
         known = observe_inertial(
-            (code, arm, bias_at if full else -1, scale_at if full else -1), value,
-            (position, v, m, rate, b, calibration), reading, linear if full else scratch,
+            Aid(code, arm, bias_at if full else -1, scale_at if full else -1), value,
+            State(position, v, m, rate, b, calibration), reading, linear if full else scratch,
         )  # fmt: skip
         if k == -1:
             at_state[:] = reading

@@ -22,7 +22,7 @@ The noise is that of the datasheet plus that of the gyroscopes times the lever a
 from __future__ import annotations
 
 from math import atan2, cos, sin, sqrt
-from typing import TypeAlias
+from typing import NamedTuple
 
 from simnav.compiled import helper, kernel
 from simnav.geometry.earth import ECCENTRICITY_SQUARED, ROTATION_RATE, SEMI_MAJOR_AXIS, radii_scalar
@@ -31,7 +31,7 @@ from simnav.kernel_types import Matrix, Vector
 from simnav.types import Array
 
 __all__ = [
-    "AID", "OWN", "STATE", "Aid", "State", "has_heading", "observe", "observe_inertial", "radii", "wrap",
+    "OWN", "Aid", "State", "has_heading", "observe", "observe_inertial", "radii", "wrap",
 ]  # fmt: skip
 
 #: Smallest cosine of the pitch at which there is a heading [-].
@@ -44,16 +44,50 @@ GNSS_POSITION, TERRAIN_FIX, GNSS_VELOCITY, DVL, SPEED_LOG, HEADING, DEPTH = rang
 #: In the place of a code: the kind of instrument has a function of its own (`simnav.kinds.Kind.observation`).
 OWN = -1
 
-#: The parameters of an instrument: its code; its lever arm (3,), body axes [m]; the index in the error state of
-#: its first bias, and of its scale factor, -1 for none. After a DVL's scale factor come three misalignments, after a
-#: log's bias the current, north and east.
-Aid: TypeAlias = tuple[int, Array, int, int]
-#: The state at which a measurement is observed: position (3,), latitude, longitude [rad] and height [m]; velocity (3,),
-#: north, east, down [m/s]; rotation from body to north-east-down (3, 3); body rate relative to the inertial frame, as
-#: measured (3,) [rad/s]; bias, the gyroscopes' first; calibration states of the instruments (n - 15,).
-State: TypeAlias = tuple[Array, Array, Array, Array, Array, Array]
-#: Their types.
-AID, STATE = "Tuple((i8, f8[::1], i8, i8))", "Tuple((f8[::1], f8[::1], f8[:, ::1], f8[::1], f8[::1], f8[::1]))"
+
+class Aid(NamedTuple):
+    """The parameters of an instrument.
+
+    Attributes
+    ----------
+    code : int
+        Its measurement equation.
+    lever_arm : (3,) array
+        In body axes [m].
+    bias_at, scale_at : int
+        Index in the error state of its first bias, and of its scale factor; -1 for none. After a DVL's scale factor
+        come three misalignments, after a log's bias the current, north and east.
+    """
+
+    code: int
+    lever_arm: Vector
+    bias_at: int
+    scale_at: int
+
+
+class State(NamedTuple):
+    """The state at which a measurement is predicted.
+
+    Attributes
+    ----------
+    position, velocity : (3,) array
+        Latitude, longitude [rad] and height [m]; velocity north, east, down [m/s].
+    dcm : (3, 3) array
+        Rotation from body to north-east-down.
+    rate : (3,) array
+        Body rate relative to the inertial frame, as measured [rad/s].
+    bias : (6,) array
+        Biases, the gyroscopes' first.
+    calibration : (n - 15,) array
+        Calibration states of the instruments.
+    """
+
+    position: Vector
+    velocity: Vector
+    dcm: Matrix
+    rate: Vector
+    bias: Vector
+    calibration: Vector
 
 
 def wrap(angle: float) -> float:
@@ -80,12 +114,12 @@ def observe_inertial(aid: Aid, value: Array, state: State, innovation: Array, ja
 
     Parameters
     ----------
-    aid : tuple
-        Parameters of the instrument, see `Aid`.
+    aid : Aid
+        Parameters of the instrument.
     value : (d,) array
         Measured value.
-    state : tuple of arrays
-        The state at which the measurement is predicted, see `State`.
+    state : State
+        The state at which the measurement is predicted.
     innovation : (d,) array
         Overwritten with measured minus predicted, in the units of ``KINDS[kind].errors``.
     jacobian : (d, n) array
@@ -96,7 +130,7 @@ def observe_inertial(aid: Aid, value: Array, state: State, innovation: Array, ja
     int
         Number d of components; 0 if there is no such measurement at this state (a heading near the vertical).
     """
-    code, arm, bias_at, scale_at = aid
+    code, arm, bias_at, scale_at = aid.code, aid.lever_arm, aid.bias_at, aid.scale_at
     position, velocity, dcm, rate, bias, calibration = state
     d = 3
     if code == TERRAIN_FIX:
@@ -196,9 +230,9 @@ def observe_inertial(aid: Aid, value: Array, state: State, innovation: Array, ja
 
 @kernel
 def observe(
-    aid: tuple[int, Vector, int, int],
+    aid: Aid,
     value: Vector,
-    state: tuple[Vector, Vector, Matrix, Vector, Vector, Vector],
+    state: State,
     innovation: Vector,
     jacobian: Matrix,
 ) -> int:

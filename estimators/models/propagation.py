@@ -9,7 +9,7 @@ covariance is touched once a measurement (`propagate_covariance`). The equations
 from __future__ import annotations
 
 from math import cos, exp, sin
-from typing import TypeAlias
+from typing import NamedTuple
 
 import numpy as np
 
@@ -34,15 +34,15 @@ __all__ = [
     "BLOCK_COLUMNS",
     "HELD_ATTITUDE",
     "HELD_VELOCITY",
-    "MOVING",
-    "SAMPLES",
+    "MOTION_NUMBERS",
     "TURN_TIME",
-    "Moving",
+    "Motion",
     "Samples",
     "accumulate_error",
     "advance_inertial",
     "carry_errors",
     "correct_inertial",
+    "motion_of",
     "next_stretch",
     "propagate_covariance",
     "propagate_inertial",
@@ -65,17 +65,65 @@ BLOCK_COLUMNS = 22
 #: Columns of the matrices of a block: the 15 states, and one of zeros, so that they are a multiple of eight.
 WIDTH = 16
 
-#: IMU samples: their times and intervals (k,) [s], angular rates [rad/s] and specific forces [m/s^2] (k, 3).
-Samples: TypeAlias = tuple[Array, Array, Array, Array]
-SAMPLES = "Tuple((f8[::1], f8[::1], f8[:, ::1], f8[:, ::1]))"
-#: An inertial state that is carried along, with its memory of the samples: position (3,), latitude, longitude [rad] and
-#: height [m]; velocity (3,), north, east, down [m/s]; rotation from body to north-east-down (3, 3); increments of the
-#: last whole sample (6,); gyroscope and accelerometer bias, which decays (6,); averaged body rate (3,) [rad/s]; and the
-#: clock (15,): time of the state; end of the last sample used; seconds held so far; that sample's mean rate and force;
-#: the mean rate of the one before; and the rate at the time of the state, extrapolated from both: a mean is half a
-#: sample old, which over the lever arm of a DVL in a seaway would be taken for a misalignment.
-Moving: TypeAlias = tuple[Array, Array, Array, Array, Array, Array, Array]
-MOVING = "Tuple((f8[::1], f8[::1], f8[:, ::1], f8[::1], f8[::1], f8[::1], f8[::1]))"
+
+class Samples(NamedTuple):
+    """The IMU samples of a step.
+
+    Attributes
+    ----------
+    time, interval : (k,) array
+        Ends of the samples, and their lengths [s].
+    angular_rate, specific_force : (k, 3) array
+        Means over the intervals [rad/s], [m/s^2].
+    """
+
+    time: Vector
+    interval: Vector
+    angular_rate: Matrix
+    specific_force: Matrix
+
+
+class Motion(NamedTuple):
+    """An inertial state that is propagated, with what it remembers of the samples. All arrays are updated in place.
+
+    Attributes
+    ----------
+    position, velocity : (3,) array
+        Latitude, longitude [rad] and height [m]; velocity north, east, down [m/s].
+    dcm : (3, 3) array
+        Rotation from body to north-east-down.
+    bias : (6,) array
+        Biases of gyroscopes [rad/s] and accelerometers [m/s^2], which decay.
+    increments : (6,) array
+        Angle and velocity increments of the last whole sample.
+    turn : (3,) array
+        Averaged body rate [rad/s].
+    clock : (15,) array
+        Time of the state; end of the last sample used; seconds held so far; that sample's mean rate and force; the mean
+        rate of the one before; and the rate at the time of the state, extrapolated from both: a mean is half a sample
+        old, which over the lever arm of a DVL in a seaway would be taken for a misalignment.
+    """
+
+    position: Vector
+    velocity: Vector
+    dcm: Matrix
+    bias: Vector
+    increments: Vector
+    turn: Vector
+    clock: Vector
+
+
+#: Numbers of a flat inertial state before the calibration states of the instruments.
+MOTION_NUMBERS = 45
+
+
+@helper
+def motion_of(numbers: Array) -> Motion:
+    """The named blocks of a flat inertial state; behind them are the calibration states."""
+    return Motion(
+        numbers[0:3], numbers[3:6], numbers[6:15].reshape((3, 3)), numbers[15:21], numbers[21:27], numbers[27:30],
+        numbers[30:45],
+    )  # fmt: skip
 
 
 @helper
@@ -229,9 +277,9 @@ def next_stretch(
     Parameters
     ----------
     clock : (15,) array
-        The clock of `Moving`; its entries about samples are updated.
-    samples : tuple of arrays
-        The IMU samples, see `Samples`.
+        The clock of `Motion`; its entries about samples are updated.
+    samples : Samples
+        The IMU samples.
     i : int
         Index of the first sample that may not be completely used.
     t, until, nominal : float
@@ -248,7 +296,7 @@ def next_stretch(
     hold : bool
         Whether there is no sample for it.
     """
-    time, interval, rate, force = samples
+    time, interval, rate, force = samples.time, samples.interval, samples.angular_rate, samples.specific_force
     eps = 1e-7
     n = time.size
     while i < n and (
@@ -281,8 +329,8 @@ def next_stretch(
 
 @kernel
 def advance_inertial(
-    state: tuple[Vector, Vector, Matrix, Vector, Vector, Vector, Vector],
-    samples: tuple[Vector, Vector, Matrix, Matrix],
+    state: Motion,
+    samples: Samples,
     first: int,
     until: float,
     noise: Vector,
@@ -295,10 +343,10 @@ def advance_inertial(
 
     Parameters
     ----------
-    state : tuple of arrays
-        The state with its memory of the samples, see `Moving`; updated.
-    samples : tuple of arrays
-        The IMU samples, see `Samples`.
+    state : Motion
+        The state; updated.
+    samples : Samples
+        The IMU samples.
     first : int
         Index of the first sample that is not completely used.
     until : float
@@ -313,7 +361,7 @@ def advance_inertial(
     int, int
         Index of the first sample that is not completely used, and number of blocks.
     """
-    position, velocity, dcm, memory, bias, turn, clock = state
+    position, velocity, dcm, bias, memory, turn, clock = state
     eps = 1e-7
     before = np.empty(9)
     keep = np.empty(6)
@@ -472,8 +520,8 @@ def carry_errors(transition: Matrix, rate: Vector, elapsed: float, error: Matrix
 
 @kernel
 def propagate_inertial(
-    state: tuple[Vector, Vector, Matrix, Vector, Vector, Vector, Vector],
-    samples: tuple[Vector, Vector, Matrix, Matrix],
+    state: Motion,
+    samples: Samples,
     first: int,
     until: float,
     noise: Vector,
@@ -501,7 +549,7 @@ def propagate_inertial(
         Index of the first sample that is not completely used.
     """
     transition, process_noise, covariance = matrices
-    blocks = np.empty((int((until - state[6][0]) / BLOCK) + 2, BLOCK_COLUMNS))
+    blocks = np.empty((int((until - state.clock[0]) / BLOCK) + 2, BLOCK_COLUMNS))
     first, count = advance_inertial(state, samples, first, until, noise, blocks)
     accumulate_error(blocks, count, noise, transition, process_noise)
     calibration, rate, density = others

@@ -15,8 +15,9 @@ import numpy as np
 
 from simnav.types import Array, Instruments, Measurement
 
-from .base import AidTable, ErrorModel, Linearised, Observation, StepRule
+from .base import ErrorModel, Linearised
 from .chain import Chain
+from .filtering import ModelFunctions
 
 __all__ = ["with_stated_sigmas"]
 
@@ -52,28 +53,8 @@ class _Stated(ErrorModel):
     def nominal_noises(self, measurements: Sequence[Measurement]) -> Array | None:
         return None if any(map(self._states, measurements)) else super().nominal_noises(measurements)
 
-    def step_table(self, names: Sequence[str]) -> AidTable | None:
-        return None if self.stated_variances else super().step_table(names)
-
-    def innovate(self, measurement: Measurement, covariance: Array) -> Observation | None:
-        if not self._states(measurement):
-            return super().innovate(measurement, covariance)
-        return ErrorModel.innovate(self, measurement, covariance)
-
-    def assimilate(self, measurement: Measurement, covariance: Array, correction: Array) -> tuple[float, float] | None:
-        return None if self._states(measurement) else super().assimilate(measurement, covariance, correction)
-
-    def assimilate_step(
-        self,
-        measurements: Sequence[Measurement],
-        until: float,
-        covariance: Array,
-        correction: Array,
-        rule: StepRule | None = None,
-    ) -> list[list[float]] | None:
-        if rule is not None or any(map(self._states, measurements)):
-            return None
-        return super().assimilate_step(measurements, until, covariance, correction)
+    def functions(self) -> ModelFunctions | None:
+        return None if self.stated_variances else super().functions()
 
     def assimilate_together(
         self, measurements: Sequence[Measurement], covariance: Array, correction: Array

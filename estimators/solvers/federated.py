@@ -49,18 +49,19 @@ from numpy.typing import NDArray
 
 from simnav.estimator import UnsuitableScenario
 from simnav.estimators.adaptations.base import Adaptation
+from simnav.estimators.adaptations.choice import Choice
 from simnav.estimators.algebra.joseph import joseph_update
-from simnav.estimators.models.base import Observation
 from simnav.estimators.models.channels import instrument_of
 from simnav.estimators.models.coupling import by_source
+from simnav.estimators.models.filtering import Dynamics, Prediction, Readings
 from simnav.estimators.models.inertial import InertialModel
 from simnav.estimators.models.nine_state import NineStateModel
-from simnav.estimators.models.propagation import propagate_covariance
+from simnav.estimators.models.propagation import Samples, propagate_covariance
 from simnav.estimators.models.state_blocks import without_shared_blocks
 from simnav.estimators.models.unaided import UnaidedModel
-from simnav.types import Array, Estimate, InitialState, Instruments, Measurement
+from simnav.types import Array, Estimate, InitialState, Instruments
 
-from .kalman import KalmanEstimator
+from .kalman import FilterFunctions, KalmanEstimator
 
 __all__ = ["FederatedEstimator"]
 
@@ -104,7 +105,6 @@ class FederatedEstimator(KalmanEstimator):
         "iteration": "a local filter corrects its own error, not the reference that is linearised about",
         "smoother": "every local filter has a covariance of its own",
     }
-    assimilates = False
     model: InertialModel
 
     @classmethod
@@ -166,7 +166,15 @@ class FederatedEstimator(KalmanEstimator):
         covariance[:c, :c] /= share
         return _Local(share, own, np.zeros(self.model.size), covariance)
 
-    def _propagate(self, until: float) -> None:
+    def functions(self) -> FilterFunctions:
+        """Motion, prediction and correction are those of the local filters."""
+        functions = super().functions()
+        return FilterFunctions(
+            self.propagate, self.predict, functions.choose if self.adaptation is None else self.choose, self.inflate,
+            self.correct, self.retract,
+        )  # fmt: skip
+
+    def propagate(self, dynamics: Dynamics, samples: Samples, until: float) -> None:
         """Advance the reference and all filters, and fuse on the way."""
         while self._period > 0.0 and self._next < until - SAME:
             self._step(self._next)
@@ -196,34 +204,43 @@ class FederatedEstimator(KalmanEstimator):
             self._fuse()
         return super()._estimate()
 
-    def _observe(self, m: Measurement) -> Observation | None:
-        """What a measurement says of its local filter's state."""
+    def predict(self, dynamics: Dynamics, readings: Readings, k: int, prediction: Prediction) -> bool:
+        """Compare a measurement with the state of its local filter."""
+        m = self._measurements[k]
         linearised = self.model.measure(m)
         if linearised is None:
-            return None
-        local = self._locals[self._of[m.instrument]]
+            return False
+        local = self._correcting = self._locals[self._of[m.instrument]]
         residual, jacobian, noise = linearised
-        cross = np.dot(local.covariance, jacobian.T)
-        return residual - jacobian @ local.error, cross, np.dot(jacobian, cross), noise
+        prediction.cross[:] = np.dot(local.covariance, jacobian.T)
+        prediction.predicted[:] = np.dot(jacobian, prediction.cross)
+        prediction.innovation[:], prediction.nominal[:] = residual - jacobian @ local.error, noise
+        return True
 
-    def _take(self, m: Measurement, diagnostics: dict[str, float | Array], flagged: list[tuple[str, float]]) -> None:
-        """Correct the measurement's local filter."""
-        master, self._correcting = self.covariance, self._locals[self._of[m.instrument]]
-        self.covariance = self._correcting.covariance
-        try:
-            super()._take(m, diagnostics, flagged)
-        finally:
-            self.covariance = master
+    def choose(self, choice: Choice, covariance: Array, readings: Readings, k: int, prediction: Prediction) -> None:
+        """Ask the adaptation about a reading of a local filter."""
+        super().choose(choice, self._correcting.covariance, readings, k, prediction)
+
+    def inflate(self, dynamics: Dynamics, readings: Readings, k: int, prediction: Prediction) -> None:
+        """Inflate the covariance of the local filter."""
+        own, factor = self._correcting.covariance, float(readings.inflation[k])
+        if self.adaptation is not None and self.adaptation.inflates:
+            for matrix in (own, prediction.cross, prediction.predicted):
+                matrix *= factor
+        else:
+            self.model.loosen(own, factor, dynamics.first_variances)
+            self.predict(dynamics, readings, k, prediction)
+
+    def correct(self, dynamics: Dynamics, choice: Choice, readings: Readings, k: int, prediction: Prediction) -> float:
+        """Correct the covariance of the local filter."""
+        innovation, cross, predicted, _, noise = prediction
+        return joseph_update(self._correcting.covariance, cross, predicted + noise, innovation, dynamics.correction)
+
+    def retract(self, dynamics: Dynamics) -> None:
+        """Add the correction to the error of the local filter."""
+        self._correcting.error[:] += dynamics.correction
         if self._period == 0.0:
             self._fuse()
-
-    def _absorb(self, observation: Observation) -> float:
-        """Correct the local filter whose turn it is."""
-        residual, cross, predicted, noise = observation
-        nis: float = joseph_update(self.covariance, cross, predicted + noise, residual, self._correction)
-        if nis >= 0.0:
-            self._correcting.error[:] += self._correction
-        return nis
 
     def _fuse(self) -> None:
         """Add up the information of all local filters; correct the reference; share the sum out again."""

@@ -24,7 +24,15 @@ import numpy as np
 from simnav.compiled import kernel
 from simnav.estimators.models.base import Linearised
 from simnav.estimators.models.inertial import InertialModel
-from simnav.estimators.models.measurements import DVL, GNSS_POSITION, GNSS_VELOCITY, SPEED_LOG, observe_inertial
+from simnav.estimators.models.measurements import (
+    DVL,
+    GNSS_POSITION,
+    GNSS_VELOCITY,
+    SPEED_LOG,
+    Aid,
+    State,
+    observe_inertial,
+)
 from simnav.estimators.models.stated_sigmas import with_stated_sigmas
 from simnav.geometry.rotation import rpy_from_dcm
 from simnav.kernel_types import Matrix, Vector
@@ -82,8 +90,8 @@ def observe_tangent(
     gyroscope, nothing, ours = np.empty(3), np.empty(0), np.empty((3, 15))
     for r in range(3):
         gyroscope[r] = bias[3 + r]
-    at = position, velocity, dcm, rate, gyroscope, nothing
-    d = observe_inertial((code, arm, -1, -1), value, at, error, ours)
+    at = State(position, velocity, dcm, rate, gyroscope, nothing)
+    d = observe_inertial(Aid(code, arm, -1, -1), value, at, error, ours)
     for i in range(d):
         error[i] = -error[i]
         for j in range(9):

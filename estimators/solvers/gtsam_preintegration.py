@@ -27,10 +27,12 @@ from typing import Any
 import numpy as np
 
 from simnav.compiled import kernel
+from simnav.estimators.models.base import NO_SAMPLES
 from simnav.estimators.models.propagation import (
     HELD_ATTITUDE,
     HELD_VELOCITY,
     TURN_TIME,
+    Samples,
     next_stretch,
 )
 from simnav.geometry.rotation import cross
@@ -57,7 +59,7 @@ def imu_pieces(
     clock: Vector,
     memory: Vector,
     bias: Vector,
-    samples: tuple[Vector, Vector, Matrix, Matrix],
+    samples: Samples,
     first: int,
     until: float,
     nominal: float,
@@ -71,13 +73,13 @@ def imu_pieces(
     Parameters
     ----------
     clock : (15,) array
-        As of `simnav.estimators.models.propagation.Moving`, but for the seconds held; updated.
+        As of `simnav.estimators.models.propagation.Motion`, but for the seconds held; updated.
     memory : (6,) array
         Angle and velocity increment of the last whole sample; updated.
     bias : (6,) array
         Gyroscopes, accelerometers: taken off for coning and sculling, and put on again.
-    samples : tuple of arrays
-        The IMU samples, see `simnav.estimators.models.propagation.Samples`.
+    samples : Samples
+        The IMU samples.
     first : int
         Index of the first sample that is not completely used.
     until, nominal : float
@@ -180,11 +182,13 @@ class Preintegration:
     def load(self, imu: ImuSamples | None) -> None:
         """Take the IMU samples of the step that follows."""
         self._first = 0
-        self._samples: tuple[Array, Array, Array, Array]
+        self._samples: Samples
         if imu is None or len(imu) == 0:
-            self._samples = np.empty(0), np.empty(0), np.empty((0, 3)), np.empty((0, 3))
+            self._samples = NO_SAMPLES
         else:
-            self._samples = _own(imu.time), _own(imu.interval), _own(imu.angular_rate), _own(imu.specific_force)
+            self._samples = Samples(
+                _own(imu.time), _own(imu.interval), _own(imu.angular_rate), _own(imu.specific_force)
+            )
 
     def begin(self, state: Any, bias: Any) -> None:
         """Start anew at a node."""

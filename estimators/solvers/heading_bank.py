@@ -28,14 +28,15 @@ from typing import ClassVar
 
 import numpy as np
 
+from simnav.estimators.adaptations.choice import Choice
 from simnav.estimators.algebra.chi_square import chi_square_limits
 from simnav.estimators.composition import Solver
-from simnav.estimators.models.base import Observation
+from simnav.estimators.models.filtering import Dynamics, Prediction, Readings
 from simnav.estimators.models.suitable import ModelChoice
 from simnav.geometry.rotation import wrap_angle
 from simnav.types import Array, Estimate, InitialState, Instruments, Measurements
 
-from .kalman import KalmanEstimator
+from .kalman import FilterFunctions, KalmanEstimator
 from .state_difference import difference, displaced
 
 __all__ = ["HeadingBank", "initial_headings"]
@@ -79,7 +80,6 @@ def initial_headings(sigma: float, spacing: float) -> tuple[Array, Array]:
 class _Scored(KalmanEstimator):
     """The filter, with the logarithm of the likelihood of its innovations."""
 
-    assimilates = False
     log_likelihood: float
 
     def reset(self, start: InitialState, instruments: Instruments) -> None:
@@ -88,14 +88,18 @@ class _Scored(KalmanEstimator):
         self.log_likelihood = 0.0
         self._limits = chi_square_limits(_CLIP)
 
-    def _absorb(self, observation: Observation) -> float:
-        residual, _, predicted, noise = observation
-        spread = 2.0 * pi * (predicted + noise)
-        nis = super()._absorb(observation)
+    def functions(self) -> FilterFunctions:
+        """The correction scores the innovation."""
+        return super().functions()._replace(correct=self.correct)
+
+    def correct(self, dynamics: Dynamics, choice: Choice, readings: Readings, k: int, prediction: Prediction) -> float:
+        """Correct the covariance, and add the logarithm of the innovation's likelihood."""
+        spread = 2.0 * pi * (prediction.predicted + prediction.noise)
+        nis = super().correct(dynamics, choice, readings, k, prediction)
         if nis >= 0.0:
             determinant = float(np.linalg.det(spread))
             if determinant > 0.0:
-                self.log_likelihood -= 0.5 * (min(nis, self._limits[len(residual)]) + log(determinant))
+                self.log_likelihood -= 0.5 * (min(nis, self._limits[len(prediction.innovation)]) + log(determinant))
         return nis
 
 

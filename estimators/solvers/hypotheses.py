@@ -116,7 +116,7 @@ class WatchedFilter(KalmanEstimator):
 
     def inflate_motion(self) -> None:
         """Inflate the covariance of position, velocity and attitude; the attitude within the linear range."""
-        first = self._first_variances.copy()
+        first = self.dynamics.first_variances.copy()
         attitude = self.model.moving[1]
         first[attitude] = np.maximum(first[attitude], _TILT**2)
         self.model.loosen(self.covariance, _LOOSENED, first)

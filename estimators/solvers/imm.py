@@ -2,23 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from math import ceil, hypot, log, sqrt
+from collections.abc import Mapping, Sequence
+from math import ceil, log, sqrt
 from typing import ClassVar
 
 import numpy as np
 
-from simnav.estimators.adaptations.adaptive_step import mixture_rule
-from simnav.estimators.adaptations.base import Innovation
+from simnav.compiled import kernel
+from simnav.estimators.adaptations.choice import Choice, choose_noise, keep_nominal
 from simnav.estimators.adaptations.prediction import PredictionTest
+from simnav.estimators.adaptations.rules import OWN
 from simnav.estimators.algebra.mixture import mixture_update
-from simnav.estimators.models.base import REPORT, SIGMA, StepRule
 from simnav.estimators.models.channels import summary
 from simnav.estimators.models.coupling import by_source
+from simnav.estimators.models.filtering import Dynamics, Prediction, Readings
 from simnav.estimators.models.suitable import ModelChoice
 from simnav.types import KINDS, Array, Estimate, InitialState, Instruments, Measurement, Measurements
 
-from .kalman import KalmanEstimator
+from .filter_step import correct
+from .kalman import FilterFunctions, KalmanEstimator
 from .smoother import Smoother
 
 __all__ = ["ImmEstimator"]
@@ -77,7 +79,7 @@ class ImmEstimator(KalmanEstimator):
         stay_high: float = 0.675,
     ):
         super().__init__(model, smoother=smoother)
-        if self._stepwise:
+        if smoother is not None and smoother.stepwise:
             raise ValueError(f"{type(smoother).__name__} needs one noise of a measurement; here it is a mixture")
         if not levels:
             if not (np.isfinite(highest) and highest > 1.0 and ratio > 1.0):
@@ -101,24 +103,39 @@ class ImmEstimator(KalmanEstimator):
             self._report.update(zip(self._labels[name], map(float, instruments[name].sigma)))
             self._report[f"quiet.{name}"] = float(self._probability[name][0])
 
-    def _step_rule(self, instruments: Instruments) -> StepRule:
-        self._prediction = PredictionTest(instruments)
-        # The chain's stationary distribution
+    def functions(self) -> FilterFunctions:
+        """The prediction is tested, and the correction is a mixture."""
+        functions = super().functions()
+        correct = self.correct if self.smoother is not None else correct_by_mixture
+        return functions._replace(choose=choose_noise, correct=correct)
+
+    def choice(self, instruments: Instruments) -> Choice:
+        """The levels as settings, and the probabilities of the levels as memories; at first the stationary ones."""
         values, vectors = np.linalg.eig(self.transition.T)
         first = np.real(vectors[:, int(np.argmax(np.real(values)))])
-        probability = np.tile(first / first.sum(), (len(instruments), 1))
+        probability, i = np.tile(first / first.sum(), (len(instruments), 1)), len(self._names)
         self._probability = dict(zip(instruments, probability, strict=True))
-        return mixture_rule(
-            self._variances, self.transition, probability, self._names, self._prediction, self._first_variances
-        )
+        index = {name: k for k, name in enumerate(instruments)}
+        return Choice(
+            rule=keep_nominal, estimates=False, inflates_disturbed=False,
+            index=np.array([index[name] for name in self._names], np.int64), in_scope=np.ones(i, np.bool_),
+            last=np.zeros((i, 9)),
+            settings=np.tile([*self._variances, *self.transition.ravel()], (len(instruments), 1)),
+            memories=probability.ravel(), first=np.arange(0, probability.size + 1, len(self._variances)),
+            shared=np.full(OWN + 1, np.nan), **PredictionTest(instruments).arrays(self.model.size),
+        )  # fmt: skip
 
-    def _reporter(self) -> Callable[[str, Sequence[float]], None]:
-        return self._noted
+    def correct(self, dynamics: Dynamics, choice: Choice, readings: Readings, k: int, prediction: Prediction) -> float:
+        """Correct by the mixture, and tell a smoother."""
+        nis = correct_by_mixture(dynamics, choice, readings, k, prediction)
+        if nis >= 0.0 and self.smoother is not None:
+            self.smoother.use(dynamics.correction, self._linearised, prediction.noise)
+        return nis
 
-    def _noted(self, name: str, row: Sequence[float]) -> None:
-        if row[SIGMA] == row[SIGMA]:
-            self._report.update(zip(self._labels[name], row[SIGMA:]))
-            self._report[f"quiet.{name}"] = row[REPORT]
+    def _report_choice(self, m: Measurement, sigma: Sequence[float], number: float) -> None:
+        if sigma[0] == sigma[0]:
+            self._report.update(zip(self._labels[m.instrument], sigma))
+            self._report[f"quiet.{m.instrument}"] = number
 
     def update(self, measurements: Measurements) -> Estimate:
         """Take one step's measurements."""
@@ -127,26 +144,24 @@ class ImmEstimator(KalmanEstimator):
         estimate.diagnostics = {**estimate.diagnostics, **self._report, **means}
         return estimate
 
-    def _take(self, m: Measurement, diagnostics: dict[str, float | Array], flagged: list[tuple[str, float]]) -> None:
-        observation = self._observe(m)
-        if observation is None:
-            self._admission.skipped += 1
-            return
-        residual, cross, predicted, noise = observation
-        if self._prediction.fails(Innovation(m, residual, predicted, noise)):
-            super()._take(m, diagnostics, flagged)
-            return
-        probability = self._probability[m.instrument]
-        nis, expected = mixture_update(
-            self.covariance, cross, predicted, noise, residual, self._variances, self.transition, probability,
-            self._correction,
-        )  # fmt: skip
-        if nis >= 0.0:
-            self.model.correct(self._correction)
-            for label, variance in zip(self._labels[m.instrument], noise.diagonal().tolist()):
-                self._report[label] = sqrt(expected * variance)
-            self._report[f"quiet.{m.instrument}"] = float(probability[0])
-        self._note(m, nis, hypot(*residual.tolist()), diagnostics)
+
+@kernel(passed=True)
+def correct_by_mixture(dynamics: Dynamics, choice: Choice, readings: Readings, k: int, prediction: Prediction) -> float:
+    """Correct the covariance by a mixture of levels; by the nominal noise where the prediction is wrong."""
+    if readings.wrong[k]:
+        readings.sigma[k, 0] = np.nan
+        return correct(dynamics, choice, readings, k, prediction)
+    i = choice.index[readings.instrument[k]]
+    probability, count = choice.memories[choice.first[i] : choice.first[i + 1]], choice.first[i + 1] - choice.first[i]
+    levels, transition = choice.settings[i, :count], choice.settings[i, count:].reshape((count, count))
+    nis, expected = mixture_update(
+        dynamics.covariance, prediction.cross, prediction.predicted, prediction.nominal, prediction.innovation, levels,
+        transition, probability, dynamics.correction,
+    )  # fmt: skip
+    readings.reported[k] = probability[0]
+    for a in range(prediction.innovation.size):
+        readings.sigma[k, a] = sqrt(expected * prediction.nominal[a, a])
+    return nis
 
 
 def _chain(n: int, stay: float, stay_high: float) -> Array:

@@ -43,13 +43,11 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from simnav.estimators.adaptations.base import Adaptation
-from simnav.estimators.algebra.joseph import joseph_update
-from simnav.estimators.models.base import Observation
+from simnav.estimators.models.filtering import Dynamics
 from simnav.estimators.models.inertial import InertialModel
 from simnav.geometry.rotation import left_jacobian, skew
-from simnav.types import Array
 
-from .kalman import KalmanEstimator
+from .kalman import FilterFunctions, KalmanEstimator
 
 __all__ = ["InvariantKalmanEstimator"]
 
@@ -75,7 +73,6 @@ class InvariantKalmanEstimator(KalmanEstimator):
         "iteration": "an iterated correction is not one on the group",
         "smoother": "it turns the covariance after a correction, which a smoother does not undo",
     }
-    assimilates = False
 
     @classmethod
     def misfit(cls, keyword: str, made: type) -> str:
@@ -94,15 +91,13 @@ class InvariantKalmanEstimator(KalmanEstimator):
             raise ValueError(f'error is {error!r}; it must be "left" or "right"')
         self.error = error
 
-    def _absorb(self, observation: Observation) -> float:
-        residual, cross, predicted, noise = observation
-        nis: float = joseph_update(self.covariance, cross, predicted + noise, residual, self._correction)
-        if nis >= 0.0:
-            self._correct(self._correction)
-        return nis
+    def functions(self) -> FilterFunctions:
+        """The state is corrected on the group."""
+        return super().functions()._replace(retract=self.retract)
 
-    def _correct(self, dx: Array) -> None:
+    def retract(self, dynamics: Dynamics) -> None:
         """Correct the state on the group, and transform the covariance of the invariant error."""
+        dx = dynamics.correction
         turn, P = dx[6:9], self.covariance
         J, across = left_jacobian(turn), skew(turn)
         dx[0:3], dx[3:6] = J @ dx[0:3], J @ dx[3:6]

@@ -18,39 +18,43 @@ Source: P. D. Groves 2013, sections 3.2 and 3.4.3.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from math import hypot
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from simnav.estimators.adaptations.adaptive_step import step_rule
 from simnav.estimators.adaptations.base import Adaptation, Innovation
+from simnav.estimators.adaptations.choice import Choice, choose_noise, no_choice
 from simnav.estimators.adaptations.intersection import weaken_position
 from simnav.estimators.adaptations.noise import NoiseAdaptation
+from simnav.estimators.algebra.joseph import joseph_update, project
 from simnav.estimators.composition import Solver
-from simnav.estimators.models.base import (
-    INNOVATION,
-    NIS,
-    REJECTED,
-    SIGMA,
-    SIZE,
-    ErrorModel,
-    Linearised,
-    Observation,
-    StepRule,
-)
+from simnav.estimators.models.base import ErrorModel, Linearised
 from simnav.estimators.models.channels import owners, summary
 from simnav.estimators.models.coupling import by_source
+from simnav.estimators.models.filtering import Dynamics, Prediction, Readings, ReadingsOfSteps
+from simnav.estimators.models.propagation import Samples
 from simnav.estimators.models.stated_sigmas import with_stated_sigmas
 from simnav.estimators.models.suitable import ModelChoice
 from simnav.types import Array, Estimate, InitialState, Instruments, Measurement, Measurements, NavigationStates
 
 from .admission import Admission, together
+from .filter_step import Filter, correct, filter_step, inflate_all, use_nominal
 from .innovation_consistency import InnovationTest
 from .iterated import Iteration, absorb_iterated
 from .smoother import Smoother
 
-__all__ = ["KalmanEstimator"]
+__all__ = ["FilterFunctions", "KalmanEstimator"]
+
+
+class FilterFunctions(NamedTuple):
+    """The functions of a filter, see `simnav.estimators.solvers.filter_step.Filter`."""
+
+    propagate: Callable[[Dynamics, Samples, float], None]
+    predict: Callable[[Dynamics, Readings, int, Prediction], bool]
+    choose: Callable[[Choice, Array, Readings, int, Prediction], None]
+    inflate: Callable[[Dynamics, Readings, int, Prediction], None]
+    correct: Callable[[Dynamics, Choice, Readings, int, Prediction], float]
+    retract: Callable[[Dynamics], None]
 
 
 class KalmanEstimator(Solver):
@@ -81,12 +85,6 @@ class KalmanEstimator(Solver):
         "weighting": "WeightedKalmanEstimator is the filter that takes one",
         "isolation": "a filter sees one measurement at a time, so that none can agree with another",
     }
-    #: True if `ErrorModel.assimilate` may replace `_observe` and `_absorb` when the noise is the nominal one. A solver
-    #: with another form of one of these methods sets it to False.
-    assimilates: ClassVar[bool] = True
-    #: True if `ErrorModel.assimilate_step` may replace `_take` and `_propagate`, too, for all measurements of a step.
-    takes_steps: ClassVar[bool] = True
-
     model: ErrorModel
 
     def __init__(
@@ -102,8 +100,7 @@ class KalmanEstimator(Solver):
         self.adaptation = adaptation
         self.iteration = None if iteration is None else iteration.check()
         self.smoother = smoother
-        self._stepwise = smoother is not None and smoother.stepwise
-        if self._stepwise and iteration is not None:
+        if smoother is not None and smoother.stepwise and iteration is not None:
             raise ValueError(f"{type(smoother).__name__} knows one Jacobian of a measurement; iterated, it has several")
 
     def reset(self, start: InitialState, instruments: Instruments) -> None:
@@ -112,22 +109,19 @@ class KalmanEstimator(Solver):
         self.model = self._chosen(instruments)
         self.model.reports_all |= self.reports_all
         self.covariance = self.model.begin(start, instruments)
-        self._first_variances = self.covariance.diagonal().copy()
         if self.adaptation is not None:
             self.adaptation.reset(instruments)
         self._names = [name for name, sheet in instruments.items() if self.model.observes(sheet)]
         self._admission = Admission(instruments, self._names)
         self._innovation_test = InnovationTest()
-        self._correction = np.empty(self.model.size)
         self._owners, self._mean_labels = owners(instruments), dict[str, str]()
         self._keys = {name: (f"innovation.{name}", f"nis.{name}") for name in self._names}
         self._blank = dict.fromkeys((label for pair in self._keys.values() for label in pair), np.nan)
-        self._plain = self.assimilates and self.adaptation is None and not self._stepwise
-        self._rule = self._step_rule(instruments)
-        known = self.adaptation is None or self._rule is not None
-        single = self.iteration is not None or self.smoother is not None
-        self._whole = self.assimilates and self.takes_steps and known and not single
         self._linearised: Linearised | None = None
+        self._measurements: Sequence[Measurement] = ()
+        self._arrays = ReadingsOfSteps(self._names)
+        self._filter = self._assembled(instruments)
+        self._compiled, self._iterated = self._filter.compiled, False
         if self.smoother is not None:
             self.smoother.begin(self.model, [instruments[name] for name in self._names])
 
@@ -141,15 +135,16 @@ class KalmanEstimator(Solver):
         model.load(measurements.imu)
         diagnostics: dict[str, float | Array] = dict(self._blank)
         flagged: list[tuple[str, float]] = []
-        admitted = self._admission.admit(measurements, model.time)
-        if not (self._whole and self._take_step(admitted, measurements.time, diagnostics, flagged)):
-            advance = self._propagate if self.smoother is None else self._advance
-            for group in self._together(admitted):
-                advance(min(group[0].time, measurements.time))
-                if len(group) == 1 or not self._take_together(group, diagnostics):
-                    for m in group:
-                        self._take(m, diagnostics, flagged)
-            advance(measurements.time)
+        admitted, until, samples = self._admission.admit(measurements, model.time), measurements.time, model.samples
+        self._iterations = 0
+        for group in self._groups(admitted):
+            end = until if group is admitted else min(group[0].time, until)
+            if group is admitted or len(group) == 1 or not self._use_together(group, end, diagnostics):
+                self._use(group, samples, end, diagnostics, flagged)
+        if model.time < until:
+            self._use((), samples, until, diagnostics, flagged)
+        if self._iterations:
+            diagnostics["iterations"] = float(self._iterations)
         diagnostics["skipped"] = float(self._admission.skipped)
         self._innovation_test.end_epoch()
         diagnostics["variance_factor"] = self._innovation_test.variance_factor
@@ -178,135 +173,146 @@ class KalmanEstimator(Solver):
         assert self.smoother is not None, "it has no smoother"
         return self.smoother.smoothed_covariance
 
-    def _propagate(self, until: float) -> None:
-        """Propagate the state and the covariance to a time; subclasses may override it."""
-        self.model.propagate(self.covariance, until)
-
-    def _advance(self, until: float) -> None:
-        """Call `_propagate`, and record the stretch for the smoother."""
-        assert self.smoother is not None
-        begin = self.model.time
-        if until > begin:
-            self.smoother.depart(self.model, self.covariance)
-            self._propagate(until)
-            self.smoother.arrive(self.model, self.covariance, until - begin)
-
     def _estimate(self) -> Estimate:
         """The estimate at the end of a step; subclasses may override it."""
         return self.model.estimate(self.covariance)
 
-    def _observe(self, m: Measurement) -> Observation | None:
-        """The linearised measurement; None if it cannot be used. Subclasses may override it."""
-        if not self._stepwise:
-            return self.model.innovate(m, self.covariance)
-        self._linearised = self.model.measure(m)
-        return None if self._linearised is None else self._linearised.project(self.covariance)
+    def functions(self) -> FilterFunctions:
+        """The functions of the filter; a solver of another kind replaces some of them.
 
-    def _absorb(self, observation: Observation) -> float:
-        """Correct the state and the covariance with the given noise; subclasses may override it.
-
-        It returns the normalised innovation squared, or -1 if nothing was changed. ``_correction`` is the correction of
-        the state.
+        They are kernels where the model has its equations as kernels and nothing has to be known of a measurement in
+        Python: a smoother and an iteration have to know.
         """
-        if not self._stepwise:
-            return self.model.absorb(observation, self.covariance, self._correction)
-        return ErrorModel.absorb(self.model, observation, self.covariance, self._correction)
+        kernels, own, inflate = self.model.functions(), self.adaptation, self.inflate
+        choose: Callable[..., None] = self.choose
+        if own is None:
+            choose = use_nominal
+        elif isinstance(own, NoiseAdaptation) and own.ruled:
+            choose = choose_noise
+        if own is None or (own.inflates and not own.inflates_position):
+            inflate = inflate_all
+        if kernels is None or self.smoother is not None or self.iteration is not None:
+            return FilterFunctions(self.propagate, self.predict, choose, inflate, self.correct, self.retract)
+        if own is not None and not own.inflates:
+            inflate = kernels.inflate_motion
+        return FilterFunctions(kernels.propagate, kernels.predict, choose, inflate, correct, kernels.retract)
 
-    def _take(self, m: Measurement, diagnostics: dict[str, float | Array], flagged: list[tuple[str, float]]) -> None:
-        """Use one measurement: linearise it, choose its noise or reject it, and correct the state."""
-        iteration = self.iteration
-        if iteration is not None and not iteration.applies(self.model, self.covariance):
-            iteration = None
-        if self._plain and iteration is None:
-            used = self.model.assimilate(m, self.covariance, self._correction)
-            if used is not None:
-                self._note(m, *used, diagnostics)
-                return
-        observation = self._observe(m)
-        if observation is None:
-            self._admission.skipped += 1
-            return
-        residual, cross, predicted, noise = observation
-        if self.adaptation is not None:
-            chosen = self.adaptation.adapt(Innovation(m, residual, predicted, noise, self.covariance, cross))
-            if chosen is None:
-                flagged.append((m.instrument, m.time))
-                return
-            noise, inflation = chosen, self.adaptation.inflation
-            if inflation != 1.0 and not self.adaptation.inflates:
-                self.model.loosen(self.covariance, inflation, self._first_variances)
-                residual, cross, predicted, _ = self._observe(m) or observation
-            elif inflation != 1.0 and self.adaptation.inflates_position:
-                weaken_position(self.covariance, inflation)
-                residual, cross, predicted, _ = self._observe(m) or observation
-            elif inflation != 1.0:
-                for matrix in (self.covariance, cross, predicted):
-                    matrix *= inflation
-        observation = residual, cross, predicted, noise
-        if iteration is not None:
-            nis, count = absorb_iterated(self.model, m, observation, self.covariance, self._correction, iteration)
-            diagnostics["iterations"] = max(float(count), float(diagnostics.get("iterations", 0.0)))
-        else:
-            nis = self._absorb(observation)
-        self._note(m, nis, hypot(*residual.tolist()), diagnostics, noise)
+    def _assembled(self, instruments: Instruments) -> Filter:
+        """The filter of a run, with all that its functions work on."""
+        self.dynamics = self.model.dynamics(self.covariance, self._names)
+        return Filter(dynamics=self.dynamics, choice=self.choice(instruments), **self.functions()._asdict())
 
-    def _together(self, measurements: Sequence[Measurement]) -> Iterable[Sequence[Measurement]]:
-        """The measurements, those of the channels of one instrument at one time in one group if that is quicker."""
-        if not (self._plain and self.model.many) or self.iteration is not None or self.smoother is not None:
-            return ((m,) for m in measurements)
-        return together(measurements, self._owners)
-
-    def _step_rule(self, instruments: Instruments) -> StepRule | None:
-        """How the noise of each measurement is chosen in a kernel; None: it is nominal, or chosen in Python."""
+    def choice(self, instruments: Instruments) -> Choice:
+        """How the noise of each reading is chosen in a run."""
         own = self.adaptation
-        return step_rule(own, self._names, self._first_variances) if isinstance(own, NoiseAdaptation) else None
+        return own.choice(self._names, self.model.size) if isinstance(own, NoiseAdaptation) else no_choice()
 
-    def _take_step(
-        self,
-        measurements: Sequence[Measurement],
-        until: float,
-        diagnostics: dict[str, float | Array],
+    def _use(
+        self, measurements: Sequence[Measurement], samples: Samples, until: float, diagnostics: dict[str, float | Array],
         flagged: list[tuple[str, float]],
-    ) -> bool:
-        """Use the measurements of a step, and propagate to its end; False if they have to be taken one by one."""
-        rule = self._rule
-        used = self.model.assimilate_step(measurements, until, self.covariance, self._correction, rule)
-        if used is None:
-            self._whole = self._whole and rule is None  # otherwise it is so for the run
-            return False
-        if rule is None:
-            for m, row in zip(measurements, used, strict=True):
-                self._note(m, row[NIS], row[SIZE], diagnostics)
-            return True
-        noted = self._reporter()
-        for m, row in zip(measurements, used, strict=True):
-            if row[NIS] == REJECTED:
+    ) -> None:  # fmt: skip
+        """Use measurements in order of their times, propagate to a time, and record what became of each."""
+        self._measurements, count = measurements, len(measurements)
+        readings = self._arrays.fill(measurements)
+        step = filter_step.unchecked if self._compiled else filter_step.function
+        step(self._filter, readings, samples, count, until)
+        nis, size, rejected = readings.nis.tolist(), readings.size.tolist(), readings.rejected.tolist()
+        chosen = self._filter.choose is choose_noise
+        if chosen:
+            sigma, reported = readings.sigma.tolist(), readings.reported.tolist()
+        for k, m in enumerate(measurements):
+            if rejected[k]:
                 flagged.append((m.instrument, m.time))
                 continue
-            noted(m.instrument, row)
-            size = row[SIZE]
-            if size != size:
-                size = hypot(*row[INNOVATION:SIGMA])
-            self._note(m, row[NIS], size, diagnostics)
+            if chosen:
+                self._report_choice(m, sigma[k], reported[k])
+            self._note(m, nis[k], size[k], diagnostics)
+
+    def _report_choice(self, m: Measurement, sigma: Sequence[float], number: float) -> None:
+        """Tell the adaptation what a kernel chose for a measurement."""
+        assert isinstance(self.adaptation, NoiseAdaptation)
+        self.adaptation.noted(m.instrument, sigma, number)
+
+    def propagate(self, dynamics: Dynamics, samples: Samples, until: float) -> None:
+        """Advance the state and its covariance to a time, and record the motion for a smoother."""
+        begin = self.model.time
+        if until <= begin:
+            return
+        if self.smoother is not None:
+            self.smoother.depart(self.model, self.covariance)
+        self.model.propagate(self.covariance, until)
+        if self.smoother is not None:
+            self.smoother.arrive(self.model, self.covariance, until - begin)
+
+    def predict(self, dynamics: Dynamics, readings: Readings, k: int, prediction: Prediction) -> bool:
+        """Linearise a measurement at the present state, and project the covariance."""
+        linearised = self._linearised = self.model.measure(self._measurements[k])
+        if linearised is None:
+            return False
+        prediction.innovation[:], prediction.nominal[:] = linearised.innovation, linearised.noise
+        jacobian = np.ascontiguousarray(linearised.jacobian, dtype=np.float64)
+        project(self.covariance, jacobian, prediction.cross, prediction.predicted)
         return True
 
-    def _reporter(self) -> Callable[[str, Sequence[float]], None]:
-        """What is told by `_take_step` what a kernel chose for an instrument, see `Adaptation.noted`."""
-        assert self.adaptation is not None
-        return self.adaptation.noted
+    def choose(self, choice: Choice, covariance: Array, readings: Readings, k: int, prediction: Prediction) -> None:
+        """Ask an adaptation that chooses in Python."""
+        own, m = self.adaptation, self._measurements[k]
+        assert own is not None
+        innovation, cross, predicted, nominal, noise = prediction
+        chosen = own.adapt(Innovation(m, innovation, predicted, nominal, covariance, cross))
+        if chosen is None:
+            readings.rejected[k] = True
+        else:
+            noise[...] = chosen
+            readings.inflation[k] = own.inflation
 
-    def _take_together(self, group: Sequence[Measurement], diagnostics: dict[str, float | Array]) -> bool:
-        """Use the measurements of a group; False if they have to be taken one by one."""
-        used = self.model.assimilate_together(group, self.covariance, self._correction)
+    def inflate(self, dynamics: Dynamics, readings: Readings, k: int, prediction: Prediction) -> None:
+        """Inflate the covariance of the motion, or that of the position, and predict again."""
+        assert self.adaptation is not None
+        if self.adaptation.inflates_position:
+            weaken_position(dynamics.covariance, readings.inflation[k])
+        else:
+            self.model.loosen(dynamics.covariance, readings.inflation[k], dynamics.first_variances)
+        self._filter.predict(dynamics, readings, k, prediction)
+
+    def correct(self, dynamics: Dynamics, choice: Choice, readings: Readings, k: int, prediction: Prediction) -> float:
+        """Correct the covariance, and compute the correction of the state."""
+        innovation, cross, predicted, _, noise = prediction
+        covariance, correction, iteration = self.covariance, dynamics.correction, self.iteration
+        if iteration is not None and iteration.applies(self.model, covariance):
+            observation = innovation, cross, predicted, noise
+            nis, count = absorb_iterated(
+                self.model, self._measurements[k], observation, covariance, correction, iteration
+            )
+            self._iterations, self._iterated = max(self._iterations, count), True
+        else:
+            self._iterated = False
+            nis = joseph_update(covariance, cross, predicted + noise, innovation, correction)
+        if nis >= 0.0 and self.smoother is not None:
+            self.smoother.use(correction, self._linearised, noise)
+        return nis
+
+    def retract(self, dynamics: Dynamics) -> None:
+        """Add the correction to the state; an iterated one is added already."""
+        if not self._iterated:
+            self.model.correct(dynamics.correction)
+
+    def _groups(self, measurements: Sequence[Measurement]) -> Iterable[Sequence[Measurement]]:
+        """The measurements in one group, or those of the channels of one instrument at one time in one if quicker."""
+        plain = self._filter.choose is use_nominal and self._filter.correct is correct
+        return together(measurements, self._owners) if plain and self.model.many else [measurements]
+
+    def _use_together(self, group: Sequence[Measurement], until: float, diagnostics: dict[str, float | Array]) -> bool:
+        """Use the measurements of a group; False if they have to be used one by one."""
+        self._filter.propagate(self.dynamics, self.model.samples, until)
+        used = self.model.assimilate_together(group, self.covariance, self.dynamics.correction)
         if used is None:
             return False
         for m, nis, size in zip(group, used[0].tolist(), used[1].tolist(), strict=True):
             self._note(m, nis, size, diagnostics)
         return True
 
-    def _note(
-        self, m: Measurement, nis: float, size: float, diagnostics: dict[str, float | Array], noise: Array | None = None
-    ) -> None:
+    def _note(self, m: Measurement, nis: float, size: float, diagnostics: dict[str, float | Array]) -> None:
         """Record the diagnostics of a measurement, or that it was skipped (``nis`` below 0)."""
         if nis < 0.0:
             self._admission.skipped += 1
@@ -314,5 +320,3 @@ class KalmanEstimator(Solver):
         self._innovation_test.add(nis, len(m.value))
         innovation, normalised = self._keys[m.instrument]
         diagnostics[innovation], diagnostics[normalised] = size, nis
-        if self.smoother is not None:
-            self.smoother.use(self._correction, self._linearised, noise)

@@ -38,12 +38,12 @@ from typing import ClassVar
 import numpy as np
 
 from simnav.estimators.adaptations.base import Adaptation
-from simnav.estimators.algebra.joseph import joseph_update
-from simnav.estimators.models.base import Observation
+from simnav.estimators.models.filtering import Dynamics, Prediction, Readings
+from simnav.estimators.models.propagation import Samples
 from simnav.estimators.models.suitable import ModelChoice
-from simnav.types import Estimate, InitialState, Instruments, Measurement, Measurements
+from simnav.types import Estimate, InitialState, Instruments, Measurements
 
-from .kalman import KalmanEstimator
+from .kalman import FilterFunctions, KalmanEstimator
 
 __all__ = ["LinearKalmanEstimator"]
 
@@ -72,7 +72,6 @@ class LinearKalmanEstimator(KalmanEstimator):
         "iteration": "it linearises about the nominal trajectory, which no measurement moves",
         "smoother": "its corrections stay outside of the state that a smoother goes back over",
     }
-    assimilates = False
 
     def __init__(self, model: ModelChoice, adaptation: Adaptation | None = None, feedback: float = 0.0):
         if not feedback >= 0.0:
@@ -96,25 +95,28 @@ class LinearKalmanEstimator(KalmanEstimator):
             self._fed_back = self.model.time
         return estimate
 
-    def _propagate(self, until: float) -> None:
+    def functions(self) -> FilterFunctions:
+        """Motion, prediction and correction keep the estimated error apart from the nominal state."""
+        return super().functions()._replace(propagate=self.propagate, predict=self.predict, retract=self.retract)
+
+    def propagate(self, dynamics: Dynamics, samples: Samples, until: float) -> None:
+        """Advance the nominal state, the covariance and the estimated error."""
         elapsed = until - self.model.time
         if elapsed > 0.0:
             self.model.propagate(self.covariance, until)
             self.model.carry(self.x, elapsed)
 
-    def _observe(self, m: Measurement) -> Observation | None:
-        linearised = self.model.measure(m)
-        if linearised is None:
-            return None
-        innovation = linearised.innovation - linearised.jacobian @ self.x
-        return linearised._replace(innovation=innovation).project(self.covariance)
+    def predict(self, dynamics: Dynamics, readings: Readings, k: int, prediction: Prediction) -> bool:
+        """Compare a measurement with the nominal state less its estimated error."""
+        if not super().predict(dynamics, readings, k, prediction):
+            return False
+        assert self._linearised is not None
+        prediction.innovation[:] -= self._linearised.jacobian @ self.x
+        return True
 
-    def _absorb(self, observation: Observation) -> float:
-        residual, cross, predicted, noise = observation
-        nis: float = joseph_update(self.covariance, cross, predicted + noise, residual, self._correction)
-        if nis >= 0.0:
-            self.x += self._correction
-        return nis
+    def retract(self, dynamics: Dynamics) -> None:
+        """Add the correction to the estimated error."""
+        self.x += dynamics.correction
 
     def _estimate(self) -> Estimate:
         nominal = self.model.snapshot()

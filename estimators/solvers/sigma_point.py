@@ -39,12 +39,13 @@ import numpy as np
 from simnav.compiled import kernel
 from simnav.estimators.adaptations.base import Adaptation
 from simnav.estimators.algebra.cholesky import factorise
-from simnav.estimators.models.base import Observation
+from simnav.estimators.models.filtering import Dynamics, Prediction, Readings
 from simnav.estimators.models.points import PointModel
+from simnav.estimators.models.propagation import Samples
 from simnav.kernel_types import Matrix
-from simnav.types import Array, InitialState, Instruments, Measurement
+from simnav.types import Array, InitialState, Instruments
 
-from .kalman import KalmanEstimator
+from .kalman import FilterFunctions, KalmanEstimator
 
 __all__ = ["SigmaPointEstimator", "draw_points"]
 
@@ -95,7 +96,6 @@ class SigmaPointEstimator(KalmanEstimator):
         "iteration": "it linearises no measurement",
         "smoother": "it has no transition matrix, only the points that went through the motion",
     }
-    assimilates = False
     model: PointModel
 
     @classmethod
@@ -137,7 +137,11 @@ class SigmaPointEstimator(KalmanEstimator):
         covariance += self._excess * (mean[:, None] * mean)
         return mean, covariance
 
-    def _propagate(self, until: float) -> None:
+    def functions(self) -> FilterFunctions:
+        """Motion and predictions come from points."""
+        return super().functions()._replace(propagate=self.propagate, predict=self.predict)
+
+    def propagate(self, dynamics: Dynamics, samples: Samples, until: float) -> None:
         """Advance the state and the covariance through the points."""
         if until <= self.model.time:
             return
@@ -148,13 +152,16 @@ class SigmaPointEstimator(KalmanEstimator):
         self.covariance += noise
         self.model.correct(mean)
 
-    def _observe(self, m: Measurement) -> Observation | None:
+    def predict(self, dynamics: Dynamics, readings: Readings, k: int, prediction: Prediction) -> bool:
         """Innovation, its covariance and its cross-covariance with the state, from points drawn afresh."""
+        m = self._measurements[k]
         linearised = self.model.measure(m)
         if linearised is None:
-            return None
+            return False
         points = self._points
         draw_points(self.covariance, self._spread, points)
         values = self.model.observe_points(m, points)
-        mean, predicted = self._moments(values)
-        return linearised.innovation - mean, self._weight * (points.T @ values), predicted, linearised.noise
+        mean, prediction.predicted[:] = self._moments(values)
+        prediction.innovation[:], prediction.nominal[:] = linearised.innovation - mean, linearised.noise
+        prediction.cross[:] = self._weight * (points.T @ values)
+        return True

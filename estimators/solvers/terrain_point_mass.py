@@ -37,16 +37,19 @@ import numpy as np
 
 from simnav.estimator import UnsuitableScenario, lacking
 from simnav.estimator.needs import Needs
+from simnav.estimators.adaptations.choice import Choice
 from simnav.estimators.algebra.point_mass import PointMass
-from simnav.estimators.models.base import Linearised, Observation
+from simnav.estimators.models.base import Linearised
 from simnav.estimators.models.channels import whole
+from simnav.estimators.models.filtering import Dynamics, Prediction, Readings
 from simnav.estimators.models.inertial import InertialModel
 from simnav.estimators.models.own_observation import OwnObservation
+from simnav.estimators.models.propagation import Samples
 from simnav.geometry.earth import displace
 from simnav.kinds import KINDS, NavigationPoints
 from simnav.types import Array, InitialState, Instruments, Measurement
 
-from .kalman import KalmanEstimator
+from .kalman import FilterFunctions, KalmanEstimator
 
 __all__ = ["TerrainPointMass"]
 
@@ -74,7 +77,6 @@ class TerrainPointMass(KalmanEstimator):
     """
 
     pieces: ClassVar[tuple[str, ...]] = ("model",)
-    assimilates: ClassVar[bool] = False
     slow = True
 
     def __init__(self, model: InertialModel, nodes: int = 20000, outliers: float = 1e-3):
@@ -95,23 +97,17 @@ class TerrainPointMass(KalmanEstimator):
         if lack := lacking((_SOUNDERS,), instruments):
             raise UnsuitableScenario(f"{self.label}: {lack}")
         super().reset(start, instruments)
-        self._stepwise = True  # `_observe` leaves the Jacobian of each measurement
         self._density: PointMass | None = None
         self._sheets = {name: whole(own.sheet) for name, own in self.model.own.items()}
         self._sheets = {name: sheet for name, sheet in self._sheets.items() if "bottom" in sheet.details}
 
-    def _take(self, m: Measurement, diagnostics: dict[str, float | Array], flagged: list[tuple[str, float]]) -> None:
-        """Use one measurement; a sounding by the lattice."""
-        if m.instrument not in self._sheets:
-            super()._take(m, diagnostics, flagged)
-            return
-        linearised = self.model.measure(m)
-        if linearised is None:
-            self._admission.skipped += 1
-            return
-        self._catch_up()
-        self._sound(m, linearised, diagnostics)
-        self._begin_clone()
+    def functions(self) -> FilterFunctions:
+        """Soundings are used by the lattice, and the clone of the position goes with every correction."""
+        return (
+            super()
+            .functions()
+            ._replace(propagate=self.propagate, predict=self.predict, correct=self.correct, retract=self.retract)
+        )
 
     # --- the clone of the horizontal position, from one sounding to the next
 
@@ -122,26 +118,38 @@ class TerrainPointMass(KalmanEstimator):
         self._first = P[_AT, _AT].copy()
         self._clone, self._mean = self._first.copy(), np.zeros(2)
 
-    def _propagate(self, until: float) -> None:
+    def propagate(self, dynamics: Dynamics, samples: Samples, until: float) -> None:
+        """Advance the state, and the covariance with the clone."""
         begin = self.model.time
-        super()._propagate(until)
+        super().propagate(dynamics, samples, until)
         if self._density is not None and until > begin:
             self.model.carry(self._cross, until - begin)
 
-    def _absorb(self, observation: Observation) -> float:
-        residual, cross, predicted, noise = observation
-        if self._density is None:
-            return super()._absorb(observation)
-        assert self._linearised is not None
-        jacobian, projected = self._linearised.jacobian, cross.copy()
-        innovation = predicted + noise
-        nis = super()._absorb(observation)
-        if nis >= 0.0:
-            gain = np.linalg.solve(innovation, jacobian @ self._cross).T
+    def correct(self, dynamics: Dynamics, choice: Choice, readings: Readings, k: int, prediction: Prediction) -> float:
+        """Correct by a measurement and take the clone along; a sounding moves the lattice."""
+        m, linearised = self._measurements[k], self._linearised
+        assert linearised is not None
+        if m.instrument in self._sheets:
+            self._sounded = True
+            self._catch_up()
+            nis, readings.size[k] = self._sound(m, linearised)
+            self._begin_clone()
+            return nis
+        self._sounded = False
+        residual, cross, predicted, _, noise = prediction
+        projected, innovation = cross.copy(), predicted + noise
+        nis = super().correct(dynamics, choice, readings, k, prediction)
+        if nis >= 0.0 and self._density is not None:
+            gain = np.linalg.solve(innovation, linearised.jacobian @ self._cross).T
             self._mean += gain @ residual
             self._clone -= gain @ innovation @ gain.T
             self._cross -= projected @ gain.T
         return nis
+
+    def retract(self, dynamics: Dynamics) -> None:
+        """Add the correction to the state; that of a sounding is added already."""
+        if not self._sounded:
+            self.model.correct(dynamics.correction)
 
     def _catch_up(self) -> None:
         """Bring the density of the position to the present time."""
@@ -186,8 +194,8 @@ class TerrainPointMass(KalmanEstimator):
         reading, jacobian = observations(points, sheet)
         return reading[:, 0], jacobian["navigation"][:, 0, _AT]
 
-    def _sound(self, m: Measurement, linearised: Linearised, diagnostics: dict[str, float | Array]) -> None:
-        """Correct the density, the state and its covariance with a sounding."""
+    def _sound(self, m: Measurement, linearised: Linearised) -> tuple[float, float]:
+        """Correct the density, the state and its covariance; normalised square and size of the innovation."""
         density, P = self._density, self.covariance
         assert density is not None
         regression = np.linalg.solve(P[_AT, _AT], P[_AT]).T  # B
@@ -217,7 +225,6 @@ class TerrainPointMass(KalmanEstimator):
         chance = (1.0 - self.outliers) * float(weight @ fits) / max(float(weight @ likelihood), 1e-300)
         if likelihood.min() > 0.0 or likelihood.max() > 0.0:
             density.take(index, np.log(np.maximum(likelihood, 1e-300)))
-        self._note(m, mean**2 / total, abs(mean), diagnostics)
         kept = density.moments()
         moved = weight * likelihood
         moved /= moved.sum()
@@ -233,6 +240,6 @@ class TerrainPointMass(KalmanEstimator):
         P[:] = given + regression @ kept[1] @ regression.T + cross + cross.T
         P += (own - innovation) * np.outer(gain, gain)
         P[:] = 0.5 * (P + P.T)
-        self._correction[:] = correction
         self.model.correct(correction)
         density.shift(-kept[0])
+        return mean**2 / total, abs(mean)

@@ -18,19 +18,20 @@ least-squares*, 1977.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from math import hypot
 from typing import ClassVar
 
 import numpy as np
 
+from simnav.estimators.adaptations.choice import Choice
 from simnav.estimators.algebra.joseph import joseph_update
 from simnav.estimators.algebra.whitening import whitening
 from simnav.estimators.models.coupling import by_source
+from simnav.estimators.models.filtering import Dynamics, Prediction, Readings
 from simnav.estimators.models.suitable import ModelChoice
 from simnav.estimators.weightings.base import Factors, Weighting
 from simnav.types import Array, Estimate, InitialState, Instruments, Measurement, Measurements
 
-from .kalman import KalmanEstimator
+from .kalman import FilterFunctions, KalmanEstimator
 
 __all__ = ["WeightedKalmanEstimator"]
 
@@ -60,7 +61,6 @@ class WeightedKalmanEstimator(KalmanEstimator):
         "isolation": KalmanEstimator.refuses["isolation"],
         "smoother": "the weight of a prediction is not in the transition that a smoother goes back over",
     }
-    assimilates = False
 
     def __init__(self, model: ModelChoice, weighting: Weighting, *, limit: int = 15, threshold: float = 0.05):
         super().__init__(model)
@@ -80,26 +80,34 @@ class WeightedKalmanEstimator(KalmanEstimator):
 
     def update(self, measurements: Measurements) -> Estimate:
         """Take one step's measurements, each at its own time."""
+        self._weights: dict[str, float] = {}
+        self._doubted: list[tuple[str, float]] = []
         estimate = super().update(measurements)
-        estimate.diagnostics = {**estimate.diagnostics, **self.weighting.diagnostics()}
+        estimate.diagnostics = {**estimate.diagnostics, **self._weights, **self.weighting.diagnostics()}
+        estimate.flagged = self._doubted
         return estimate
 
-    def _take(self, m: Measurement, diagnostics: dict[str, float | Array], flagged: list[tuple[str, float]]) -> None:
-        linearised = self.model.measure(m)
-        if linearised is None:
-            self._admission.skipped += 1
-            return
-        size = hypot(*linearised.innovation.tolist())
-        factors = self._factors(m, linearised.noise)
-        nis = self._iterate(m, factors, linearised.innovation, linearised.jacobian, linearised.noise)
-        weight = diagnostics[f"weight.{m.instrument}"] = float(factors.weight[0])
+    def functions(self) -> FilterFunctions:
+        """Every measurement is linearised, and weighted, again and again."""
+        return super().functions()._replace(predict=self.predict, correct=self.correct, retract=self.retract)
+
+    def correct(self, dynamics: Dynamics, choice: Choice, readings: Readings, k: int, prediction: Prediction) -> float:
+        """Correct state and covariance until correction and weights have converged; flag a small weight."""
+        m, found = self._measurements[k], self._linearised
+        assert found is not None
+        factors = self._factors(m, found.noise)
+        nis = self._iterate(m, factors, found.innovation, found.jacobian, found.noise)
+        weight = self._weights[f"weight.{m.instrument}"] = float(factors.weight[0])
         if weight <= FAULTY_WEIGHT:
-            flagged.append((m.instrument, m.time))
-        self._note(m, nis, size, diagnostics)
+            self._doubted.append((m.instrument, m.time))
+        return nis
+
+    def retract(self, dynamics: Dynamics) -> None:
+        """The state is corrected already."""
 
     def _iterate(self, m: Measurement, factors: Factors, innovation: Array, H: Array, noise: Array) -> float:
         """Correct the state; the normalised innovation squared at full weight, -1 where nothing was changed."""
-        model, P, dx = self.model, self.covariance, self._correction
+        model, P, dx = self.model, self.covariance, self.dynamics.correction
         before, first = model.snapshot(), -1.0
         sigma, whitener = np.sqrt(np.diag(P)) + 1e-300, np.empty_like(P)
         whitening(P, whitener)
@@ -141,7 +149,7 @@ class WeightedKalmanEstimator(KalmanEstimator):
         root = np.linalg.cholesky(factors.noise[0])
         factors.whitened[0] = np.linalg.solve(root, factors.residual[0])
         factors.norm[0] = np.linalg.norm(factors.whitened[0])
-        factors.motion_residual[0] = self._correction
-        factors.motion_norm[0] = np.linalg.norm(whitener @ self._correction)
+        factors.motion_residual[0] = self.dynamics.correction
+        factors.motion_norm[0] = np.linalg.norm(whitener @ self.dynamics.correction)
         factors.iteration = iteration
         return self.weighting.weigh(factors)

@@ -1,0 +1,51 @@
+"""Rules: the functions by which adaptations choose the noise of a reading.
+
+A rule is called ``rule(settings, memory, shared, innovation, predicted, nominal, noise)``. It receives its settings and
+its memory for an instrument, what all instruments share, the innovation (m,), H P H' (m, m) and the nominal R (m, m).
+It updates its memory, overwrites the last array with the noise to be used, and returns a number to be reported, or 0.
+What is shared are the time of the reading [s], the factor on P and the rejection, which the rule may set (before they
+are 1 and 0), and a number of its own, at first NaN.
+
+A new rule is one such function, a kernel with ``passed=True`` or plain Python, in a class that says its settings and
+its memory (`simnav.estimators.adaptations.noise.NoiseAdaptation`).
+"""
+
+from __future__ import annotations
+
+from math import sqrt
+
+from simnav.compiled import kernel
+from simnav.kernel_types import Matrix
+
+__all__ = ["INFLATION", "OWN", "REJECT", "TIME", "bound", "copied", "scale"]
+
+#: Places in what is shared.
+TIME, INFLATION, REJECT, OWN = range(4)
+
+
+@kernel
+def scale(noise: Matrix, f0: float, f1: float, f2: float, product: Matrix) -> None:
+    r0, r1, r2 = sqrt(f0), sqrt(f1), sqrt(f2)
+    for i in range(noise.shape[0]):
+        a = r0 if i == 0 else r1 if i == 1 else r2
+        for j in range(noise.shape[0]):
+            product[i, j] = noise[i, j] * a * (r0 if j == 0 else r1 if j == 1 else r2)
+
+
+@kernel
+def bound(estimate: Matrix, nominal: Matrix, low: float, high: float, bounded: Matrix) -> None:
+    for i in range(nominal.shape[0]):
+        bounded[i, i] = sqrt(min(max(estimate[i, i] / nominal[i, i], low), high))
+    for i in range(nominal.shape[0]):
+        for j in range(i):
+            bounded[i, j] = bounded[j, i] = nominal[i, j] * bounded[i, i] * bounded[j, j]
+    for i in range(nominal.shape[0]):
+        bounded[i, i] *= nominal[i, i] * bounded[i, i]
+
+
+@kernel
+def copied(noise: Matrix, used: Matrix) -> None:
+    """Copy an (m, m) array into another; a slice would take seconds to compile."""
+    for i in range(noise.shape[0]):
+        for j in range(noise.shape[0]):
+            used[i, j] = noise[i, j]

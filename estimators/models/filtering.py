@@ -1,0 +1,190 @@
+"""What the functions of a filter work on: the arrays of a model, the readings of a step, and one prediction.
+
+A model that has its equations as kernels keeps its state in one flat vector, with all else that its functions need, in
+`Dynamics`. `ModelFunctions` are these functions. `simnav.estimators.solvers.filter_step` calls them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from simnav.kernel_types import FlagVector, IntegerMatrix, IntegerVector, Matrix, Vector
+from simnav.records import Record
+from simnav.types import Measurement
+
+__all__ = ["AidTable", "Dynamics", "ModelFunctions", "Prediction", "Readings", "ReadingsOfSteps", "room_for"]
+
+
+class AidTable(NamedTuple):
+    """The instruments of a filter, one in each row.
+
+    Attributes
+    ----------
+    codes : (i, 4) array of int
+        Measurement equation, number of components, and places of bias and scale factor in the error; -1 for none.
+    lever_arms : (i, 3) array
+        In body axes [m].
+    noises : (i, 9) array
+        Covariance of the white noise, its d d elements one after the other.
+    """
+
+    codes: IntegerMatrix
+    lever_arms: Matrix
+    noises: Matrix
+
+
+class Dynamics(Record):
+    """The state of a model with n error components, its covariance, and what its functions need to know.
+
+    Attributes
+    ----------
+    numbers : (s,) array
+        The flat state. Its model knows the named blocks.
+    covariance : (n, n) array
+        Covariance of the error.
+    transition, process_noise : (m, m) arrays
+        Of the last propagation.
+    constants : (c,) array
+        Figures of the motion; its model knows their meaning.
+    decay, density : (n - m,) arrays
+        Inverse correlation times [1/s] and noise densities of the states behind the motion.
+    first_variances, correction : (n,) arrays
+        Variances at the start of the run; the last correction of the state.
+    next_sample : (1,) array of int
+        Index of the first IMU sample of the step that is not completely used.
+    aids : AidTable
+        The instruments.
+    """
+
+    numbers: Vector
+    covariance: Matrix
+    transition: Matrix
+    process_noise: Matrix
+    constants: Vector
+    decay: Vector
+    density: Vector
+    first_variances: Vector
+    correction: Vector
+    next_sample: IntegerVector
+    aids: AidTable
+
+
+class Readings(Record):
+    """The readings of a step in the order of their times, and what became of each.
+
+    Attributes
+    ----------
+    instrument, components : (k,) array of int
+        Row of its instrument, and number d of its components.
+    time : (k,) array
+        Time of validity [s].
+    value : (k, 3) array
+        What was measured.
+    innovation : (k, 3) array
+        Measured minus predicted.
+    nis : (k,) array
+        Normalised innovation squared; -1 where the reading was not used.
+    size : (k,) array
+        Norm of the innovation.
+    sigma : (k, 3) array
+        Roots of the variances that an adaptation chose; NaN where none was chosen.
+    reported : (k,) array
+        A further number that an adaptation reports, or 0.
+    inflation : (k,) array
+        Factor by which the covariance of the prediction is inflated before the reading is used.
+    rejected, wrong : (k,) array of bool
+        Whether the reading is rejected; whether the prediction is taken as wrong.
+    """
+
+    instrument: IntegerVector
+    components: IntegerVector
+    time: Vector
+    value: Matrix
+    innovation: Matrix
+    nis: Vector
+    size: Vector
+    sigma: Matrix
+    reported: Vector
+    inflation: Vector
+    rejected: FlagVector
+    wrong: FlagVector
+
+
+class Prediction(NamedTuple):
+    """What one reading of d components is compared with.
+
+    Attributes
+    ----------
+    innovation : (d,) array
+        Measured minus predicted, in the units of ``KINDS[kind].errors``.
+    cross, predicted : (n, d), (d, d) array
+        P H' and H P H', with the covariance P of the model's error and the Jacobian H of the reading.
+    nominal, noise : (d, d) array
+        Covariance R of the noise by the datasheet, and that which is used.
+    """
+
+    innovation: Vector
+    cross: Matrix
+    predicted: Matrix
+    nominal: Matrix
+    noise: Matrix
+
+
+class ModelFunctions(NamedTuple):
+    """The equations of a model as kernels.
+
+    Attributes
+    ----------
+    propagate : Kernel
+        Advances a state and its covariance to a time: ``propagate(dynamics, samples, until)``.
+    predict : Kernel
+        Predicts a reading: ``predict(dynamics, readings, k, prediction)``; False where there is no such reading.
+    retract : Kernel
+        Adds the correction to the state: ``retract(dynamics)``.
+    inflate_motion : Kernel
+        Inflates the covariance of the motion, and predicts again: ``inflate_motion(dynamics, readings, k, prediction)``.
+    """
+
+    propagate: Callable[..., None]
+    predict: Callable[..., bool]
+    retract: Callable[..., None]
+    inflate_motion: Callable[..., None]
+
+
+def room_for(count: int) -> Readings:
+    """Room for so many readings."""
+    whole: Any = np.int64
+    return Readings(
+        instrument=np.zeros(count, whole), components=np.zeros(count, whole), time=np.zeros(count),
+        value=np.zeros((count, 3)), innovation=np.zeros((count, 3)), nis=np.zeros(count), size=np.zeros(count),
+        sigma=np.zeros((count, 3)), reported=np.zeros(count), inflation=np.ones(count),
+        rejected=np.zeros(count, np.bool_), wrong=np.zeros(count, np.bool_),
+    )  # fmt: skip
+
+
+class ReadingsOfSteps:
+    """The readings of a step as arrays, which are used again at the next step.
+
+    Parameters
+    ----------
+    names : sequence of str
+        The instruments, in the order of their rows.
+    """
+
+    def __init__(self, names: Sequence[str]):
+        self._row = {name: i for i, name in enumerate(names)}
+        self._readings = room_for(8)
+
+    def fill(self, measurements: Sequence[Measurement]) -> Readings:
+        """The measurements as arrays; those of the call before are overwritten."""
+        into = self._readings
+        if len(measurements) > len(into.time):
+            into = self._readings = room_for(2 * len(measurements))
+        for k, m in enumerate(measurements):
+            d = len(m.value)
+            into.instrument[k], into.components[k], into.time[k] = self._row[m.instrument], d, m.time
+            into.value[k, :d] = m.value
+        return into

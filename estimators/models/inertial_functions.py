@@ -1,0 +1,95 @@
+"""The equations of the inertial model as the functions of a filter, over its flat state."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from simnav.compiled import helper, kernel
+from simnav.estimators.algebra.inflation import inflate_motion
+from simnav.estimators.algebra.joseph import joseph_update, project
+from simnav.types import Array
+
+from .filtering import Dynamics, ModelFunctions, Prediction, Readings
+from .measurements import Aid, State, observe_inertial
+from .propagation import MOTION_NUMBERS, Samples, correct_inertial, motion_of, propagate_inertial
+
+__all__ = ["INERTIAL_FUNCTIONS", "use_reading"]
+
+#: Places of position and velocity, and of the attitude, in the error.
+_MOVING = (0, 6, 6, 9)
+
+
+@kernel(passed=True)
+def propagate(dynamics: Dynamics, samples: Samples, until: float) -> None:
+    """Advance the state and its covariance to a time, through the IMU samples."""
+    state = motion_of(dynamics.numbers)
+    elapsed = until - state.clock[0]
+    if elapsed > 0.0:
+        dynamics.next_sample[0] = propagate_inertial(
+            state, samples, dynamics.next_sample[0], until, dynamics.constants,
+            (dynamics.transition, dynamics.process_noise, dynamics.covariance),
+            (dynamics.numbers[MOTION_NUMBERS:], dynamics.decay, dynamics.density), elapsed,
+        )  # fmt: skip
+
+
+@helper
+def predict_reading(
+    aid: Aid, value: Array, state: State, covariance: Array, innovation: Array, cross: Array, predicted: Array
+) -> bool:
+    """Compute innovation, P H' and H P H' of a reading; False if there is no such reading at this state."""
+    jacobian = np.empty((innovation.size, covariance.shape[0]))
+    if not observe_inertial(aid, value, state, innovation, jacobian):
+        return False
+    project(covariance, jacobian, cross, predicted)
+    return True
+
+
+@helper
+def use_reading(aid: Aid, value: Array, state: State, covariance: Array, noise: Array, correction: Array) -> None:
+    """Correct a state and its covariance by a reading, where there is such a reading, for a loop over many filters."""
+    n, d = covariance.shape[0], noise.shape[0]
+    innovation, cross, spread = np.empty(d), np.empty((n, d)), np.empty((d, d))
+    if not predict_reading(aid, value, state, covariance, innovation, cross, spread):
+        return
+    for a in range(d):
+        for b in range(d):
+            spread[a, b] += noise[a, b]
+    if joseph_update(covariance, cross, spread, innovation, correction) >= 0.0:
+        correct_inertial(state.position, state.velocity, state.dcm, state.bias, state.calibration, correction)
+
+
+@kernel(passed=True)
+def predict(dynamics: Dynamics, readings: Readings, k: int, prediction: Prediction) -> bool:
+    """Compute what a reading should be, and the covariance of that (`observe_inertial`)."""
+    row, aids, numbers = readings.instrument[k], dynamics.aids, dynamics.numbers
+    code, d, bias_at, scale_at = aids.codes[row]
+    motion = motion_of(numbers)
+    state = State(
+        motion.position, motion.velocity, motion.dcm, motion.clock[12:15], motion.bias, numbers[MOTION_NUMBERS:]
+    )
+    for a in range(d):
+        for b in range(d):
+            prediction.nominal[a, b] = aids.noises[row, a * d + b]
+    return predict_reading(
+        Aid(code, aids.lever_arms[row], bias_at, scale_at), readings.value[k, :d], state, dynamics.covariance,
+        prediction.innovation, prediction.cross, prediction.predicted,
+    )  # fmt: skip
+
+
+@kernel(passed=True)
+def retract(dynamics: Dynamics) -> None:
+    """Add the correction to the state."""
+    state = motion_of(dynamics.numbers)
+    correct_inertial(
+        state.position, state.velocity, state.dcm, state.bias, dynamics.numbers[MOTION_NUMBERS:], dynamics.correction
+    )
+
+
+@kernel(passed=True)
+def inflate_and_predict(dynamics: Dynamics, readings: Readings, k: int, prediction: Prediction) -> None:
+    """Inflate the covariance of position, velocity and attitude, and predict the reading again."""
+    inflate_motion(dynamics.covariance, readings.inflation[k], dynamics.first_variances, _MOVING)
+    predict(dynamics, readings, k, prediction)
+
+
+INERTIAL_FUNCTIONS = ModelFunctions(propagate, predict, retract, inflate_and_predict)
