@@ -85,10 +85,10 @@ def is_poor(predicted: Matrix, nominal: Matrix, last: Vector) -> bool:
 @kernel
 def has_noise(nominal: Matrix) -> bool:
     """Whether all components have noise."""
+    noisy = True
     for a in range(nominal.shape[0]):
-        if not nominal[a, a] > 0.0:
-            return False
-    return True
+        noisy = noisy and nominal[a, a] > 0.0
+    return noisy
 
 
 @kernel

@@ -145,7 +145,7 @@ class ReferenceFilter(KalmanEstimator):
 
     def functions(self) -> FilterFunctions:
         """Every motion and every correction is noted."""
-        return super().functions()._replace(propagate=self.propagate, predict=self.predict, retract=self.retract)
+        return super().functions().replaced(propagate=self.propagate, predict=self.predict, retract=self.retract)
 
     def propagate(self, dynamics: Dynamics, samples: Samples, until: float) -> None:
         """Advance the filter, and note its transition matrix and process noise."""

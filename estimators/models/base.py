@@ -120,6 +120,10 @@ class ErrorModel(ABC):
     def observes(self, instrument: Datasheet) -> bool:
         """Whether the model can use the measurements of an instrument."""
 
+    def components(self, instrument: Datasheet) -> int:
+        """Number of components of an observed instrument that the model predicts."""
+        return len(instrument.sigma)
+
     def holds(self, instrument: Datasheet) -> bool:
         """Whether the model has a state for each block that an instrument brings along."""
         return True

@@ -81,6 +81,10 @@ class FaultStateModel(ErrorModel):
         """As the model within."""
         return self.inner.observes(instrument)
 
+    def components(self, instrument: Datasheet) -> int:
+        """As the model within."""
+        return self.inner.components(instrument)
+
     def load(self, imu: ImuSamples | None) -> None:
         """Take the IMU samples of the step that follows."""
         self.inner.load(imu)

@@ -6,7 +6,7 @@ A model that has its equations as kernels keeps its state in one flat vector, wi
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -145,7 +145,7 @@ class ModelFunctions(NamedTuple):
     retract : Kernel
         Adds the correction to the state: ``retract(dynamics)``.
     inflate_motion : Kernel
-        Inflates the covariance of the motion, and predicts again: ``inflate_motion(dynamics, readings, k, prediction)``.
+        Inflates the covariance of the motion and predicts again: ``inflate_motion(dynamics, readings, k, prediction)``.
     """
 
     propagate: Callable[..., None]
@@ -170,12 +170,12 @@ class ReadingsOfSteps:
 
     Parameters
     ----------
-    names : sequence of str
-        The instruments, in the order of their rows.
+    components : dict of str to int
+        The instruments in the order of their rows, with the number of components that a model predicts.
     """
 
-    def __init__(self, names: Sequence[str]):
-        self._row = {name: i for i, name in enumerate(names)}
+    def __init__(self, components: Mapping[str, int]):
+        self._row = {name: (i, d) for i, (name, d) in enumerate(components.items())}
         self._readings = room_for(8)
 
     def fill(self, measurements: Sequence[Measurement]) -> Readings:
@@ -184,7 +184,6 @@ class ReadingsOfSteps:
         if len(measurements) > len(into.time):
             into = self._readings = room_for(2 * len(measurements))
         for k, m in enumerate(measurements):
-            d = len(m.value)
-            into.instrument[k], into.components[k], into.time[k] = self._row[m.instrument], d, m.time
-            into.value[k, :d] = m.value
+            (into.instrument[k], into.components[k]), into.time[k] = self._row[m.instrument], m.time
+            into.value[k, : len(m.value)] = m.value
         return into

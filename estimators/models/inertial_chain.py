@@ -352,7 +352,7 @@ class InertialChain(Chain):
             np.array([at for *_, at in known], dtype=np.int64),
         )
         self._dynamics = None if front.functions() is None else front.dynamics(covariance, self.names)
-        self._readings = ReadingsOfSteps(self.names)
+        self._readings = ReadingsOfSteps(dict.fromkeys(self.names, 0))
         return covariance
 
     def take(self, measurements: Sequence[Measurement], until: float, spacing: float) -> tuple[int, int] | None:

@@ -222,6 +222,11 @@ class ShipModel(MovingModel):
                 self.aids[name] = code, np.array(numbers), 1 if kind in (HEADING, LOG) else 2
         self.many = of_instruments(self.own, self.bias_at, ShipReadings)
 
+    def components(self, instrument: Datasheet) -> int:
+        """Without the height and the velocity down."""
+        known = self.aids.get(instrument.name)
+        return super().components(instrument) if known is None else known[2]
+
     def propagate(self, covariance: Array, until: float) -> None:
         """Advance the state and its covariance."""
         elapsed = until - self.time

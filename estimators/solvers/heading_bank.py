@@ -90,7 +90,7 @@ class _Scored(KalmanEstimator):
 
     def functions(self) -> FilterFunctions:
         """The correction scores the innovation."""
-        return super().functions()._replace(correct=self.correct)
+        return super().functions().replaced(correct=self.correct)
 
     def correct(self, dynamics: Dynamics, choice: Choice, readings: Readings, k: int, prediction: Prediction) -> float:
         """Correct the covariance, and add the logarithm of the innovation's likelihood."""

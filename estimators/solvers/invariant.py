@@ -93,7 +93,7 @@ class InvariantKalmanEstimator(KalmanEstimator):
 
     def functions(self) -> FilterFunctions:
         """The state is corrected on the group."""
-        return super().functions()._replace(retract=self.retract)
+        return super().functions().replaced(retract=self.retract)
 
     def retract(self, dynamics: Dynamics) -> None:
         """Correct the state on the group, and transform the covariance of the invariant error."""

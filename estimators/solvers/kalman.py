@@ -18,7 +18,7 @@ Source: P. D. Groves 2013, sections 3.2 and 3.4.3.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -47,7 +47,11 @@ __all__ = ["FilterFunctions", "KalmanEstimator"]
 
 
 class FilterFunctions(NamedTuple):
-    """The functions of a filter, see `simnav.estimators.solvers.filter_step.Filter`."""
+    """The functions of a filter, see `simnav.estimators.solvers.filter_step.Filter`.
+
+    ``together`` uses readings of one time of the channels of an instrument by one call
+    (`ErrorModel.assimilate_together`); None: they are used one by one.
+    """
 
     propagate: Callable[[Dynamics, Samples, float], None]
     predict: Callable[[Dynamics, Readings, int, Prediction], bool]
@@ -55,6 +59,11 @@ class FilterFunctions(NamedTuple):
     inflate: Callable[[Dynamics, Readings, int, Prediction], None]
     correct: Callable[[Dynamics, Choice, Readings, int, Prediction], float]
     retract: Callable[[Dynamics], None]
+    together: Callable[..., tuple[Array, Array] | None] | None = None
+
+    def replaced(self, **functions: Callable[..., Any]) -> FilterFunctions:
+        """Some functions in place of others; readings are then used one by one."""
+        return self._replace(**functions, together=None)
 
 
 class KalmanEstimator(Solver):
@@ -119,7 +128,7 @@ class KalmanEstimator(Solver):
         self._blank = dict.fromkeys((label for pair in self._keys.values() for label in pair), np.nan)
         self._linearised: Linearised | None = None
         self._measurements: Sequence[Measurement] = ()
-        self._arrays = ReadingsOfSteps(self._names)
+        self._arrays = ReadingsOfSteps({name: self.model.components(instruments[name]) for name in self._names})
         self._filter = self._assembled(instruments)
         self._compiled, self._iterated = self._filter.compiled, False
         if self.smoother is not None:
@@ -191,8 +200,12 @@ class KalmanEstimator(Solver):
             choose = choose_noise
         if own is None or (own.inflates and not own.inflates_position):
             inflate = inflate_all
-        if kernels is None or self.smoother is not None or self.iteration is not None:
-            return FilterFunctions(self.propagate, self.predict, choose, inflate, self.correct, self.retract)
+        single = self.smoother is not None or self.iteration is not None
+        together = self.model.assimilate_together if self.model.many and own is None and not single else None
+        if kernels is None or single:
+            return FilterFunctions(
+                self.propagate, self.predict, choose, inflate, self.correct, self.retract, together
+            )
         if own is not None and not own.inflates:
             inflate = kernels.inflate_motion
         return FilterFunctions(kernels.propagate, kernels.predict, choose, inflate, correct, kernels.retract)
@@ -200,7 +213,9 @@ class KalmanEstimator(Solver):
     def _assembled(self, instruments: Instruments) -> Filter:
         """The filter of a run, with all that its functions work on."""
         self.dynamics = self.model.dynamics(self.covariance, self._names)
-        return Filter(dynamics=self.dynamics, choice=self.choice(instruments), **self.functions()._asdict())
+        functions = self.functions()._asdict()
+        self._together = functions.pop("together")
+        return Filter(dynamics=self.dynamics, choice=self.choice(instruments), **functions)
 
     def choice(self, instruments: Instruments) -> Choice:
         """How the noise of each reading is chosen in a run."""
@@ -299,13 +314,13 @@ class KalmanEstimator(Solver):
 
     def _groups(self, measurements: Sequence[Measurement]) -> Iterable[Sequence[Measurement]]:
         """The measurements in one group, or those of the channels of one instrument at one time in one if quicker."""
-        plain = self._filter.choose is use_nominal and self._filter.correct is correct
-        return together(measurements, self._owners) if plain and self.model.many else [measurements]
+        return [measurements] if self._together is None else together(measurements, self._owners)
 
     def _use_together(self, group: Sequence[Measurement], until: float, diagnostics: dict[str, float | Array]) -> bool:
         """Use the measurements of a group; False if they have to be used one by one."""
         self._filter.propagate(self.dynamics, self.model.samples, until)
-        used = self.model.assimilate_together(group, self.covariance, self.dynamics.correction)
+        assert self._together is not None
+        used = self._together(group, self.covariance, self.dynamics.correction)
         if used is None:
             return False
         for m, nis, size in zip(group, used[0].tolist(), used[1].tolist(), strict=True):

@@ -97,7 +97,7 @@ class LinearKalmanEstimator(KalmanEstimator):
 
     def functions(self) -> FilterFunctions:
         """Motion, prediction and correction keep the estimated error apart from the nominal state."""
-        return super().functions()._replace(propagate=self.propagate, predict=self.predict, retract=self.retract)
+        return super().functions().replaced(propagate=self.propagate, predict=self.predict, retract=self.retract)
 
     def propagate(self, dynamics: Dynamics, samples: Samples, until: float) -> None:
         """Advance the nominal state, the covariance and the estimated error."""

@@ -139,7 +139,7 @@ class SigmaPointEstimator(KalmanEstimator):
 
     def functions(self) -> FilterFunctions:
         """Motion and predictions come from points."""
-        return super().functions()._replace(propagate=self.propagate, predict=self.predict)
+        return super().functions().replaced(propagate=self.propagate, predict=self.predict)
 
     def propagate(self, dynamics: Dynamics, samples: Samples, until: float) -> None:
         """Advance the state and the covariance through the points."""

@@ -103,10 +103,9 @@ class TerrainPointMass(KalmanEstimator):
 
     def functions(self) -> FilterFunctions:
         """Soundings are used by the lattice, and the clone of the position goes with every correction."""
-        return (
-            super()
-            .functions()
-            ._replace(propagate=self.propagate, predict=self.predict, correct=self.correct, retract=self.retract)
+        functions = super().functions()
+        return functions.replaced(
+            propagate=self.propagate, predict=self.predict, correct=self.correct, retract=self.retract
         )
 
     # --- the clone of the horizontal position, from one sounding to the next

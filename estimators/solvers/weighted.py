@@ -89,7 +89,7 @@ class WeightedKalmanEstimator(KalmanEstimator):
 
     def functions(self) -> FilterFunctions:
         """Every measurement is linearised, and weighted, again and again."""
-        return super().functions()._replace(predict=self.predict, correct=self.correct, retract=self.retract)
+        return super().functions().replaced(predict=self.predict, correct=self.correct, retract=self.retract)
 
     def correct(self, dynamics: Dynamics, choice: Choice, readings: Readings, k: int, prediction: Prediction) -> float:
         """Correct state and covariance until correction and weights have converged; flag a small weight."""
