@@ -14,7 +14,7 @@ from simnav.scoring.lagged import seconds_of
 
 from .calls import call, whole_number
 from .claim_requests import ClaimRequest
-from .given import absolute, scenario_of
+from .arguments import absolute, scenario_of
 
 if TYPE_CHECKING:
     from simnav.leaderboard.papers.claims.answer import Answer

@@ -10,7 +10,7 @@ from simnav.leaderboard.campaign.request import EstimatorRequest, requests, toge
 from simnav.leaderboard.results.errors import RequestError, mistakes
 
 from .calls import call, whole_number
-from .given import absolute, scenario_of
+from .arguments import absolute, scenario_of
 from .requests import BenchRequest, CostsRequest, ScenarioLike
 
 if TYPE_CHECKING:

@@ -17,7 +17,7 @@ from simnav.leaderboard.results.scratch import scratch
 
 from .calls import call, finite_number, whole_number
 from .error_requests import AllanRequest, RealismRequest
-from .given import absolute, results_of, scenario_of, scenarios_of
+from .arguments import absolute, results_of, scenario_of, scenarios_of
 from .requests import (
     BoundRequest,
     CiteRequest,

@@ -15,7 +15,7 @@ from simnav.leaderboard.results.errors import RequestError, StoreError, mistakes
 from simnav.leaderboard.results.scratch import scratch
 
 from .calls import call, whole_number
-from .given import absolute, results_of
+from .arguments import absolute, results_of
 from .inspection import rank
 from .publishing_requests import (
     AuditRequest,

@@ -20,7 +20,7 @@ from simnav.leaderboard.results.scratch import scratch
 
 from .baselines import baselines_or
 from .calls import call, whole_number
-from .given import absolute, results_of, scenario_of, scenarios_of, seeds_of
+from .arguments import absolute, results_of, scenario_of, scenarios_of, seeds_of
 from .printed import first_lines
 from .requests import (
     CampaignRequest,

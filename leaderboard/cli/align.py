@@ -8,7 +8,7 @@ import numpy as np
 
 from simnav.leaderboard.figures.log_figures import DelayCurve, delay_panels
 from simnav.leaderboard.figures.style import save_as
-from simnav.leaderboard.given import scenario_of
+from simnav.leaderboard.arguments import scenario_of
 from simnav.leaderboard.logs import align
 from simnav.leaderboard.ranking import tables
 
