@@ -21,7 +21,7 @@ from simnav.leaderboard.results.scratch import scratch
 from .baselines import baselines_or
 from .calls import call, whole_number
 from .arguments import absolute, results_of, scenario_of, scenarios_of, seeds_of
-from .printed import first_lines
+from .estimator_output import first_lines
 from .requests import (
     CampaignRequest,
     EvaluateRequest,
