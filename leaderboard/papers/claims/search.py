@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from simnav.leaderboard.campaign.campaign import run_campaign
-from simnav.leaderboard.campaign.suited import require_suited
+from simnav.leaderboard.campaign.suitability import require_suitable
 from simnav.leaderboard.papers.measures import value_of
 from simnav.leaderboard.results.errors import RequestError
 from simnav.leaderboard.results.store import load
@@ -94,7 +94,7 @@ def search(
     }
     base = every[0]
     for scenario, requests in _methods(every):
-        require_suited(scenario, requests)
+        require_suitable(scenario, requests)
     run = partial(_run, folder=folder, workers=workers, progress=progress)
     points: dict[tuple[str, Choice], Point] = {}
     for count in sorted({min(runs, 1), runs}) if settings else ():  # what a method lacks shows on the first seed
