@@ -49,7 +49,7 @@ from simnav.sensors.instrument import (
 )
 from simnav.sensors.janus import absorption, beam_axes, noise_by_range, signal_margin
 from simnav.sensors.one_of_many import one_of_many
-from simnav.sensors.pacing import Pings
+from simnav.sensors.pings import Pings
 from simnav.sensors.processes import GaussMarkov
 from simnav.spec import NonNegative, Positive, Vector, quantity
 from simnav.streams import stream

@@ -34,7 +34,7 @@ from simnav.sensors.channels import ChannelInstrument
 from simnav.sensors.errors import InstrumentError
 from simnav.sensors.instrument import ZERO, AidSpec, Instrument
 from simnav.sensors.one_of_many import one_of_many
-from simnav.sensors.pacing import Pings
+from simnav.sensors.pings import Pings
 from simnav.spec import NonNegative, Positive, Vector, quantity
 from simnav.types import NO_SIDE, Array, TapStates
 from simnav.world.bathymetry import Bottom
