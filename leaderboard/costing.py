@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 from simnav.leaderboard.campaign.request import EstimatorRequest, requests, together
 from simnav.leaderboard.results.errors import RequestError, mistakes
 
-from .calls import call, whole_number
 from .arguments import absolute, scenario_of
+from .calls import call, whole_number
 from .requests import BenchRequest, CostsRequest, ScenarioLike
 
 if TYPE_CHECKING:

@@ -14,8 +14,8 @@ from simnav.leaderboard.campaign.request import EstimatorRequest, file_of
 from simnav.leaderboard.results.errors import RequestError, StoreError, mistakes
 from simnav.leaderboard.results.scratch import scratch
 
-from .calls import call, whole_number
 from .arguments import absolute, results_of
+from .calls import call, whole_number
 from .inspection import rank
 from .publishing_requests import (
     AuditRequest,

@@ -18,9 +18,9 @@ from simnav.leaderboard.campaign.suitability import require_suitable, with_long_
 from simnav.leaderboard.results.errors import RequestError, StoreError, mistakes
 from simnav.leaderboard.results.scratch import scratch
 
+from .arguments import absolute, results_of, scenario_of, scenarios_of, seeds_of
 from .baselines import baselines_or
 from .calls import call, whole_number
-from .arguments import absolute, results_of, scenario_of, scenarios_of, seeds_of
 from .estimator_output import first_lines
 from .requests import (
     CampaignRequest,

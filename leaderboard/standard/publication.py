@@ -10,10 +10,10 @@ from pathlib import Path
 from typing import Any
 
 from simnav.estimator import find
+from simnav.leaderboard.arguments import scenarios_of
 from simnav.leaderboard.calls import finite_number
 from simnav.leaderboard.campaign.campaign import Progress, Summary, combined, require_known, run_campaign
 from simnav.leaderboard.campaign.request import comes_with_simnav, requests
-from simnav.leaderboard.arguments import scenarios_of
 from simnav.leaderboard.profiles import Profile
 from simnav.leaderboard.ranking.board import Ranking
 from simnav.leaderboard.ranking.ranking import rank

@@ -29,8 +29,8 @@ from numpy.typing import NDArray
 
 from simnav.arrivals import Arrivals
 from simnav.environment.charted import ChartedEnv
-from simnav.environment.sample_counts import most_samples
 from simnav.environment.observed_steps import ClosedLoopSteps, ObservedSteps, horizontal, pack, rows_of
+from simnav.environment.sample_counts import most_samples
 from simnav.geometry.rotation import dcm_from_rpy, rotation_vector_from_dcm
 from simnav.types import KINDS, Array, InitialState
 

@@ -48,9 +48,9 @@ from simnav.sensors.instrument import (
     turn_to_ned,
 )
 from simnav.sensors.janus import absorption, beam_axes, noise_by_range, signal_margin
-from simnav.sensors.single_reading import single_reading
 from simnav.sensors.pings import Pings
 from simnav.sensors.processes import GaussMarkov
+from simnav.sensors.single_reading import single_reading
 from simnav.spec import NonNegative, Positive, Vector, quantity
 from simnav.streams import stream
 from simnav.types import NO_SIDE, Array, TapStates

@@ -10,7 +10,9 @@ from simnav.types import Array
 __all__ = ["single_reading"]
 
 
-def single_reading(observations: Observations, point: NavigationPoint, sheet: Datasheet) -> tuple[Array, dict[str, Array]]:
+def single_reading(
+    observations: Observations, point: NavigationPoint, sheet: Datasheet
+) -> tuple[Array, dict[str, Array]]:
     """What an equation for many readings gives for one: an `Observation` by way of `Observations`.
 
     Parameters

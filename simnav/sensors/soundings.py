@@ -33,8 +33,8 @@ from simnav.recording import AidStream
 from simnav.sensors.channels import ChannelInstrument
 from simnav.sensors.errors import InstrumentError
 from simnav.sensors.instrument import ZERO, AidSpec, Instrument
-from simnav.sensors.single_reading import single_reading
 from simnav.sensors.pings import Pings
+from simnav.sensors.single_reading import single_reading
 from simnav.spec import NonNegative, Positive, Vector, quantity
 from simnav.types import NO_SIDE, Array, TapStates
 from simnav.world.bathymetry import Bottom

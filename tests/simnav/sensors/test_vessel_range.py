@@ -14,8 +14,8 @@ from simnav.kinds import NavigationPoint
 from simnav.recording import AidStream
 from simnav.sensors import VesselRange
 from simnav.sensors.channels import ChannelInstrument
-from simnav.sensors.vessel_range import message_noise, observe
 from simnav.sensors.planned_track import PlannedTrack
+from simnav.sensors.vessel_range import message_noise, observe
 from simnav.spec import SpecError
 from simnav.types import Array, TapStates
 from simnav.world.surroundings import Surroundings
