@@ -188,7 +188,7 @@ def test_an_ideal_modem_has_no_error() -> None:
     [
         ({"depth_m": -2.0}, "depth_m = -2: the transducer of the other vessel should be below the surface"),
         ({"east_m": [0.0, 1.0]}, "north_m has 1 numbers and east_m 2"),
-        ({"north_m": [0.0, 1.0], "east_m": [0.0, 1.0]}, "speed_m_s = 0: a ship with a way"),
+        ({"north_m": [0.0, 1.0], "east_m": [0.0, 1.0]}, "speed_m_s = 0: a ship with a track"),
         ({"repeats": True}, "repeats = true: a way that is sailed again and again has two points or more"),
         ({"clock_s": 0.1}, "way = 'two_way': a two-way travel time is measured by one clock"),
         ({"drift_percent": 0.5}, "drift_percent: a vessel with navigation = 'gnss' has none"),
