@@ -33,8 +33,8 @@ if TYPE_CHECKING:
     from simnav.leaderboard.ranking.reports import CampaignReport, StandardReport
     from simnav.leaderboard.site.report import SiteReport
     from simnav.leaderboard.standard.auditing import Audit
-    from simnav.leaderboard.standard.currency import Outdated
     from simnav.leaderboard.standard.drawing import Drawing
+    from simnav.leaderboard.standard.outdated_results import Outdated
     from simnav.leaderboard.standard.publication import Published
     from simnav.leaderboard.submission.bundle import Row
     from simnav.leaderboard.submission.verifying import SubmissionReport
@@ -302,14 +302,14 @@ def check_standard(request: CheckStandardRequest) -> Outdated:
 
     Returns
     -------
-    simnav.leaderboard.standard.currency.Outdated
+    simnav.leaderboard.standard.outdated_results.Outdated
 
     Raises
     ------
     RequestError
         If there are no results.
     """
-    from simnav.leaderboard.standard.currency import outdated
+    from simnav.leaderboard.standard.outdated_results import outdated
 
     folder = _standard_results(request.results)
     with mistakes(StoreError):

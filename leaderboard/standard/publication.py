@@ -27,8 +27,8 @@ from simnav.leaderboard.results.versions import declared, is_declared
 from simnav.scenario import load
 
 from . import shipped
-from .currency import changes, outdated
 from .history import append
+from .outdated_results import changes, outdated
 from .readme import draw, replaced, tables
 
 __all__ = ["Published", "begin", "missing", "publish", "run"]

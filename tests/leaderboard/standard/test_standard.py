@@ -24,10 +24,10 @@ from simnav.leaderboard.results import store
 from simnav.leaderboard.results.errors import RequestError
 from simnav.leaderboard.results.packing import write_packed
 from simnav.leaderboard.site.content import SiteFacts
-from simnav.leaderboard.standard import currency, history, readme
+from simnav.leaderboard.standard import history, readme
 from simnav.leaderboard.standard.auditing import share_found
-from simnav.leaderboard.standard.currency import outdated
 from simnav.leaderboard.standard.editions import pages_of
+from simnav.leaderboard.standard.outdated_results import outdated
 
 PROFILE = """
 title = "small"
