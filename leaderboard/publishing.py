@@ -69,7 +69,7 @@ def site(request: SiteRequest) -> SiteReport:
     from simnav.leaderboard.papers.page import pages_in
     from simnav.leaderboard.ranking.agreement import rank_correlations
     from simnav.leaderboard.ranking.ranking import rank as ranked
-    from simnav.leaderboard.results.home import linked_from
+    from simnav.leaderboard.results.web_addresses import linked_from
     from simnav.leaderboard.site.report import SiteReport
     from simnav.leaderboard.site.site import build
     from simnav.leaderboard.standard.drawn import attached, stored_sweeps
@@ -356,7 +356,7 @@ def publish_standard(request: PublishRequest) -> Published:
         If runs are missing or out of date; then nothing is written.
     """
     from simnav.leaderboard.papers.page import pages_in
-    from simnav.leaderboard.results.home import linked_from
+    from simnav.leaderboard.results.web_addresses import linked_from
     from simnav.leaderboard.site.site import build
     from simnav.leaderboard.standard.drawn import attached, stored_sweeps
     from simnav.leaderboard.standard.editions import pages_of
