@@ -1,4 +1,8 @@
-"""One step of the instruments and faults of many runs: the kernels of `simnav.simulation.steps`."""
+"""One step of the instruments and faults of many runs: the kernels of `simnav.simulation.steps`.
+
+The random numbers of instruments and faults depend on the times of their samples only, so those of several steps of a
+run are drawn together. Such steps are a *batch*. The kernels compute what depends on the motion.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,8 @@
-"""The search for conditions: each dial by itself, first on the seeds of a search, then on those of a judgement."""
+"""The search for conditions: each dial by itself, first on the seeds of a search, then on those of a judgement.
+
+A condition that a search finds is one of many that were tried, so its gain is chosen and not only measured. It is
+computed again on seeds that the search did not use, and the interval of those decides.
+"""
 
 from __future__ import annotations
 
