@@ -43,8 +43,8 @@ def baselines(scenarios: Iterable[Scenario]) -> list[str]:
     found: dict[str, None] = {}
     for scenario in scenarios:
         instruments = open_source(scenario, 0).instruments
-        suited = [name for name in BASELINES if not lacking(registered(name)().needs, instruments)]
-        found |= dict.fromkeys(suited[:MOST])
+        suitable = [name for name in BASELINES if not lacking(registered(name)().needs, instruments)]
+        found |= dict.fromkeys(suitable[:MOST])
     return sorted(found, key=BASELINES.index)
 
 

@@ -12,9 +12,9 @@ from simnav.leaderboard.results.errors import RequestError, mistakes, sentence
 from simnav.scoring import SCORES
 from simnav.scoring.lagged import seconds_of
 
+from .arguments import absolute, scenario_of
 from .calls import call, whole_number
 from .claim_requests import ClaimRequest
-from .given import absolute, scenario_of
 
 if TYPE_CHECKING:
     from simnav.leaderboard.papers.claims.answer import Answer

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 from simnav.leaderboard.campaign.request import EstimatorRequest, requests, together
 from simnav.leaderboard.results.errors import RequestError, mistakes
 
+from .arguments import absolute, scenario_of
 from .calls import call, whole_number
-from .given import absolute, scenario_of
 from .requests import BenchRequest, CostsRequest, ScenarioLike
 
 if TYPE_CHECKING:
@@ -43,8 +43,8 @@ def bench(request: BenchRequest) -> CostReport:
     beside = together([*mine, *requests(list(BESIDE) if request.against is None else request.against)])[len(mine) :]
     counts = whole_number("epochs", request.epochs), whole_number("rounds", request.rounds, 1)
     multiples, seas = _multiples(mine, request.scenario, request.seed, *counts, request.progress)
-    suited = (s for s in seas if not any(lacking(r.make().needs, s[1].instruments) for r in mine))
-    name, recording = next(suited, seas[0])
+    suitable = (s for s in seas if not any(lacking(r.make().needs, s[1].instruments) for r in mine))
+    name, recording = next(suitable, seas[0])
     return costs_of(mine, beside, name, recording, *counts, multiples, request.progress)
 
 

@@ -15,9 +15,9 @@ from simnav.leaderboard.campaign.request import requests
 from simnav.leaderboard.results.errors import RequestError, StoreError, mistakes
 from simnav.leaderboard.results.scratch import scratch
 
+from .arguments import absolute, results_of, scenario_of, scenarios_of
 from .calls import call, finite_number, whole_number
 from .error_requests import AllanRequest, RealismRequest
-from .given import absolute, results_of, scenario_of, scenarios_of
 from .requests import (
     BoundRequest,
     CiteRequest,

@@ -15,9 +15,9 @@ from __future__ import annotations
 from simnav.leaderboard.campaign.request import EstimatorLike, Estimators
 from simnav.leaderboard.results.errors import RequestError
 
+from .arguments import results_of, scenario_of, scenarios_of
 from .claiming import claim
 from .costing import bench, costs
-from .given import results_of, scenario_of, scenarios_of
 from .inspection import allan, bound, cite, merge, rank, realism, reproduce, rescore, seal, verify
 from .logs import align, export, inspect_log, recordings, score_files, tune_noise
 from .requests import ScenarioLike, Scenarios

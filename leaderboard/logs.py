@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 
 from simnav.leaderboard.results.errors import RequestError, mistakes
 
+from .arguments import absolute, scenario_of, scenarios_of
 from .calls import call, whole_number
-from .given import absolute, scenario_of, scenarios_of
 from .log_requests import (
     AlignRequest,
     ExportRequest,

@@ -14,8 +14,8 @@ from simnav.leaderboard.campaign.request import EstimatorRequest, file_of
 from simnav.leaderboard.results.errors import RequestError, StoreError, mistakes
 from simnav.leaderboard.results.scratch import scratch
 
+from .arguments import absolute, results_of
 from .calls import call, whole_number
-from .given import absolute, results_of
 from .inspection import rank
 from .publishing_requests import (
     AuditRequest,
@@ -33,8 +33,8 @@ if TYPE_CHECKING:
     from simnav.leaderboard.ranking.reports import CampaignReport, StandardReport
     from simnav.leaderboard.site.report import SiteReport
     from simnav.leaderboard.standard.auditing import Audit
-    from simnav.leaderboard.standard.currency import Outdated
     from simnav.leaderboard.standard.drawing import Drawing
+    from simnav.leaderboard.standard.outdated_results import Outdated
     from simnav.leaderboard.standard.publication import Published
     from simnav.leaderboard.submission.bundle import Row
     from simnav.leaderboard.submission.verifying import SubmissionReport
@@ -69,7 +69,7 @@ def site(request: SiteRequest) -> SiteReport:
     from simnav.leaderboard.papers.page import pages_in
     from simnav.leaderboard.ranking.agreement import rank_correlations
     from simnav.leaderboard.ranking.ranking import rank as ranked
-    from simnav.leaderboard.results.home import linked_from
+    from simnav.leaderboard.results.web_addresses import linked_from
     from simnav.leaderboard.site.report import SiteReport
     from simnav.leaderboard.site.site import build
     from simnav.leaderboard.standard.drawn import attached, stored_sweeps
@@ -302,14 +302,14 @@ def check_standard(request: CheckStandardRequest) -> Outdated:
 
     Returns
     -------
-    simnav.leaderboard.standard.currency.Outdated
+    simnav.leaderboard.standard.outdated_results.Outdated
 
     Raises
     ------
     RequestError
         If there are no results.
     """
-    from simnav.leaderboard.standard.currency import outdated
+    from simnav.leaderboard.standard.outdated_results import outdated
 
     folder = _standard_results(request.results)
     with mistakes(StoreError):
@@ -356,7 +356,7 @@ def publish_standard(request: PublishRequest) -> Published:
         If runs are missing or out of date; then nothing is written.
     """
     from simnav.leaderboard.papers.page import pages_in
-    from simnav.leaderboard.results.home import linked_from
+    from simnav.leaderboard.results.web_addresses import linked_from
     from simnav.leaderboard.site.site import build
     from simnav.leaderboard.standard.drawn import attached, stored_sweeps
     from simnav.leaderboard.standard.editions import pages_of

@@ -7,7 +7,7 @@ from dataclasses import KW_ONLY
 from pathlib import Path
 
 from simnav.leaderboard.campaign.options import PathLike, part_of
-from simnav.leaderboard.results.home import BUILT
+from simnav.leaderboard.results.web_addresses import BUILT
 
 from .calls import option, request
 from .requests import (

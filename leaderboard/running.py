@@ -14,14 +14,14 @@ from simnav.estimator.looking_back import LAGS, lags_of
 from simnav.leaderboard.campaign.options import RunOptions, shared
 from simnav.leaderboard.campaign.request import EstimatorLike, EstimatorRequest, Estimators, requests, together
 from simnav.leaderboard.campaign.request import request as one_request
-from simnav.leaderboard.campaign.suited import require_suited, with_long_windows
+from simnav.leaderboard.campaign.suitability import require_suitable, with_long_windows
 from simnav.leaderboard.results.errors import RequestError, StoreError, mistakes
 from simnav.leaderboard.results.scratch import scratch
 
+from .arguments import absolute, results_of, scenario_of, scenarios_of, seeds_of
 from .baselines import baselines_or
 from .calls import call, whole_number
-from .given import absolute, results_of, scenario_of, scenarios_of, seeds_of
-from .printed import first_lines
+from .estimator_output import first_lines
 from .requests import (
     CampaignRequest,
     EvaluateRequest,
@@ -138,7 +138,7 @@ def run(request: RunRequest) -> RunReport:
         if request.estimators is None:
             asked = with_long_windows(chosen, asked)
         else:
-            require_suited(chosen, asked, lags_only=True)
+            require_suitable(chosen, asked, lags_only=True)
     return run_once(chosen, asked, seed, request.progress)
 
 

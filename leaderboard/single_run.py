@@ -27,7 +27,7 @@ from simnav.scoring.consistency import badge
 from simnav.scoring.lagged import seconds_of
 from simnav.scoring.trajectory_errors import TrajectoryErrors, trajectory_errors
 
-from .printed import first_lines
+from .estimator_output import first_lines
 from .ranking import tables
 
 if TYPE_CHECKING:

@@ -208,7 +208,8 @@ def navigate(
                 s = samples[b]
                 first, blocks_used = advance_inertial(
                     Motion(position[b], velocity[b], dcm[b], bias[b], memory[b], turn[b], clock[b]),
-                    Samples(imu_time[b, :s], imu_interval[b, :s], rate[b, :s], force[b, :s]), first, stop, sensors[b], blocks,
+                    Samples(imu_time[b, :s], imu_interval[b, :s], rate[b, :s], force[b, :s]), first, stop, sensors[b],
+                    blocks,
                 )  # fmt: skip
                 accumulate_error(blocks, blocks_used, sensors[b], transition, process_noise)
                 now[b] = stop

@@ -203,9 +203,7 @@ class KalmanEstimator(Solver):
         single = self.smoother is not None or self.iteration is not None
         together = self.model.assimilate_together if self.model.many and own is None and not single else None
         if kernels is None or single:
-            return FilterFunctions(
-                self.propagate, self.predict, choose, inflate, self.correct, self.retract, together
-            )
+            return FilterFunctions(self.propagate, self.predict, choose, inflate, self.correct, self.retract, together)
         if own is not None and not own.inflates:
             inflate = kernels.inflate_motion
         return FilterFunctions(kernels.propagate, kernels.predict, choose, inflate, correct, kernels.retract)
@@ -223,9 +221,13 @@ class KalmanEstimator(Solver):
         return own.choice(self._names, self.model.size) if isinstance(own, NoiseAdaptation) else no_choice()
 
     def _use(
-        self, measurements: Sequence[Measurement], samples: Samples, until: float, diagnostics: dict[str, float | Array],
+        self,
+        measurements: Sequence[Measurement],
+        samples: Samples,
+        until: float,
+        diagnostics: dict[str, float | Array],
         flagged: list[tuple[str, float]],
-    ) -> None:  # fmt: skip
+    ) -> None:
         """Use measurements in order of their times, propagate to a time, and record what became of each."""
         self._measurements, count = measurements, len(measurements)
         readings = self._arrays.fill(measurements)

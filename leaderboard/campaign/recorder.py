@@ -1,4 +1,7 @@
-"""A recording made in a process of its own, with limits: it fails, hangs or wants memory without harm to a campaign."""
+"""A recording made in a process of its own, with limits: it fails, hangs or wants memory without harm to a campaign.
+
+The process is a fork of the worker. The arrays of the recording come back through shared memory.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,8 @@
-"""What an estimator learned from: no estimator is scored on such a run, and results say what it was."""
+"""What an estimator learned from: no estimator is scored on such a run, and results say what it was.
+
+`Estimator.learned_from` holds the seeds from which the random streams of the training runs started. A campaign compares
+them with its own. Names of scenarios are not enough, because two scenarios with the same seed share streams.
+"""
 
 from __future__ import annotations
 

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from simnav.leaderboard.arguments import scenario_of
 from simnav.leaderboard.figures.log_figures import DelayCurve, delay_panels
 from simnav.leaderboard.figures.style import save_as
-from simnav.leaderboard.given import scenario_of
 from simnav.leaderboard.logs import align
 from simnav.leaderboard.ranking import tables
 

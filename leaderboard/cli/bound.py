@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from simnav.leaderboard.given import scenario_of
+from simnav.leaderboard.arguments import scenario_of
 from simnav.leaderboard.inspection import bound
 from simnav.leaderboard.results.errors import mistakes
 

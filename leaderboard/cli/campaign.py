@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from shlex import quote
 
-from simnav.leaderboard.given import scenarios_of
+from simnav.leaderboard.arguments import scenarios_of
 from simnav.leaderboard.ranking import tables
 from simnav.leaderboard.ranking.confinement import confinement_line
 from simnav.leaderboard.ranking.failures import failure_table

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from simnav.leaderboard.given import scenario_of
+from simnav.leaderboard.arguments import scenario_of
 from simnav.leaderboard.ranking import tables
 from simnav.leaderboard.results.errors import RequestError
 from simnav.leaderboard.running import check

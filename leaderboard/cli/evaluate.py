@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from simnav.leaderboard.given import scenarios_of
+from simnav.leaderboard.arguments import scenarios_of
 from simnav.leaderboard.ranking.failures import failure_table
 from simnav.leaderboard.requests import EvaluateRequest
 from simnav.leaderboard.results.errors import RequestError

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from simnav.leaderboard.given import scenarios_of
+from simnav.leaderboard.arguments import scenarios_of
 from simnav.leaderboard.ranking import reference, tables
 from simnav.leaderboard.ranking.reference_measurement import measure, save
 from simnav.leaderboard.results.errors import mistakes

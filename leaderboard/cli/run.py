@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from simnav.leaderboard.arguments import scenario_of
 from simnav.leaderboard.figures.stanford import stanford_diagrams
 from simnav.leaderboard.figures.style import save_as
-from simnav.leaderboard.given import scenario_of
 from simnav.leaderboard.results.errors import RequestError
 from simnav.leaderboard.running import run
 from simnav.scoring.consistency import ending

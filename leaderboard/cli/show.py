@@ -9,8 +9,8 @@ from collections.abc import Mapping
 from typing import Any, TypeAlias
 
 from simnav.estimator import describe
+from simnav.leaderboard.arguments import scenario_of
 from simnav.leaderboard.campaign.request import file_of
-from simnav.leaderboard.given import scenario_of
 from simnav.leaderboard.ranking import tables
 from simnav.leaderboard.results.errors import RequestError, mistakes
 

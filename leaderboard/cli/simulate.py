@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from simnav.leaderboard.given import scenario_of
+from simnav.leaderboard.arguments import scenario_of
 from simnav.leaderboard.ranking import tables
 from simnav.leaderboard.results.errors import RequestError
 from simnav.leaderboard.results.formats import formats, write

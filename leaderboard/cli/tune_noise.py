@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from simnav.leaderboard.given import scenario_of
+from simnav.leaderboard.arguments import scenario_of
 from simnav.leaderboard.log_requests import TuneNoiseRequest
 from simnav.leaderboard.logs import tune_noise
 from simnav.leaderboard.ranking import tables

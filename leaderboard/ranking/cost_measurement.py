@@ -114,11 +114,11 @@ def _multiples(
         If no scenario suits it.
     """
     lacks = {name: lacking(request.make().needs, sea.instruments) for name, sea in seas}
-    suited = [(name, sea) for name, sea in seas if not lacks[name]]
-    if not suited:
+    suitable = [(name, sea) for name, sea in seas if not lacks[name]]
+    if not suitable:
         raise UnsuitableScenario("; ".join(f"{name}: {why}" for name, why in lacks.items()))
     done = set[str]()
-    for name, sea in suited:
+    for name, sea in suitable:
         for smooth in (False, True):
             plain = _plain_row_for(sea, smooth)
             if not plain or plain in done or (smooth and not _smooths(request.make(), sea)):

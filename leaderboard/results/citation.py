@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 
 from .errors import RequestError
-from .home import home
 from .provenance import BENCHMARK, Provenance, benchmark_of, distinct
+from .web_addresses import home
 
 __all__ = ["AUTHORS", "TITLE", "Citation", "citation"]
 

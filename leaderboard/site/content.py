@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Protocol
 
 from simnav.leaderboard.results.citation import Citation
-from simnav.leaderboard.results.home import NOWHERE, Home
 from simnav.leaderboard.results.provenance import Provenance
+from simnav.leaderboard.results.web_addresses import NOWHERE, Home
 
 from .facts import EstimatorFacts
 

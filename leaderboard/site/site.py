@@ -37,8 +37,8 @@ from simnav.leaderboard.results.citation import citation
 from simnav.leaderboard.results.errors import RequestError
 from simnav.leaderboard.results.export import Document
 from simnav.leaderboard.results.formats import formats, write
-from simnav.leaderboard.results.home import NOWHERE, Home
 from simnav.leaderboard.results.provenance import benchmark_of, distinct
+from simnav.leaderboard.results.web_addresses import NOWHERE, Home
 
 from .background import background_of, prepare
 from .columns import glossary
@@ -112,7 +112,7 @@ def build(
     seeds : mapping of str to sequence of int, optional
         By scenario, the runs that have series, where not all have.
     home : Home
-        Where the repository and the documentation are (`simnav.leaderboard.results.home.linked_from`).
+        Where the repository and the documentation are (`simnav.leaderboard.results.web_addresses.linked_from`).
 
     Returns
     -------

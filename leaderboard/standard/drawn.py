@@ -29,7 +29,7 @@ from simnav.leaderboard.site.sweeps import SweepFile, sweeps_in
 from simnav.simulation.version import SIMULATOR_VERSION
 
 from . import shipped
-from .currency import changes
+from .outdated_results import changes
 
 __all__ = ["DRAWN", "PROFILE", "SEEDS", "AskedSweep", "asked_sweeps", "attached", "begin", "keep", "stored_sweeps",
            "thinned"]  # fmt: skip

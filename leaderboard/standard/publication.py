@@ -10,10 +10,10 @@ from pathlib import Path
 from typing import Any
 
 from simnav.estimator import find
+from simnav.leaderboard.arguments import scenarios_of
 from simnav.leaderboard.calls import finite_number
 from simnav.leaderboard.campaign.campaign import Progress, Summary, combined, require_known, run_campaign
 from simnav.leaderboard.campaign.request import comes_with_simnav, requests
-from simnav.leaderboard.given import scenarios_of
 from simnav.leaderboard.profiles import Profile
 from simnav.leaderboard.ranking.board import Ranking
 from simnav.leaderboard.ranking.ranking import rank
@@ -27,8 +27,8 @@ from simnav.leaderboard.results.versions import declared, is_declared
 from simnav.scenario import load
 
 from . import shipped
-from .currency import changes, outdated
 from .history import append
+from .outdated_results import changes, outdated
 from .readme import draw, replaced, tables
 
 __all__ = ["Published", "begin", "missing", "publish", "run"]

@@ -29,8 +29,8 @@ from numpy.typing import NDArray
 
 from simnav.arrivals import Arrivals
 from simnav.environment.charted import ChartedEnv
+from simnav.environment.observed_steps import ClosedLoopSteps, ObservedSteps, horizontal, pack, rows_of
 from simnav.environment.sample_counts import most_samples
-from simnav.environment.stretch import LiveStretch, Stretch, horizontal, pack, rows_of
 from simnav.geometry.rotation import dcm_from_rpy, rotation_vector_from_dcm
 from simnav.types import KINDS, Array, InitialState
 
@@ -53,7 +53,7 @@ _ACTION_LIMIT = np.array([[np.pi / 2, np.pi, 1e5], [100.0, 100.0, 100.0], [np.pi
 
 # The source is advanced this many steps ahead, doubling as the episode goes on: short episodes start at once, long
 # ones spread the fixed cost of a block over many steps. The data are the same whatever the blocks (bit for bit).
-_FIRST_STRETCH, _LONGEST_STRETCH = 8, 256
+_FEWEST_AHEAD, _MOST_AHEAD = 8, 256
 
 
 class NavigationEnv(ChartedEnv[Observation, Array]):
@@ -154,12 +154,12 @@ class NavigationEnv(ChartedEnv[Observation, Array]):
         self.observation_space = _observation_space(self._most, self._widths, self._sides)
         self.action_space = spaces.Box(-_ACTION_LIMIT, _ACTION_LIMIT, dtype=np.float64)
         self._source: Any = None
-        self._stretch: Stretch | None = None
+        self._observed: ObservedSteps | None = None
         self._runs: SteppedRuns | None = None
         self._shared: SteppedRuns | None = None
         self._number = 0  # of the run in these
         self._row = 0
-        self._size = _FIRST_STRETCH
+        self._size = _FEWEST_AHEAD
         self._steps = 0  # steps that the source has been advanced by
         self._arrivals = Arrivals()
 
@@ -186,7 +186,7 @@ class NavigationEnv(ChartedEnv[Observation, Array]):
         if seed is None:
             seed = int(self.np_random.integers(2**63 - 1))
         self._source, note = _open(self.scenario, seed)
-        self._stretch, self._runs, self._steps, self._size = None, None, 0, _FIRST_STRETCH
+        self._observed, self._runs, self._steps, self._size = None, None, 0, _FEWEST_AHEAD
         self._arrivals = Arrivals()
         start: InitialState = self._source.start
         if self.closed_loop:
@@ -225,10 +225,10 @@ class NavigationEnv(ChartedEnv[Observation, Array]):
 
     def step_from(self, estimate: list[float]) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """As `step`, for the nine numbers of a checked action; the observation may be views of longer arrays."""
-        stretch = self._stretch
-        if stretch is None:
+        observed = self._observed
+        if observed is None:
             raise gymnasium.error.ResetNeeded("no run is under way: call reset() first")
-        row = stretch.rows[self._row]
+        row = observed.rows[self._row]
         north, east = horizontal(estimate, row)
         reward = -self._error(estimate, north, east, row)
         if self._chart is not None:
@@ -236,12 +236,12 @@ class NavigationEnv(ChartedEnv[Observation, Array]):
         if self.closed_loop:
             self._source.steer_by(north, east, math.remainder(estimate[8] - row[5], math.tau))
         self._row += 1
-        if self._row < len(stretch.rows) or self._load():
+        if self._row < len(observed.rows) or self._load():
             return self._observation(), reward, False, False, self._reveal({})
         last = self._row - 1
-        observation = self.empty(float(stretch.intervals[last, 1]))
-        info = {"truth": stretch.truth[last].copy()} if self.reveal_truth else {}
-        self._stretch = None
+        observation = self.empty(float(observed.intervals[last, 1]))
+        info = {"truth": observed.truth[last].copy()} if self.reveal_truth else {}
+        self._observed = None
         return observation, reward, False, True, info
 
     @property
@@ -260,14 +260,14 @@ class NavigationEnv(ChartedEnv[Observation, Array]):
         self._shared, self._number = runs, number
 
     def hand_over(self) -> tuple[list[float], int]:
-        """Leave a run that has just begun to whom it is shared with: its row of `Stretch.rows`, and the steps left."""
-        assert self._stretch is not None
-        row, left = self._stretch.rows[0], int(self._source.duration / self._source.step + 1e-6) - self._steps
-        self._stretch = None
+        """Hand over a run that has just begun: its row of `ObservedSteps.rows`, and the number of steps left."""
+        assert self._observed is not None
+        row, left = self._observed.rows[0], int(self._source.duration / self._source.step + 1e-6) - self._steps
+        self._observed = None
         return row, left
 
     def _forget(self) -> None:
-        self._source = self._stretch = self._runs = None
+        self._source = self._observed = self._runs = None
 
     # ------------------------------------------------------------------------------------------- the run
 
@@ -281,11 +281,11 @@ class NavigationEnv(ChartedEnv[Observation, Array]):
             if self._steps >= total:
                 return False
             self._steps = min(total, self._steps + self._size)
-            self._size = min(2 * self._size, _LONGEST_STRETCH)
+            self._size = min(2 * self._size, _MOST_AHEAD)
             block = source.advance(source.duration if self._steps == total else self._steps * source.step)
             if len(block.truth):
-                begin = block.start if self._stretch is None else float(self._stretch.intervals[-1, 1])
-                self._stretch, self._row = pack(self._arrivals.of(block), begin, self._most), 0
+                begin = block.start if self._observed is None else float(self._observed.intervals[-1, 1])
+                self._observed, self._row = pack(self._arrivals.of(block), begin, self._most), 0
                 return True
 
     def _advance(self, runs: SteppedRuns) -> bool:
@@ -293,21 +293,21 @@ class NavigationEnv(ChartedEnv[Observation, Array]):
         if self._steps >= int(self._source.duration / self._source.step + 1e-6):
             return False
         self._steps += 1
-        stretch = self._stretch
-        if not isinstance(stretch, LiveStretch) or len(stretch.rows) == stretch.LENGTH:
-            self._stretch = stretch = LiveStretch(runs, self._number, self._most, self._widths, self._sides)
-        self._row = len(stretch.rows)
-        stretch.advance()
+        observed = self._observed
+        if not isinstance(observed, ClosedLoopSteps) or len(observed.rows) == observed.LENGTH:
+            self._observed = observed = ClosedLoopSteps(runs, self._number, self._most, self._widths, self._sides)
+        self._row = len(observed.rows)
+        observed.advance()
         return True
 
     def _observation(self) -> Observation:
-        stretch, i = self._stretch, self._row
-        assert stretch is not None
-        observation: Observation = {"interval": stretch.intervals[i]}
-        for name, columns in stretch.columns.items():
+        observed, i = self._observed, self._row
+        assert observed is not None
+        observation: Observation = {"interval": observed.intervals[i]}
+        for name, columns in observed.columns.items():
             observation[name] = {key: array[i] for key, array in columns.items()}
-        if len(stretch.columns) < len(self._most):
-            for name in self._most.keys() - stretch.columns.keys():  # instruments that other runs of the scenario have
+        if len(observed.columns) < len(self._most):
+            for name in self._most.keys() - observed.columns.keys():  # instruments that other runs of the scenario have
                 observation[name] = self._nothing(name)
         return observation
 
@@ -323,8 +323,8 @@ class NavigationEnv(ChartedEnv[Observation, Array]):
         return {key: np.zeros(s.shape, s.dtype) for key, s in space.items()}
 
     def _reveal(self, info: dict[str, Any]) -> dict[str, Any]:
-        if self.reveal_truth and self._stretch is not None:
-            info["truth"] = self._stretch.truth[self._row].copy()
+        if self.reveal_truth and self._observed is not None:
+            info["truth"] = self._observed.truth[self._row].copy()
         return info
 
     def _error(self, estimate: list[float], north: float, east: float, row: list[float]) -> float:
@@ -332,8 +332,8 @@ class NavigationEnv(ChartedEnv[Observation, Array]):
         if self._weights is None:
             error = math.hypot(north, east)
             return error if error == error else 0.0
-        assert self._stretch is not None
-        truth = self._stretch.truth[self._row]
+        assert self._observed is not None
+        truth = self._observed.truth[self._row]
         down = row[2] - estimate[2]
         measures: dict[str, Callable[[], float]] = {
             "horizontal": lambda: math.hypot(north, east),
@@ -346,11 +346,11 @@ class NavigationEnv(ChartedEnv[Observation, Array]):
         return sum(term for term in terms if term == term)
 
     def _draw(self, chart: Chart, estimate: list[float]) -> None:
-        stretch, i = self._stretch, self._row
-        assert stretch is not None
-        for position, faulty in stretch.fixes(i):
+        observed, i = self._observed, self._row
+        assert observed is not None
+        for position, faulty in observed.fixes(i):
             chart.add_fixes(position, faulty)
-        chart.add(float(stretch.intervals[i, 1]), stretch.truth[i, 0], np.array(estimate[:3]))
+        chart.add(float(observed.intervals[i, 1]), observed.truth[i, 0], np.array(estimate[:3]))
         self._show()
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simnav.environment.navigation import NavigationEnv, Observation
-from simnav.environment.stretch import crowded, entries, horizontal, keep, padded
+from simnav.environment.observed_steps import crowded, entries, horizontal, keep, padded
 from simnav.simulation.steps import SteppedRuns
 
 __all__ = ["SteeredRuns"]

@@ -28,7 +28,7 @@ from simnav.labels import REFLECTION, FaultLabel
 from simnav.recording import AidStream
 from simnav.sensors.channels import ChannelInstrument
 from simnav.sensors.instrument import AidSpec
-from simnav.sensors.pacing import Pings
+from simnav.sensors.pings import Pings
 from simnav.spec import NonNegative, Positive, quantity
 from simnav.timing import TimingSheet
 from simnav.types import Array, Datasheet, TapStates

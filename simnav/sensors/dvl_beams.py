@@ -48,9 +48,9 @@ from simnav.sensors.instrument import (
     turn_to_ned,
 )
 from simnav.sensors.janus import absorption, beam_axes, noise_by_range, signal_margin
-from simnav.sensors.one_of_many import one_of_many
-from simnav.sensors.pacing import Pings
+from simnav.sensors.pings import Pings
 from simnav.sensors.processes import GaussMarkov
+from simnav.sensors.single_reading import single_reading
 from simnav.spec import NonNegative, Positive, Vector, quantity
 from simnav.streams import stream
 from simnav.types import NO_SIDE, Array, TapStates
@@ -157,7 +157,7 @@ def observe_all(points: NavigationPoints, sheet: Datasheet) -> tuple[Array, dict
 
 def observe(point: NavigationPoint, sheet: Datasheet) -> tuple[Array, dict[str, Array]]:
     """The velocity along a beam and its Jacobian by block (`simnav.kinds.Observation`)."""
-    return one_of_many(observe_all, point, sheet)
+    return single_reading(observe_all, point, sheet)
 
 
 def reading_sigma(side: Array, sheet: Datasheet) -> Array:

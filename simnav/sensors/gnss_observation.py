@@ -15,7 +15,7 @@ from simnav.geometry.ecef import ecef_from_geodetic_scalar
 from simnav.kernel_types import IntegerVector, Matrix, Stack, Vector
 from simnav.kinds import Component, Datasheet, NavigationPoint, NavigationPoints
 from simnav.satellites.signal_errors import amplification, noise_factor, range_error
-from simnav.sensors.one_of_many import one_of_many
+from simnav.sensors.single_reading import single_reading
 from simnav.types import Array
 
 __all__ = ["DENSITY_RATIO", "SIDE", "observe", "observe_all", "reading_sigma"]
@@ -162,7 +162,7 @@ def _predict_all(
 
 def observe(point: NavigationPoint, sheet: Datasheet) -> tuple[Array, dict[str, Array]]:
     """Pseudorange and its rate at a state, and their Jacobian by block (`simnav.kinds.Observation`)."""
-    return one_of_many(observe_all, point, sheet)
+    return single_reading(observe_all, point, sheet)
 
 
 def observe_all(points: NavigationPoints, sheet: Datasheet) -> tuple[Array, dict[str, Array]]:

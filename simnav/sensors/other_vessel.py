@@ -22,7 +22,7 @@ import numpy as np
 
 from simnav.blocks import StateBlock
 from simnav.sensors.block_values import BlockValues
-from simnav.sensors.way import Way
+from simnav.sensors.planned_track import PlannedTrack
 from simnav.streams import stream
 from simnav.types import Array
 
@@ -74,7 +74,7 @@ class DeadReckoning(Navigation):
 
     Parameters
     ----------
-    way : Way
+    track : PlannedTrack
         Where it really is.
     fixes : sequence of float
         Times of its fixes after the start, ascending [s]; at the start it has one, too.
@@ -91,9 +91,16 @@ class DeadReckoning(Navigation):
     """
 
     def __init__(
-        self, way: Way, fixes: Sequence[float], fix: float, drift: Sequence[float], walk: float, label: str, seed: int
+        self,
+        track: PlannedTrack,
+        fixes: Sequence[float],
+        fix: float,
+        drift: Sequence[float],
+        walk: float,
+        label: str,
+        seed: int,
     ):
-        self.way, self.fix, self.drift, self.walk = way, fix, np.array(drift), walk
+        self.track, self.fix, self.drift, self.walk = track, fix, np.array(drift), walk
         self.fixes = np.array([0.0, *fixes])
         rng = stream(seed, "vessel", label, "navigation")
         self._drift = self.drift * rng.standard_normal(2)
@@ -104,7 +111,7 @@ class DeadReckoning(Navigation):
         """(n,) numbers of the last fixes and their times [s], and (n, 2) displacements since then [m]."""
         last = np.maximum(np.searchsorted(self.fixes, time, side="right") - 1, 0)
         begin = self.fixes[last]
-        return last, begin, self.way.at(time)[0] - self.way.at(begin)[0]
+        return last, begin, self.track.at(time)[0] - self.track.at(begin)[0]
 
     def error(self, time: Array, variates: Array) -> Array:
         """See `Navigation.error`; nothing in it is white."""

@@ -33,8 +33,8 @@ from simnav.recording import AidStream
 from simnav.sensors.channels import ChannelInstrument
 from simnav.sensors.errors import InstrumentError
 from simnav.sensors.instrument import ZERO, AidSpec, Instrument
-from simnav.sensors.one_of_many import one_of_many
-from simnav.sensors.pacing import Pings
+from simnav.sensors.pings import Pings
+from simnav.sensors.single_reading import single_reading
 from simnav.spec import NonNegative, Positive, Vector, quantity
 from simnav.types import NO_SIDE, Array, TapStates
 from simnav.world.bathymetry import Bottom
@@ -182,7 +182,7 @@ def observe_all(points: NavigationPoints, sheet: Datasheet) -> tuple[Array, dict
 
 def observe(point: NavigationPoint, sheet: Datasheet) -> tuple[Array, dict[str, Array]]:
     """The range at a state and its Jacobian by block (`simnav.kinds.Observation`)."""
-    return one_of_many(observe_all, point, sheet)
+    return single_reading(observe_all, point, sheet)
 
 
 def reading_sigma(side: Array, sheet: Datasheet) -> Array:

@@ -1,4 +1,8 @@
-"""One step of the instruments and faults of many runs: the kernels of `simnav.simulation.steps`."""
+"""One step of the instruments and faults of many runs: the kernels of `simnav.simulation.steps`.
+
+The random numbers of instruments and faults depend on the times of their samples only, so those of several steps of a
+run are drawn together. Such steps are a *batch*. The kernels compute what depends on the motion.
+"""
 
 from __future__ import annotations
 
@@ -25,7 +29,7 @@ LAST, HAS_LAST, NUMBER, VALUE = 0, 3, 4, 5
 HELD = 8
 #: Number of the interval of a measurement that a layer does not affect.
 UNTOUCHED = -2
-#: What `sort_out` finds: a run with only the block form; one that is compiled, with an IMU, at the end of a stretch.
+#: What `sort_out` finds: a run with only the block form; one that is compiled, with an IMU, at the end of the batch.
 BLOCKS, COMPILED, INERTIAL, DUE = 1, 2, 4, 8
 
 
@@ -42,9 +46,9 @@ def sort_out(
     active : (b,) bool array
         True for each run that is advanced.
     runs : (b,) bool, (b,) bool, (b,) int and (b,) int arrays
-        Whether a run is compiled and has an IMU; number of its step within the stretch, and steps of the stretch.
+        Whether a run is compiled and has an IMU; number of its step within the batch, and number of steps in the batch.
     which : three (b,) bool arrays
-        Overwritten: the runs that are advanced and compiled; those of them with an IMU; those at the end of a stretch.
+        Overwritten: the runs that are advanced and compiled; those of them with an IMU; those at the end of the batch.
 
     Returns
     -------
@@ -70,7 +74,7 @@ def sort_out(
 @kernel
 def begin_step(
     compiled: FlagVector,
-    stretch: tuple[IntegerMatrix, IntegerVector],
+    drawn: tuple[IntegerMatrix, IntegerVector],
     counters: tuple[IntegerVector, IntegerVector, IntegerVector],
     limits: tuple[IntegerVector, IntegerVector, IntegerVector],
 ) -> int:
@@ -80,14 +84,14 @@ def begin_step(
     ----------
     compiled : (b,) bool array
         True for each run that is advanced.
-    stretch : (b, s + 1) int and (b,) int arrays
-        Where the times of each step begin within the stretch, and number of IMU samples in a step.
+    drawn : (b, s + 1) int and (b,) int arrays
+        Where the times of each step begin within the batch, and number of IMU samples in a step.
     counters : three (b,) int arrays
-        Number of the step within the stretch and in the run, increased; number of IMU samples in the step, overwritten.
+        Number of the step within the batch and in the run, increased; number of IMU samples in the step, overwritten.
     limits : three (b,) int arrays
-        Overwritten: number of the step within the stretch, index of its first time, and index after the last one.
+        Overwritten: number of the step within the batch, index of its first time, and index after the last one.
     """
-    edge, samples_a_step = stretch
+    edge, samples_a_step = drawn
     at, step, samples = counters
     place, first, last = limits
     most = 0
@@ -115,24 +119,24 @@ def sense_imu(
 ) -> None:
     """Add the errors and disturbances of the IMUs of b runs, for one step of each run.
 
-    The random numbers of several steps, a stretch of s samples, were drawn in advance.
+    The random numbers of several steps, a batch of s samples, were drawn in advance.
 
     Parameters
     ----------
     active : (b,) bool array
         True for each run that is advanced.
     at, samples : (b,) int arrays
-        Number of the step within the stretch, and number of samples in a step.
+        Number of the step within the batch, and number of samples in a step.
     triads : tuple of (b, 2, ...) arrays
         Gyroscopes and accelerometers: matrix and bias, as `simnav.sensors.imu.triad_errors` takes them; density of the
         white noise, range, quantization, and points a second of both tables; residual of the quantization.
     drawn : (b, 2, s, 3), (b, 2, k, 3), (b, 2, k, 3) and (b, 2, 4) int arrays
-        Variates of the samples of the stretch; tables of the in-run biases and of the random walks; length and first
+        Variates of the samples of the batch; tables of the in-run biases and of the random walks; length and first
         grid point of both tables.
     disturbances : (b, d, s) bool and (b, d, s, 6) arrays
-        True for each sample of the stretch that each of d disturbances affects, and the errors that they add.
+        True for each sample of the batch that each of d disturbances affects, and the errors that they add.
     clock : (b, 2) array
-        Number of the sample before the stretch, and number of samples in a second.
+        Number of the sample before the batch, and number of samples in a second.
     imu : tuple of (b, ...) arrays
         Times and intervals, overwritten; angular rates and specific forces: ideal samples, to which the errors are
         added.
@@ -177,15 +181,15 @@ def sense(
 ) -> None:
     """Compute the measurements of the aiding instruments of b runs, with faults, for one step of each run.
 
-    The random numbers of several steps, a stretch of s samples, were drawn in advance.
+    The random numbers of several steps, a batch of s samples, were drawn in advance.
 
     Parameters
     ----------
     active : (b,) bool array
         True for each run that is advanced.
     samples : (b,) int, (b,) int, (b, s), (b, m, 14) and (b, s) int arrays
-        For each run: index of the first sample of the step within the stretch, and index after the last one; times of
-        the samples of the stretch [s]; true states at the samples of the step; number of the instrument of each sample
+        For each run: index of the first sample of the step within the batch, and index after the last one; times of
+        the samples of the batch [s]; true states at the samples of the step; number of the instrument of each sample
         (-1: the end of a step).
     drawn : (b, s, 3), (b, s, 3), (b, s, k) int and (b, s, k, 3) arrays
         Biases and unit variates of each sample; for each of k fault layers, the number of the interval of a sample (-1:

@@ -298,11 +298,11 @@ class _Search:
             self._first = np.full(2, spec.first_search)
         self.middle, self.reach = self._begin, self._first
 
-    def move(self, way: Array, growth: float) -> None:
+    def move(self, motion: Array, growth: float) -> None:
         """Go on by dead reckoning (2,) [m], by which the areas grow."""
-        self.middle, self.reach = self.middle + way, self.reach + growth
+        self.middle, self.reach = self.middle + motion, self.reach + growth
         if not self._everywhere:
-            self._begin, self._first = self._begin + way, self._first + growth
+            self._begin, self._first = self._begin + motion, self._first + growth
 
     def fixed(self, place: Array | None) -> None:
         """What the search has found."""
@@ -374,8 +374,8 @@ class _Matcher(DerivedInstrument):
             for name, readings in ((spec.velocity, velocity), (spec.heading, heading))
         )
         length = 0.0 if track is None else track.length
-        way = np.zeros(2) if track is None else -track.place[0]
-        search.move(way, spec.search_growth * length + _UNKNOWN * blind)
+        motion = np.zeros(2) if track is None else -track.place[0]
+        search.move(motion, spec.search_growth * length + _UNKNOWN * blind)
         found = self._solved(t, grid, read, sheets, search)
         search.fixed(None if found is None else found.place)
         if found is None:

@@ -39,7 +39,7 @@ from simnav.kinds import Component, Datasheet, Kind, NavigationPoint, geodetic_c
 from simnav.recording import AidStream
 from simnav.sensors.acoustics import AcousticInstrument, AcousticSpec, paths
 from simnav.sensors.instrument import ZERO, Instrument, SigmaTriple, Triple, register_instrument
-from simnav.sensors.way import Way, check_way
+from simnav.sensors.planned_track import PlannedTrack, check_track
 from simnav.spec import NonNegative, Vector, quantity
 from simnav.types import NO_SIDE, Array, TapStates
 from simnav.world.water_column import Figures
@@ -237,7 +237,7 @@ class UsblFix(AcousticSpec):
                 f"transceiver_depth_m = {self.transceiver_depth:g}: the transceiver should be below the surface, so "
                 "the depth above 0"
             )
-        check_way(self.north, self.east, self.speed)
+        check_track(self.north, self.east, self.speed)
         return self
 
     def channels(self) -> tuple[str, ...]:
@@ -280,12 +280,12 @@ class _UsblFix(AcousticInstrument):
         super().__init__(spec, name, seed)
         self.spec = spec
         self.origin = np.array([spec.latitude, spec.longitude, -spec.transceiver_depth])
-        self.way = Way(spec.north, spec.east, spec.speed, spec.heading)
+        self.track = PlannedTrack(spec.north, spec.east, spec.speed, spec.heading)
         self._angles = self._stream("transponder", "angles")
 
     def ship(self, time: Array) -> tuple[Array, Array]:
         """(n, 3) true positions of the transceiver and (n,) headings of the ship at n times."""
-        offset, heading = self.way.at(time)
+        offset, heading = self.track.at(time)
         return displace(self.origin, np.column_stack([offset, np.zeros(len(time))])), heading
 
     def observe(self, tap: TapStates) -> Array:

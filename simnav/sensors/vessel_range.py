@@ -42,7 +42,7 @@ from simnav.recording import AidStream
 from simnav.sensors.acoustics import AcousticInstrument, AcousticSpec, Paths, paths, separation
 from simnav.sensors.instrument import ZERO, Instrument, SigmaPair, register_instrument
 from simnav.sensors.other_vessel import DeadReckoning, Navigation, SatelliteNavigation
-from simnav.sensors.way import Way, check_way
+from simnav.sensors.planned_track import PlannedTrack, check_track
 from simnav.spec import NonNegative, Positive, Vector, quantity, register_unit
 from simnav.streams import stream
 from simnav.types import Array, TapStates
@@ -232,7 +232,7 @@ class VesselRange(AcousticSpec):
                 f"depth_m = {self.depth:g}: the transducer of the other vessel should be below the surface, so the "
                 "depth above 0"
             )
-        check_way(self.north, self.east, self.speed)
+        check_track(self.north, self.east, self.speed)
         if self.repeats and len(self.north) < 2:
             raise ValueError("repeats = true: a way that is sailed again and again has two points or more")
         if self.way == "two_way" and (self.clock or self.clock_drift or self.clock_drift_noise):
@@ -287,8 +287,8 @@ class VesselRange(AcousticSpec):
         """The navigation of the other vessel in one run."""
         if self.navigation == "gnss":
             return SatelliteNavigation(self.position_noise, self.slow_error(), label, seed)
-        way = Way(self.north, self.east, self.speed, repeats=self.repeats)
-        return DeadReckoning(way, self.fixes, self.position_noise, self.drift, self.walk, label, seed)
+        track = PlannedTrack(self.north, self.east, self.speed, repeats=self.repeats)
+        return DeadReckoning(track, self.fixes, self.position_noise, self.drift, self.walk, label, seed)
 
     def build(self, name: str, seed: int) -> Instrument:
         """See `AidSpec.build`."""
@@ -313,7 +313,7 @@ class _VesselRange(AcousticInstrument):
         super().__init__(spec, name, seed)
         self.spec = spec
         self.origin = np.array([spec.latitude, spec.longitude, -spec.depth])
-        self.track = Way(spec.north, spec.east, spec.speed, repeats=spec.repeats)
+        self.track = PlannedTrack(spec.north, spec.east, spec.speed, repeats=spec.repeats)
         self.navigation = spec.navigates(f"{name}.vessel", seed)
         self._packets = stream(seed, "instrument", name, spec.vessel, "packets")
         self._messages = stream(seed, "instrument", name, spec.vessel, "messages")

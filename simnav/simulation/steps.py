@@ -1,7 +1,7 @@
 """Many runs at once, step by step: compiled passes over shared arrays advance worlds, instruments and faults.
 
 The random numbers of instruments and faults depend on the times only. They are drawn for several steps in advance (a
-stretch), by the classes of the block form (`Simulator.advance`), from the same streams, in the same order. Two kernels,
+batch), by the classes of the block form (`Simulator.advance`), from the same streams, in the same order. Two kernels,
 `simnav.world.motion.advance` and `sense`, compute all that depends on the motion, for all runs. The numbers are those
 of the block form, bit for bit.
 
@@ -40,7 +40,7 @@ from simnav.world import World, motion
 __all__ = ["SteppedRuns"]
 
 #: Number of steps that are drawn in advance the first time. The number is doubled each time.
-FIRST_STRETCH, LONGEST_STRETCH = 4, 64
+FIRST_BATCH, LONGEST_BATCH = 4, 64
 
 
 class SteppedRuns:
@@ -81,8 +81,11 @@ class SteppedRuns:
         self._packets: list[Measurements | None] = [None] * n
         self._streams: list[dict[str, AidStream]] = [{} for _ in range(n)]
         self._arrivals = [Arrivals() for _ in range(n)]
-        self._compiled, self._stretch = np.zeros(n, np.bool_), np.zeros(n, np.int64)
-        self._at, self._end = np.zeros(n, np.int64), np.zeros(n, np.int64)  # within the stretch, and its steps
+        self._compiled, self._batch = np.zeros(n, np.bool_), np.zeros(n, np.int64)
+        self._at, self._end = (
+            np.zeros(n, np.int64),
+            np.zeros(n, np.int64),
+        )  # step in the batch, and its length
         self._imu = np.zeros(n, np.bool_)
         # Of one step: see `simnav.sensors.stepwise.sort_out` and `begin_step`.
         self._which = (np.zeros(n, np.bool_), np.zeros(n, np.bool_), np.zeros(n, np.bool_))
@@ -102,7 +105,7 @@ class SteppedRuns:
         """Start a run at index b. Its simulator must be at time 0."""
         self.simulators[b] = simulator
         self.step[b] = self._at[b] = self._end[b] = self.count[b] = self.samples[b] = 0
-        self._stretch[b], self._packets[b], self._streams[b] = FIRST_STRETCH, None, {}
+        self._batch[b], self._packets[b], self._streams[b] = FIRST_BATCH, None, {}
         self._arrivals[b] = Arrivals()
         aids = simulator.aids
         self.names[b], self.kinds[b] = list(aids), [a.kind for a in aids.values()]
@@ -200,8 +203,8 @@ class SteppedRuns:
             for b in np.flatnonzero(due).tolist():
                 self._draw(b)
         place, first, last = self._limits
-        stretch = self.edge, self.samples_a_step
-        most = begin_step(compiled, stretch, (self._at, self.step, self.samples), self._limits)
+        drawn = self.edge, self.samples_a_step
+        most = begin_step(compiled, drawn, (self._at, self.step, self.samples), self._limits)
         if most > self._taps.shape[1]:
             self._taps = np.zeros((self.n, most, motion.TAP_COLUMNS))
         motion.advance(
@@ -254,11 +257,11 @@ class SteppedRuns:
         return self._streams[b]
 
     def _draw(self, b: int) -> None:
-        """Draw the random numbers of the instruments and faults of a run for the next stretch of steps."""
+        """Draw the random numbers of the instruments and faults of a run for the next batch of steps."""
         simulator = self.simulators[b]
         assert simulator is not None
-        steps, done = int(self._stretch[b]), int(self.step[b])
-        self._stretch[b] = min(2 * steps, LONGEST_STRETCH)
+        steps, done = int(self._batch[b]), int(self.step[b])
+        self._batch[b] = min(2 * steps, LONGEST_BATCH)
         self._at[b], self._end[b] = 0, steps
         ends = np.arange(done + 1, done + steps + 1) * simulator.step
         start = done * simulator.step

@@ -13,7 +13,7 @@ pytest is imported when a decorator is used, and not before: simnav itself does 
 from __future__ import annotations
 
 from simnav.testing.cost import Cost, measure
-from simnav.testing.given import EstimatorLike
+from simnav.testing.estimator_forms import EstimatorLike
 from simnav.testing.paired_time import Multiple, multiple
 from simnav.testing.parametrize import parametrize_with_checks, parametrize_with_rows
 

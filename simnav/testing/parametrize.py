@@ -7,7 +7,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 from simnav.testing.contract_check import CHECKS, Candidate, Check
-from simnav.testing.given import EstimatorLike, Factory, given, listed
+from simnav.testing.estimator_forms import EstimatorLike, Factory, factories, listed
 
 if TYPE_CHECKING:
     import pytest
@@ -123,7 +123,7 @@ def parametrize_with_checks(
     if unknown:
         raise ValueError(f"expected_failures: there is no check {unknown[0]!r}; there are {', '.join(names)}")
     cases = []
-    for label, factory in given(estimators).items():
+    for label, factory in factories(estimators).items():
         estimator = EstimatorUnderTest(label, factory)
         for check in CHECKS:
             marks = [pytest.mark.xfail(reason=expected[check.name])] if check.name in expected else []
@@ -169,7 +169,7 @@ def parametrize_with_rows(
     """
     import pytest
 
-    rows = given([*listed(estimators), *listed(beside)])
+    rows = factories([*listed(estimators), *listed(beside)])
     cases = [pytest.param(factory, id=label) for label, factory in rows.items()]
 
     def decorate(function: Callable[..., None]) -> Callable[..., None]:

@@ -27,7 +27,7 @@ from simnav.leaderboard.cli.application import app
 from simnav.leaderboard.results import store
 from simnav.leaderboard.results.errors import RequestError
 from simnav.leaderboard.results.result import Result
-from simnav.leaderboard.standard.currency import outdated
+from simnav.leaderboard.standard.outdated_results import outdated
 from simnav.scenario import load
 from simnav.scenario.scenario import Scenario
 from simnav.warmup import warmup

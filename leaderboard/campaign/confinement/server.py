@@ -51,7 +51,7 @@ from .limits import (
     use_huge_pages,
 )
 from .reachable_kernels import reachable_kernels
-from .watch import Watch
+from .resource_use import Watch
 
 __all__ = ["COPY_FROM", "main"]
 

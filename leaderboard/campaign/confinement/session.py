@@ -32,7 +32,7 @@ from .limits import why_it_died
 from .memory_group import MemoryGroup
 from .messages import LARGEST, Down, Up, command
 from .reachable_kernels import ALL
-from .watch import PROCESSES
+from .resource_use import PROCESSES
 
 if TYPE_CHECKING:
     from simnav.leaderboard.campaign.entrant import Entrant

@@ -1,4 +1,8 @@
-"""The search for conditions: each dial by itself, first on the seeds of a search, then on those of a judgement."""
+"""The search for conditions: each dial by itself, first on the seeds of a search, then on those of a judgement.
+
+A condition that a search finds is one of many that were tried, so its gain is chosen and not only measured. It is
+computed again on seeds that the search did not use, and the interval of those decides.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from simnav.leaderboard.campaign.campaign import run_campaign
-from simnav.leaderboard.campaign.suited import require_suited
+from simnav.leaderboard.campaign.suitability import require_suitable
 from simnav.leaderboard.papers.measures import value_of
 from simnav.leaderboard.results.errors import RequestError
 from simnav.leaderboard.results.store import load
@@ -94,7 +98,7 @@ def search(
     }
     base = every[0]
     for scenario, requests in _methods(every):
-        require_suited(scenario, requests)
+        require_suitable(scenario, requests)
     run = partial(_run, folder=folder, workers=workers, progress=progress)
     points: dict[tuple[str, Choice], Point] = {}
     for count in sorted({min(runs, 1), runs}) if settings else ():  # what a method lacks shows on the first seed

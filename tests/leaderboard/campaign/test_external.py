@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from simnav.estimator import make
+from simnav.leaderboard.arguments import results_of
 from simnav.leaderboard.campaign.external import add_external
 from simnav.leaderboard.campaign.seal import PUBLIC, make_key
-from simnav.leaderboard.given import results_of
 from simnav.leaderboard.logs import export, score_files
 from simnav.leaderboard.ranking.confinement import confinement_line
 from simnav.leaderboard.ranking.stored_costs import not_measured

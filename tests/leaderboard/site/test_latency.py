@@ -7,7 +7,7 @@ from typer.testing import CliRunner
 
 import simnav
 from simnav.leaderboard.campaign.request import EstimatorRequest
-from simnav.leaderboard.campaign.suited import require_suited, with_long_windows
+from simnav.leaderboard.campaign.suitability import require_suitable, with_long_windows
 from simnav.leaderboard.cli import app
 from simnav.leaderboard.ranking.runs import Runs
 from simnav.leaderboard.results.result import Result
@@ -57,7 +57,7 @@ def test_rows_that_do_not_look_back_are_named_and_windows_are_long_enough(tmp_pa
     turn, lags = load("ship-turn"), {"lags": "25"}
     window, plain = EstimatorRequest("ship-fgo", lags), EstimatorRequest("ship-ekf", lags)
     with pytest.raises(simnav.RequestError, match=r"ship-fgo\(lags=25\) on .*a lag of 25 s is longer than the window"):
-        require_suited(turn, [plain, window])
+        require_suitable(turn, [plain, window])
     longer, same = with_long_windows(turn, [window, plain])
     assert (longer.parameters, same) == ({"lags": "25", "window": 26}, plain)
-    require_suited(turn, [longer])
+    require_suitable(turn, [longer])

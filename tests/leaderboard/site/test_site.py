@@ -22,8 +22,8 @@ from simnav.leaderboard.ranking.runs import group
 from simnav.leaderboard.ranking.stored_costs import cost_of
 from simnav.leaderboard.results.errors import RequestError
 from simnav.leaderboard.results.export import SCHEMA_VERSION
-from simnav.leaderboard.results.home import Home
 from simnav.leaderboard.results.result import Result
+from simnav.leaderboard.results.web_addresses import Home
 from simnav.leaderboard.site import charts, site, sweeps
 from simnav.leaderboard.site.entries import entries
 from simnav.leaderboard.site.facts import datasheets, estimator_facts

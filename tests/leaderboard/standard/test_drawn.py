@@ -83,9 +83,9 @@ def test_results_without_series_get_those_of_their_version(home: Path) -> None:
 
 
 def test_what_is_of_another_version_is_dropped_when_it_is_kept_again(home: Path, monkeypatch) -> None:
-    from simnav.leaderboard.standard import currency
+    from simnav.leaderboard.standard import outdated_results
 
-    monkeypatch.setattr(currency, "version_of", lambda name: 9 if name == "ekf" else 1)
+    monkeypatch.setattr(outdated_results, "version_of", lambda name: 9 if name == "ekf" else 1)
     assert keep([], home / "drawn") == 2
     assert {r.estimator for r in store.load(home / "drawn" / "curves")} == {"gnss-only"}
 

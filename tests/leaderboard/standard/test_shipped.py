@@ -19,7 +19,7 @@ from simnav.leaderboard.results.result import Result
 from simnav.leaderboard.site.entries import entries
 from simnav.leaderboard.site.overview import overview
 from simnav.leaderboard.standard import history, readme
-from simnav.leaderboard.standard.currency import outdated
+from simnav.leaderboard.standard.outdated_results import outdated
 from simnav.leaderboard.standard.publication import missing
 
 ROOT = Path(__file__).parents[3]

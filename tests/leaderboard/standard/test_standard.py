@@ -24,10 +24,10 @@ from simnav.leaderboard.results import store
 from simnav.leaderboard.results.errors import RequestError
 from simnav.leaderboard.results.packing import write_packed
 from simnav.leaderboard.site.content import SiteFacts
-from simnav.leaderboard.standard import currency, history, readme
+from simnav.leaderboard.standard import history, outdated_results, readme
 from simnav.leaderboard.standard.auditing import share_found
-from simnav.leaderboard.standard.currency import outdated
 from simnav.leaderboard.standard.editions import pages_of
+from simnav.leaderboard.standard.outdated_results import outdated
 
 PROFILE = """
 title = "small"
@@ -252,14 +252,14 @@ def test_a_change_of_simulator_scenario_or_benchmark_is_said(
 ) -> None:
     folder = home / "shipped"
     with monkeypatch.context() as patch:
-        patch.setattr(currency, "SIMULATOR_VERSION", 2)
+        patch.setattr(outdated_results, "SIMULATOR_VERSION", 2)
         assert outdated(folder).scenarios == ("clean-voyages-v1",)
         assert "the simulator now has version 2: run clean-voyages-v1 with all rows" in outdated(folder).sentences()
     with monkeypatch.context() as patch:
-        patch.setattr(currency, "_is_there", lambda scenario: False)
+        patch.setattr(outdated_results, "_is_there", lambda scenario: False)
         assert outdated(folder).gone == ("clean-voyages-v1",)
     with monkeypatch.context() as patch:
-        patch.setattr(currency, "BENCHMARK", "simnav-bench 9.9")
+        patch.setattr(outdated_results, "BENCHMARK", "simnav-bench 9.9")
         assert outdated(folder).benchmark
     with pytest.raises(RequestError, match="'simnav standard run' makes one"):
         publishing.check_standard(tmp_path)

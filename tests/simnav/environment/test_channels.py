@@ -102,7 +102,7 @@ def test_closed_loop_has_the_same_slots(scenario):
         if k == 5:  # a copy goes on by itself
             again = copy.deepcopy(loop)
             again.step(action)
-            assert np.array_equal(loop._stretch.columns["beacons"]["side"][4], observation["beacons"]["side"])
+            assert np.array_equal(loop._observed.columns["beacons"]["side"][4], observation["beacons"]["side"])
         observation, _, _, over, _ = loop.step(action)
     assert k == round(20.0 / scenario.step)
 

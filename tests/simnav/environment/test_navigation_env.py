@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 import simnav
 from simnav.environment import EstimatorAgent, NavigationEnv, unpack
 from simnav.environment import navigation as environment
-from simnav.environment.stretch import pack
+from simnav.environment.observed_steps import pack
 from simnav.estimator import Estimator, make
 from simnav.geometry.earth import displace
 from simnav.log import LogError
@@ -144,10 +144,10 @@ def test_an_observation_holds_the_packet_of_its_step_whatever_the_timing(imu, fi
         [Datasheet("b", "gnss_position", 30.0, np.ones(3)), Datasheet("a", "gyrocompass", 30.0, np.ones(1))],
         imu=ImuDatasheet(30.0, TriadDatasheet(), TriadDatasheet()),
     )
-    stretch = pack(block, 0.0, {"imu": 30, "a": 30, "b": 30})
+    observed = pack(block, 0.0, {"imu": 30, "a": 30, "b": 30})
     for i, packet in enumerate(packets(block, ends)):
-        observation = {"interval": stretch.intervals[i]}
-        observation |= {name: {k: v[i] for k, v in columns.items()} for name, columns in stretch.columns.items()}
+        observation = {"interval": observed.intervals[i]}
+        observation |= {name: {k: v[i] for k, v in columns.items()} for name, columns in observed.columns.items()}
         assert_packets_equal(unpack(observation, sheets), packet)
         for entry in (observation["imu"], observation["a"], observation["b"]):
             for array in entry.values():
@@ -533,5 +533,5 @@ def test_memory_does_not_grow_with_the_run(scenario):
         after, _ = tracemalloc.get_traced_memory()
     finally:
         tracemalloc.stop()
-    # one stretch more or less may be alive; 10,000 steps of this scenario are 50 MB
+    # one batch of steps more or less may be alive; 10,000 steps of this scenario are 50 MB
     assert after - before < 2e6

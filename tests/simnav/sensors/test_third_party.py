@@ -11,7 +11,7 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 
 from simnav.environment import NavigationEnv
-from simnav.environment.stretch import pack
+from simnav.environment.observed_steps import pack
 from simnav.geometry.earth import displace, relative_position
 from simnav.kinds import Component, Kind
 from simnav.plugins import PluginError, load_plugin
@@ -220,8 +220,8 @@ def test_a_chart_shows_fixes_by_latitude_and_longitude_only(plugins, tmp_path):
     env.reset(seed=1)
     env.step(env.action_space.sample())
     block = open_source(load(tmp_path / "lagoon.toml"), 1).advance(5.0)
-    stretch = pack(block, 0.0, {"imu": 50, "depth": 1, "transponder": 1})
-    assert not any(list(stretch.fixes(i)) for i in range(5))
+    observed = pack(block, 0.0, {"imu": 50, "depth": 1, "transponder": 1})
+    assert not any(list(observed.fixes(i)) for i in range(5))
     assert env.render().ndim == 3
 
 

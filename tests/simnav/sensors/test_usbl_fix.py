@@ -208,7 +208,7 @@ def test_an_ideal_device_has_no_error() -> None:
         ({"assumed_speed_m_s": 0.0}, "assumed_speed_m_s = 0"),
         ({"transceiver_depth_m": -2.0}, "transceiver_depth_m = -2: the transceiver should be below the surface"),
         ({"north_m": [0.0, 1.0], "speed_m_s": 1.0}, "north_m has 2 numbers and east_m 1"),
-        ({"north_m": [0.0, 1.0], "east_m": [0.0, 1.0]}, "speed_m_s = 0: a ship with a way"),
+        ({"north_m": [0.0, 1.0], "east_m": [0.0, 1.0]}, "speed_m_s = 0: a ship with a track"),
         ({"north_m": [0.0, 0.0], "east_m": [1.0, 1.0], "speed_m_s": 1.0}, "are the same"),
         ({"grade": "perfect"}, "grade"),
         ({"reach_m": float("inf")}, "reach_m = inf"),

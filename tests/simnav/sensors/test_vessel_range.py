@@ -14,8 +14,8 @@ from simnav.kinds import NavigationPoint
 from simnav.recording import AidStream
 from simnav.sensors import VesselRange
 from simnav.sensors.channels import ChannelInstrument
+from simnav.sensors.planned_track import PlannedTrack
 from simnav.sensors.vessel_range import message_noise, observe
-from simnav.sensors.way import Way
 from simnav.spec import SpecError
 from simnav.types import Array, TapStates
 from simnav.world.surroundings import Surroundings
@@ -43,7 +43,7 @@ def device(seed: int = 1, **table: Any) -> ChannelInstrument:
     return made
 
 
-def errors_of(stream: AidStream, track: Way, age: Array | float = 0.0) -> Array:
+def errors_of(stream: AidStream, track: PlannedTrack, age: Array | float = 0.0) -> Array:
     """(n, 2) errors of the positions in the messages."""
     offset, _ = track.at(stream.time - age)
     true = displace(ORIGIN - np.array([0.0, 0.0, 50.0]), np.column_stack([offset, np.zeros(len(offset))]))
@@ -100,7 +100,7 @@ def test_the_noise_of_a_message_is_its_covariance_along_the_line_of_sight() -> N
 
 
 def test_the_sound_takes_its_time() -> None:
-    track = Way([0.0, 6000.0], [100.0, 100.0], 3.0)
+    track = PlannedTrack([0.0, 6000.0], [100.0, 100.0], 3.0)
     one, two = (device(**SAILING, **QUIET, way=way).sense(taps(60, step=10.0)) for way in ("one_way", "two_way"))
     np.testing.assert_array_equal(one.arrivals, one.time)
     np.testing.assert_allclose(two.arrivals - two.time, two.value[:, 0] / 1500.0, rtol=1e-9)
@@ -118,7 +118,7 @@ def test_the_error_of_a_ship_is_common_to_its_messages() -> None:
     table = {"position_noise_m": 0.5, "wander_m": 3.0, "wander_time_s": 200.0, "repeats": True, "way": "one_way"}
     lies = {"north_m": [300.0, 301.0], "east_m": [0.0, 0.0], "speed_m_s": 1e-9}
     stream = device(7, **table, **lies).sense(taps(2500, step=10.0))
-    error = errors_of(stream, Way([300.0], [0.0], 0.0))
+    error = errors_of(stream, PlannedTrack([300.0], [0.0], 0.0))
     np.testing.assert_allclose(error.std(axis=0), np.hypot(3.0, 0.5), rtol=0.2)
     np.testing.assert_allclose(stream.side[:, 6:8], np.hypot(3.0, 0.5))
     for lag in (1, 10, 30):
@@ -134,7 +134,7 @@ def test_the_drift_of_a_second_auv_grows_with_its_way_until_it_gets_a_fix() -> N
         "navigation": "dead_reckoning", "position_noise_m": 0.3, "drift_percent": [0.3, 0.9], "walk_m_sqrt_s": 0.02,
         "fixes_s": [900.0], "way": "one_way", "vessel": "auv-2",
     } | SAILING  # fmt: skip
-    track = Way([0.0, 6000.0], [100.0, 100.0], 3.0)
+    track = PlannedTrack([0.0, 6000.0], [100.0, 100.0], 3.0)
     seeds, at = range(60), [0, 6, 8, 10, 14]
     found, sheet = [], np.empty(0)
     for seed in seeds:
@@ -179,7 +179,7 @@ def test_an_ideal_modem_has_no_error() -> None:
     table = {"wander_m": 2.0, "clock_s": 0.1, "way": "one_way", "sound_speed_percent": 1.0, "correction": "fixed"}
     stream = VesselRange.from_toml(SHIP | table).ideal().install("modem", 1, Surroundings()).sense(taps(3))
     np.testing.assert_allclose(stream.value, 300.0, atol=1e-3)
-    np.testing.assert_allclose(errors_of(stream, Way([300.0], [0.0], 0.0)), 0.0, atol=1e-6)
+    np.testing.assert_allclose(errors_of(stream, PlannedTrack([300.0], [0.0], 0.0)), 0.0, atol=1e-6)
     assert not stream.side[:, 6:].any()
 
 
@@ -188,7 +188,7 @@ def test_an_ideal_modem_has_no_error() -> None:
     [
         ({"depth_m": -2.0}, "depth_m = -2: the transducer of the other vessel should be below the surface"),
         ({"east_m": [0.0, 1.0]}, "north_m has 1 numbers and east_m 2"),
-        ({"north_m": [0.0, 1.0], "east_m": [0.0, 1.0]}, "speed_m_s = 0: a ship with a way"),
+        ({"north_m": [0.0, 1.0], "east_m": [0.0, 1.0]}, "speed_m_s = 0: a ship with a track"),
         ({"repeats": True}, "repeats = true: a way that is sailed again and again has two points or more"),
         ({"clock_s": 0.1}, "way = 'two_way': a two-way travel time is measured by one clock"),
         ({"drift_percent": 0.5}, "drift_percent: a vessel with navigation = 'gnss' has none"),

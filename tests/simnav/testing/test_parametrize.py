@@ -12,7 +12,7 @@ import pytest
 
 from simnav.testing import parametrize_with_checks, parametrize_with_rows
 from simnav.testing.contract_check import CHECKS
-from simnav.testing.given import given
+from simnav.testing.estimator_forms import factories
 
 MODULE = '''
 import numpy as np
@@ -197,8 +197,8 @@ def test_what_may_be_given():
         raise AssertionError("nothing is made while tests are collected")
 
     labels = list(
-        given([mine, "my_filter.py:MyFilter", Path("a") / "b.py", ("ekf", {"calibrate": False}), "ekf", mine])
+        factories([mine, "my_filter.py:MyFilter", Path("a") / "b.py", ("ekf", {"calibrate": False}), "ekf", mine])
     )
     assert labels == ["mine", "my_filter:MyFilter", "b", "ekf(calibrate=False)", "ekf", "mine-2"]
-    assert given("gnss-only")["gnss-only"]().name == "gnss-only"
-    assert given(("gnss-only", {"acceleration": 0.5}))["gnss-only(acceleration=0.5)"]().name == "gnss-only"
+    assert factories("gnss-only")["gnss-only"]().name == "gnss-only"
+    assert factories(("gnss-only", {"acceleration": 0.5}))["gnss-only(acceleration=0.5)"]().name == "gnss-only"

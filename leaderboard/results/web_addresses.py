@@ -1,4 +1,4 @@
-"""Where simnav is at home: the web addresses of its repository and of its documentation, as far as they are known.
+"""The web addresses of the repository and of the documentation of simnav, as far as they are known.
 
 The metadata of the package name them (``[project.urls]``). In a checkout without them, the address is that of its
 remote ``origin``, if it is one on the web; a path on this machine is nobody else's address.

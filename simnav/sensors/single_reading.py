@@ -7,10 +7,12 @@ import numpy as np
 from simnav.kinds import Datasheet, NavigationPoint, NavigationPoints, Observations
 from simnav.types import Array
 
-__all__ = ["one_of_many"]
+__all__ = ["single_reading"]
 
 
-def one_of_many(observations: Observations, point: NavigationPoint, sheet: Datasheet) -> tuple[Array, dict[str, Array]]:
+def single_reading(
+    observations: Observations, point: NavigationPoint, sheet: Datasheet
+) -> tuple[Array, dict[str, Array]]:
     """What an equation for many readings gives for one: an `Observation` by way of `Observations`.
 
     Parameters

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from simnav.leaderboard.printed import LINES, first_lines
+from simnav.leaderboard.estimator_output import LINES, first_lines
 
 
 def lines(count: int, more: str = "") -> None:

@@ -10,7 +10,7 @@ from typing import Any, TypeAlias
 
 from simnav.estimator import Estimator, make
 
-__all__ = ["EstimatorLike", "Factory", "factory_of", "given", "label_of", "listed"]
+__all__ = ["EstimatorLike", "Factory", "factories", "factory_of", "label_of", "listed"]
 
 Factory: TypeAlias = Callable[[], Estimator]
 #: A class or function, a registered name, a path (``my.py``, ``my.py:MyFilter``), or one of these with parameters.
@@ -19,7 +19,7 @@ EstimatorLike: TypeAlias = (
 )
 
 
-def given(estimators: EstimatorLike | Iterable[EstimatorLike]) -> dict[str, Factory]:
+def factories(estimators: EstimatorLike | Iterable[EstimatorLike]) -> dict[str, Factory]:
     """Functions that make each estimator, by label.
 
     Parameters
@@ -39,7 +39,7 @@ def given(estimators: EstimatorLike | Iterable[EstimatorLike]) -> dict[str, Fact
 
     Examples
     --------
-    >>> list(given(["ekf", ("ekf", {"calibrate": False}), "ekf"]))
+    >>> list(factories(["ekf", ("ekf", {"calibrate": False}), "ekf"]))
     ['ekf', 'ekf(calibrate=False)', 'ekf-2']
     """
     items = listed(estimators)

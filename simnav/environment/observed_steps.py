@@ -20,11 +20,11 @@ if TYPE_CHECKING:
     from simnav.recording import AidStream, Block
     from simnav.simulation.steps import SteppedRuns
 
-__all__ = ["LiveStretch", "Stretch", "crowded", "entries", "horizontal", "keep", "pack", "padded", "rows_of"]
+__all__ = ["ClosedLoopSteps", "ObservedSteps", "crowded", "entries", "horizontal", "keep", "pack", "padded", "rows_of"]
 
 
 @dataclass(eq=False)
-class Stretch:
+class ObservedSteps:
     """S steps of a run as padded arrays; each row is one observation.
 
     Attributes
@@ -173,8 +173,8 @@ def entries(samples: Any, aids: Any, widths: Sequence[tuple[str, int, int]]) -> 
     return columns
 
 
-class LiveStretch(Stretch):
-    """A stretch whose steps are simulated one by one, for a vessel in closed loop.
+class ClosedLoopSteps(ObservedSteps):
+    """Steps that are simulated one by one, for a vessel in closed loop.
 
     Parameters
     ----------
@@ -265,7 +265,7 @@ class LiveStretch(Stretch):
                     entry["side"][i, slots] = stream.side
 
     def fixes(self, i: int) -> Iterator[tuple[Array, NDArray[np.bool_]]]:
-        """See `Stretch.fixes`. It works for the last simulated step only."""
+        """See `ObservedSteps.fixes`. It works for the last simulated step only."""
         runs, b = self._runs, self._b
         for j, who in enumerate(runs.who[b, : runs.count[b]].tolist()):
             if _draws(runs.kinds[b][who]):
@@ -323,7 +323,7 @@ def _too_many(name: str, count: int, most: int, time: float) -> ValueError:
     )
 
 
-def pack(block: Block, begin: float, most: Mapping[str, int]) -> Stretch:
+def pack(block: Block, begin: float, most: Mapping[str, int]) -> ObservedSteps:
     """Sort the data of a block into its steps, the first of which begins at ``begin``."""
     truth, n = block.truth, len(block.truth)
     edges = truth.time + TIME_TOLERANCE
@@ -371,7 +371,7 @@ def pack(block: Block, begin: float, most: Mapping[str, int]) -> Stretch:
             out[where] = a[: cut[-1]]
     intervals = np.stack([np.concatenate(([begin], truth.time[:-1])), truth.time], axis=1)
     states = np.stack([truth.position, truth.velocity, truth.attitude], axis=1)
-    return Stretch(intervals, columns, states, rows_of(truth.position, truth.attitude), aids, cuts)
+    return ObservedSteps(intervals, columns, states, rows_of(truth.position, truth.attitude), aids, cuts)
 
 
 @kernel

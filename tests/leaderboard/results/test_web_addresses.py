@@ -6,10 +6,10 @@ import subprocess
 
 import pytest
 
-from simnav.leaderboard.results import home as module
+from simnav.leaderboard.results import web_addresses as module
 from simnav.leaderboard.results.citation import citation
 from simnav.leaderboard.results.errors import RequestError
-from simnav.leaderboard.results.home import Home, linked_from, web_address
+from simnav.leaderboard.results.web_addresses import Home, linked_from, web_address
 
 
 @pytest.mark.parametrize(

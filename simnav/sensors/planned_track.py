@@ -1,4 +1,4 @@
-"""The way of another vessel: straight legs at constant speed."""
+"""The planned track of another vessel: straight legs at constant speed."""
 
 from __future__ import annotations
 
@@ -8,24 +8,24 @@ import numpy as np
 
 from simnav.types import Array
 
-__all__ = ["Way", "check_way"]
+__all__ = ["PlannedTrack", "check_track"]
 
 
-def check_way(north: Sequence[float], east: Sequence[float], speed: float) -> None:
-    """ValueError, a sentence, where points [m] and speed [m/s] are no way."""
+def check_track(north: Sequence[float], east: Sequence[float], speed: float) -> None:
+    """ValueError, a sentence, where points [m] and speed [m/s] are no track."""
     if not len(north) == len(east) > 0:
         raise ValueError(
-            f"north_m has {len(north)} numbers and east_m {len(east)}; each point of the way has one of each"
+            f"north_m has {len(north)} numbers and east_m {len(east)}; each point of the track has one of each"
         )
     if len(north) > 1 and not speed:
-        raise ValueError("speed_m_s = 0: a ship with a way of several points needs a speed")
+        raise ValueError("speed_m_s = 0: a ship with a track of several points needs a speed")
     steps = np.hypot(np.diff(north), np.diff(east))
     if (steps == 0.0).any():
-        raise ValueError("north_m and east_m: two points of the way that follow each other are the same")
+        raise ValueError("north_m and east_m: two points of the track that follow each other are the same")
 
 
-class Way:
-    """A way from the first point to the last one, where the vessel stops, or from there to the first one again.
+class PlannedTrack:
+    """A track from the first point to the last one, where the vessel stops, or from there to the first one again.
 
     Parameters
     ----------
@@ -40,7 +40,7 @@ class Way:
 
     Examples
     --------
-    >>> offset, course = Way([0.0, 30.0], [0.0, 0.0], 2.0, repeats=True).at(np.array([5.0, 20.0]))
+    >>> offset, course = PlannedTrack([0.0, 30.0], [0.0, 0.0], 2.0, repeats=True).at(np.array([5.0, 20.0]))
     >>> offset[:, 0].tolist(), np.degrees(course).tolist()
     ([10.0, 20.0], [0.0, 180.0])
     """

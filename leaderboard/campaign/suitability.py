@@ -18,10 +18,10 @@ if TYPE_CHECKING:
 
     from .request import EstimatorRequest
 
-__all__ = ["require_suited", "with_long_windows"]
+__all__ = ["require_suitable", "with_long_windows"]
 
 
-def require_suited(scenario: Scenario, asked: Iterable[EstimatorRequest], *, lags_only: bool = False) -> None:
+def require_suitable(scenario: Scenario, asked: Iterable[EstimatorRequest], *, lags_only: bool = False) -> None:
     """Refuse estimators that cannot run on a scenario.
 
     Parameters
