@@ -43,12 +43,12 @@ def claim(request: ClaimRequest) -> Answer:
     'mao-sigma-east'
     """
     from simnav.leaderboard.papers.claims import stored
-    from simnav.leaderboard.papers.claims.declared import CLAIMS, claim_of
+    from simnav.leaderboard.papers.claims.declared import claim_of, claims
     from simnav.leaderboard.papers.claims.search import search
 
     if not request.claim:
         raise RequestError("no claim was named; 'simnav claim' lists those of the papers")
-    known = request.claim in {c.name for c in CLAIMS}
+    known = request.claim in {c.name for c in claims()}
     mine = (request.than, request.scenario, request.gain)
     if known and mine != (None, None, None):
         raise RequestError(f"{request.claim} is a paper's claim; 'than', 'scenario' and 'gain' are for one of your own")

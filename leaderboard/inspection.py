@@ -269,8 +269,7 @@ def reproduce(request: ReproduceRequest) -> Reproduction:
     """
     from simnav.leaderboard.papers.reproduction import reproduce
 
-    from .papers import paper as papers
-    from .papers import sequential
+    from .papers import reading, sequential
     from .papers import stored as shipped
 
     if request.holds_if and (request.methods or request.until_decided or request.stored):
@@ -281,7 +280,7 @@ def reproduce(request: ReproduceRequest) -> Reproduction:
     if request.until_decided and request.runs is not None:
         raise RequestError("'until_decided' chooses the number of runs itself: give 'limit' in place of 'runs'")
     with mistakes(ValueError):
-        chosen = papers.paper_of(str(request.paper))
+        chosen = reading.paper_of(str(request.paper))
         if request.methods:
             names = request.methods.split(",") if isinstance(request.methods, str) else request.methods
             chosen = chosen.only([name.strip() for name in names])

@@ -2,21 +2,12 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import TYPE_CHECKING
-
-import numpy as np
-
 from simnav.leaderboard.figures.style import save_as
 from simnav.leaderboard.inspection import allan
-from simnav.leaderboard.results.errors import mistakes
 
 from .commands import AllanCommand
 from .console import Output
-from .options import absolute, require_figure
-
-if TYPE_CHECKING:
-    from simnav.leaderboard.allan import AllanReport
+from .options import absolute, require_figure, write_columns
 
 __all__ = ["show"]
 
@@ -26,7 +17,7 @@ def show(out: Output, request: AllanCommand) -> None:
     require_figure("--plot", request.plot)
     report = allan.of(request)
     drawn = None if request.plot is None else save_as(report.plot(), absolute(request.plot))
-    written = None if request.csv is None else _write(report, absolute(request.csv))
+    written = None if request.csv is None else write_columns(report.columns(), absolute(request.csv))
     files = {"plot": None if drawn is None else str(drawn), "csv": None if written is None else str(written)}
     out.document({**report.to_dict(), **files})
     out.print(*report.shown())
@@ -34,13 +25,3 @@ def show(out: Output, request: AllanCommand) -> None:
     for name, file in files.items():
         if file is not None:
             out.print(f"{'figure' if name == 'plot' else 'table'}: {file}")
-
-
-def _write(report: AllanReport, path: Path) -> Path:
-    """All averaging times as CSV."""
-    columns = report.columns()
-    with mistakes(OSError):
-        path.parent.mkdir(parents=True, exist_ok=True)
-        values = np.column_stack(list(columns.values()))
-        np.savetxt(path, values, delimiter=",", header=",".join(columns), comments="", fmt="%.9g")
-    return path

@@ -8,7 +8,7 @@ from simnav.leaderboard.claiming import claim
 from simnav.leaderboard.figures.style import save_as
 from simnav.leaderboard.papers import ALIASES, PAPERS, key_of
 from simnav.leaderboard.papers.claims import stored
-from simnav.leaderboard.papers.claims.declared import CLAIMS
+from simnav.leaderboard.papers.claims.declared import claims
 from simnav.leaderboard.papers.claims.points import gain_text
 from simnav.leaderboard.ranking import tables
 from simnav.leaderboard.results.errors import mistakes
@@ -57,7 +57,7 @@ def show(out: Output, request: ClaimCommand) -> None:
 def _list(out: Output, paper: str) -> None:
     """All claims of the papers, or of one, with their stored answers."""
     rows, found = [], []
-    for each in CLAIMS:
+    for each in claims():
         if paper and each.paper != paper:
             continue
         with mistakes(ValueError):

@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from simnav.leaderboard.results.errors import RequestError
+from simnav.leaderboard.results.errors import RequestError, mistakes
 
 if TYPE_CHECKING:
     from simnav.leaderboard.campaign.campaign import Progress
 
     from .console import ProgressBar
 
-__all__ = ["absolute", "campaign_progress", "require_figure"]
+__all__ = ["absolute", "campaign_progress", "require_figure", "write_columns"]
 
 
 def absolute(path: str | os.PathLike[str]) -> Path:
@@ -36,3 +36,14 @@ def campaign_progress(bar: ProgressBar, running: str = "running") -> Callable[[P
         bar(p.done, p.total, f"{p.failed} failed, {p.note}" if p.failed else p.note, p.left)
 
     return show
+
+
+def write_columns(columns: Mapping[str, Any], path: Path) -> Path:
+    """Write columns of numbers as CSV, with their names in the first line; returns the path."""
+    import numpy as np
+
+    with mistakes(OSError):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        values = np.column_stack(list(columns.values()))
+        np.savetxt(path, values, delimiter=",", header=",".join(columns), comments="", fmt="%.9g")
+    return path

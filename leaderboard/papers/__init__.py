@@ -1,7 +1,9 @@
-"""The comparisons of five papers, repeated: ``simnav reproduce PAPER`` puts our figures beside the paper's, row by row.
+"""The comparisons of papers, repeated: ``simnav reproduce PAPER`` puts our figures beside the paper's, row by row.
+
+A paper is one TOML file of this folder, or a file of one's own: ``simnav reproduce my_paper.toml``.
 
 - `paper`: the description of a paper: citation, methods, tables of figures and claims, and its drawings.
-- `guo_2026`, `mao_2025`, `jiang_2026`, `zhan_2026`, `auv_smoothing_2022`: the five papers.
+- `paper_file`: the keys of the file of a paper; `reading`: from the file to the paper.
 - `comparison`: the rule by which a row agrees, differs or is undecided.
 - `measures`: the quantities that are compared: named scores and computing cost.
 - `reproduction`: finds the methods among the registered estimators, runs them and fills the rows.
@@ -16,18 +18,28 @@ If no registered estimator stands for a method, its row says so.
 from __future__ import annotations
 
 from difflib import get_close_matches
+from pathlib import Path
 
-__all__ = ["ALIASES", "PAPERS", "key_of"]
+__all__ = ["ALIASES", "FOLDER", "PAPERS", "key_of"]
 
-#: Key of each paper, which is also the name of its module.
-PAPERS: tuple[str, ...] = ("guo-2026", "mao-2025", "jiang-2026", "zhan-2026", "auv-smoothing-2022")
+#: Where the files of the papers are.
+FOLDER = Path(__file__).parent
 
-#: Older names of the papers on the command line.
-ALIASES: dict[str, str] = dict(zip(("000", "001", "002", "003", "004"), PAPERS, strict=True))
+#: Older names of papers on the command line.
+ALIASES: dict[str, str] = {
+    "000": "guo-2026",
+    "001": "mao-2025",
+    "002": "jiang-2026",
+    "003": "zhan-2026",
+    "004": "auv-smoothing-2022",
+}
+
+#: Key of each paper, which is the name of its file: those with an older name first.
+PAPERS: tuple[str, ...] = tuple(dict.fromkeys([*ALIASES.values(), *sorted(f.stem for f in FOLDER.glob("*.toml"))]))
 
 
 def key_of(name: str) -> str:
-    """The key of a paper from its key or its alias.
+    """The key of a paper from its key or its alias; the path of a file, which ends in ``.toml``, stays.
 
     Raises
     ------
@@ -40,7 +52,7 @@ def key_of(name: str) -> str:
     ('guo-2026', 'zhan-2026')
     """
     key = ALIASES.get(name, name)
-    if key not in PAPERS:
+    if key not in PAPERS and not key.endswith(".toml"):
         near = get_close_matches(name, PAPERS, n=1)
         hint = f" Did you mean {near[0]!r}?" if near else ""
         raise ValueError(f"there is no paper {name!r}; there are {', '.join(PAPERS)}.{hint}")

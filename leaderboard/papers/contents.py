@@ -40,7 +40,7 @@ def contents(paper: Paper) -> list[Item]:
 
     Examples
     --------
-    >>> from simnav.leaderboard.papers.paper import paper_of
+    >>> from simnav.leaderboard.papers.reading import paper_of
     >>> [i.number for i in contents(paper_of("mao-2025"))][:3]
     ['Table 1', 'Table 2', 'Table 3']
     """

@@ -13,8 +13,7 @@ from pathlib import Path
 
 from simnav.leaderboard.results.provenance import Provenance
 
-from . import PAPERS
-from . import paper as papers
+from . import PAPERS, reading
 from .claims.section import claim_count, claim_figures, claim_sheets
 from .claims.stored import answers_of, computed_on
 from .contents import contents
@@ -33,7 +32,7 @@ FOLDER = Path(__file__).resolve().parents[2] / "docs" / "papers"
 
 def update(folder: Path = FOLDER) -> None:
     """Write the marked blocks of all pages."""
-    pages = {f"{key}.md": blocks(papers.paper_of(key)) for key in PAPERS} | {"index.md": {"overview": overview()}}
+    pages = {f"{key}.md": blocks(reading.paper_of(key)) for key in PAPERS} | {"index.md": {"overview": overview()}}
     for name, texts in pages.items():
         path = folder / name
         path.write_text(replaced(path.read_text(encoding="utf-8"), texts), encoding="utf-8")
@@ -46,7 +45,7 @@ def draw(folder: Path = FOLDER) -> None:
         place.mkdir(parents=True, exist_ok=True)
         for old in place.glob("*.png"):
             old.unlink()
-        for drawn in _figures(shipped_reproduction(papers.paper_of(key)), place):
+        for drawn in _figures(shipped_reproduction(reading.paper_of(key)), place):
             assert drawn.path is not None
             _shrink(drawn.path)
         for figure in claim_figures(answers_of(key), place):
@@ -151,7 +150,7 @@ def overview() -> str:
     titles = ("paper", "comparison", "claims", *KINDS_OF_ROWS.values(), "a single run of ours")
     lines = [_line(titles), _line(("---",) * len(titles))]
     for key in PAPERS:
-        paper = papers.paper_of(key)
+        paper = reading.paper_of(key)
         found = shipped_reproduction(paper)
         counts = (verdicts(found, kind) or "none" for kind in KINDS_OF_ROWS)
         inside, known = found.single_runs
@@ -183,7 +182,7 @@ def _store(folder: Path) -> None:
     for key in PAPERS:
         if not (folder / key / "results").is_dir():
             continue
-        paper = papers.paper_of(key)
+        paper = reading.paper_of(key)
         stands_for = {m.name: find_method(m) for m in paper.methods}
         results = load_results(paper, stands_for, folder / key / "results", range(LIMIT))
         path = add(paper, results)

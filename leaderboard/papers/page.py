@@ -176,10 +176,10 @@ def _written(place: Path, key: str) -> PaperPage | None:
 
 def _stored(folder: Path, key: str) -> PaperPage | None:
     """The page from the stored results; None if there are none."""
-    from . import paper, stored
+    from . import reading, stored
 
     try:
-        found = stored.shipped_reproduction(paper.paper_of(key))
+        found = stored.shipped_reproduction(reading.paper_of(key))
         return PaperPage(_document(found, []), folder, found)
     except ValueError:
         return None
@@ -223,10 +223,10 @@ def _state() -> str:
 
 def _draw(key: str) -> tuple[_Document, dict[str, bytes]]:
     """The page from the stored results with its figures, by name."""
-    from . import paper, stored
+    from . import reading, stored
     from .figures import write_figures
 
-    found = stored.shipped_reproduction(paper.paper_of(key))
+    found = stored.shipped_reproduction(reading.paper_of(key))
     with TemporaryDirectory() as folder:
         place = Path(folder)
         document = _document(found, write_figures(found, place, scores_only=True), place)

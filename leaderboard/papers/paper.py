@@ -3,24 +3,21 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from importlib import import_module
-from typing import Literal
+from typing import Any, Literal
+
+from pydantic import Field
 
 from simnav.scenario import Scenario
 from simnav.scenario import load as load_scenario
+from simnav.spec import Spec
 
-from . import key_of
 from .settings import PaperSetting
 
 __all__ = [
-    "ATTITUDE",
-    "HORIZONTAL",
-    "HORIZONTAL_VELOCITY",
+    "ERROR_LABELS",
     "KINDS_OF_ROWS",
-    "POSITION",
-    "VELOCITY",
     "Draw",
     "Figure",
     "Gain",
@@ -32,8 +29,8 @@ __all__ = [
     "Rule",
     "Table",
     "Value",
+    "Variant",
     "kind_of",
-    "paper_of",
 ]
 
 #: A figure, or the lower and upper end of a range that a paper gives.
@@ -48,18 +45,21 @@ Rule = Literal["equal", "at-most", "at-least", "beside"]
 Draw = Literal["track", "run", "spread", "bars", "gains", "distribution", "ratios"]
 
 
-# Panels of figures of one run.
-HORIZONTAL: Mapping[str, str] = {"North error [m]": "north", "East error [m]": "east"}
-POSITION: Mapping[str, str] = {**HORIZONTAL, "Down error [m]": "down"}
-HORIZONTAL_VELOCITY: Mapping[str, str] = {
-    "North velocity error [m/s]": "velocity_north",
-    "East velocity error [m/s]": "velocity_east",
-}
-VELOCITY: Mapping[str, str] = {**HORIZONTAL_VELOCITY, "Down velocity error [m/s]": "velocity_down"}
-ATTITUDE: Mapping[str, str] = {
-    "Tilt about north [deg]": "tilt_north",
-    "Tilt about east [deg]": "tilt_east",
-    "Heading error [deg]": "heading",
+#: Panels of errors over time: error of a run -> label, with its unit.
+ERROR_LABELS: Mapping[str, str] = {
+    "north": "North error [m]",
+    "east": "East error [m]",
+    "down": "Down error [m]",
+    "velocity_north": "North velocity error [m/s]",
+    "velocity_east": "East velocity error [m/s]",
+    "velocity_down": "Down velocity error [m/s]",
+    "tilt_north": "Tilt about north [deg]",
+    "tilt_east": "Tilt about east [deg]",
+    "heading": "Heading error [deg]",
+    "horizontal": "Horizontal error [m]",
+    "position": "Position error [m]",
+    "velocity": "Velocity error [m/s]",
+    "attitude": "Attitude error [deg]",
 }
 
 
@@ -238,13 +238,38 @@ class Figure:
         return words[:_LONGEST_NAME].rstrip("-")
 
 
-@dataclass(frozen=True)
-class NotShown:
+class NotShown(Spec):
     """A table or figure of a paper that a simulation cannot show, and why."""
 
     number: str
     what: str
     why: str
+
+
+class Variant(Spec):
+    """Another reading of a scenario of the catalogue.
+
+    Attributes
+    ----------
+    of : str
+        The scenario of the catalogue.
+    without : tuple of str
+        Kinds of faults that are taken out of it.
+    keys : mapping
+        Keys of the scenario's file, like ``fault[0].sigma_m``, with other values. Faults are counted without those that
+        were taken out.
+    """
+
+    of: str
+    without: tuple[str, ...] = ()
+    keys: dict[str, Any] = Field(default_factory=dict)
+
+    def scenario(self, name: str) -> Scenario:
+        """The variant, as a scenario of this name."""
+        base = load_scenario(self.of)
+        if self.without:
+            base = base.model_copy(update={"faults": tuple(f for f in base.faults if f.kind not in self.without)})
+        return base.with_values({"name": name, **self.keys})
 
 
 @dataclass(frozen=True)
@@ -283,8 +308,8 @@ class Paper:
         What the reader has to know of the comparison.
     settings : tuple of PaperSetting
         The settings of the comparison, each with what the paper says of it.
-    variants : mapping of str to (str, callable)
-        Other readings of a scenario: name -> scenario of the catalogue, and what makes the variant of it.
+    variants : mapping of str to Variant
+        Other readings of a scenario, by their names.
     """
 
     key: str
@@ -302,7 +327,7 @@ class Paper:
     not_shown: tuple[NotShown, ...] = ()
     notes: tuple[str, ...] = ()
     settings: tuple[PaperSetting, ...] = ()
-    variants: Mapping[str, tuple[str, Callable[[Scenario], Scenario]]] = field(default_factory=dict)
+    variants: Mapping[str, Variant] = field(default_factory=dict)
 
     @property
     def citation(self) -> str:
@@ -345,8 +370,7 @@ class Paper:
     def scenario(self, name: str) -> Scenario:
         """A scenario of the catalogue, or a variant of one."""
         if name in self.variants:
-            base, change = self.variants[name]
-            return change(load_scenario(base)).model_copy(update={"name": name})
+            return self.variants[name].scenario(name)
         return load_scenario(name)
 
     def participants(self) -> dict[str, list[str]]:
@@ -360,17 +384,3 @@ class Paper:
             if figure.draw not in ("run", "track"):  # those are of one run, which is made for them
                 wanted.setdefault(figure.scenario, set()).update(figure.methods)
         return {s: [m.name for m in self.methods if m.name in names] for s, names in wanted.items()}
-
-
-def paper_of(key: str) -> Paper:
-    """The paper of a key or of one of its aliases.
-
-    Raises
-    ------
-    ValueError
-        If there is none; one sentence.
-    """
-    name = key_of(key)
-    paper = import_module(f"simnav.leaderboard.papers.{name.replace('-', '_')}").PAPER
-    assert isinstance(paper, Paper)
-    return paper

@@ -7,19 +7,19 @@ another value than the one that was run.
 from __future__ import annotations
 
 import tomllib
-from dataclasses import dataclass
 from importlib import resources
 from typing import Any, Literal
 
-__all__ = ["SOURCES", "PaperSetting", "Source", "setting_of", "value_of_key"]
+from simnav.spec import Spec
+
+__all__ = ["SOURCES", "PaperSetting", "Source", "value_of_key"]
 
 #: Where a setting comes from: the paper's text or tables, one of its figures, or our choice.
 Source = Literal["printed", "read from a figure", "ours"]
 SOURCES: tuple[Source, ...] = ("printed", "read from a figure", "ours")
 
 
-@dataclass(frozen=True)
-class PaperSetting:
+class PaperSetting(Spec):
     """One setting.
 
     Attributes
@@ -52,13 +52,6 @@ class PaperSetting:
         found = value_of_key(self.scenario, self.key)
         text = ", ".join(f"{v:g}" for v in found) if isinstance(found, list) else f"{found:g}"
         return f"{text} {self.ours}".rstrip()
-
-
-def setting_of(
-    scenario: str, what: str, source: Source, printed: str = "", key: str = "", ours: str = ""
-) -> PaperSetting:
-    """A setting of a paper whose keys are all those of one scenario."""
-    return PaperSetting(what, source, printed, scenario if key else "", key, ours)
 
 
 def value_of_key(scenario: str, key: str) -> Any:

@@ -9,8 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from simnav.leaderboard.papers import PAPERS, documentation, stored
-from simnav.leaderboard.papers import paper as papers
+from simnav.leaderboard.papers import PAPERS, documentation, reading, stored
 
 DOCS = Path(__file__).parents[2] / "docs"
 
@@ -30,7 +29,7 @@ def test_the_stored_comparison(tmp_path):
 @pytest.mark.parametrize("key", PAPERS)
 def test_the_pages_of_the_papers_hold_the_stored_results(key):
     page = text(f"papers/{key}.md")
-    assert documentation.replaced(page, documentation.blocks(papers.paper_of(key))) == page
+    assert documentation.replaced(page, documentation.blocks(reading.paper_of(key))) == page
 
 
 def test_the_overview_of_the_papers_holds_the_stored_results():
@@ -44,7 +43,7 @@ def test_stored_results_are_small_and_complete():
     assert sorted(f.stem for f in files) == sorted(PAPERS)
     assert sum(f.stat().st_size for f in files) < 1_000_000
     for key in PAPERS:
-        found = stored.shipped_reproduction(papers.paper_of(key))
+        found = stored.shipped_reproduction(reading.paper_of(key))
         assert found.count("absent") == 0
         assert all(f.ours is not None for f in found.findings if f.verdict not in ("failed", "unsuitable"))
 

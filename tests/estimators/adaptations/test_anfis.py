@@ -216,7 +216,7 @@ def test_seeds_of_training_and_validation_are_never_scored():
     from simnav.leaderboard import profiles
     from simnav.leaderboard.campaign.campaign import RUNS
     from simnav.leaderboard.papers import PAPERS
-    from simnav.leaderboard.papers.paper import paper_of as load_paper
+    from simnav.leaderboard.papers.reading import paper_of as load_paper
 
     runs = [part.runs for name in profiles.profiles() for part in profiles.read_profile(name).parts]
     scored = max(RUNS, *runs, *(load_paper(key).full for key in PAPERS))

@@ -18,7 +18,7 @@ from simnav.leaderboard.papers.claims import search as searching
 from simnav.leaderboard.papers.claims import stored
 from simnav.leaderboard.papers.claims.answer import Answer
 from simnav.leaderboard.papers.claims.claim import Claim, compared
-from simnav.leaderboard.papers.claims.declared import CLAIMS, claim_of
+from simnav.leaderboard.papers.claims.declared import claim_of, claims
 from simnav.leaderboard.papers.claims.dials import choice_dial, lag_dial, lags_given, parameter_dial, scenario_dial
 from simnav.leaderboard.papers.claims.points import DialAnswer, Point
 from simnav.leaderboard.papers.claims.section import claim_count, claim_figures, claim_sheets
@@ -81,7 +81,7 @@ def test_the_range_of_a_condition_is_in_words():
     assert words((0.8, 0.8, 0.8, 0.8), 0) == "the factor is from 1 to 5, all that was tried"
 
 
-@pytest.mark.parametrize("claim", CLAIMS, ids=lambda c: c.name)
+@pytest.mark.parametrize("claim", claims(), ids=lambda c: c.name)
 def test_every_value_of_every_dial_is_a_comparison_that_can_be_run(claim):
     base = claim.base()
     assert claim.paper in PAPERS
@@ -96,7 +96,7 @@ def test_every_value_of_every_dial_is_a_comparison_that_can_be_run(claim):
 
 
 def test_names_are_unique():
-    assert max(Counter(c.name for c in CLAIMS).values()) == 1
+    assert max(Counter(c.name for c in claims()).values()) == 1
     assert claim_of("guo-sw-fgo").gain == 0.1373
 
 
@@ -238,7 +238,7 @@ def test_an_answer_is_read_as_it_was_saved(tmp_path):
     assert stored.read("nothing", tmp_path) is None
 
 
-@pytest.mark.parametrize("claim", CLAIMS, ids=lambda c: c.name)
+@pytest.mark.parametrize("claim", claims(), ids=lambda c: c.name)
 def test_the_stored_answers_are_those_of_the_declared_claims(claim):
     found = stored.read(claim.name)
     assert found is not None
@@ -262,7 +262,7 @@ def test_pages_count_claims_and_draw_them(tmp_path):
 
 def test_the_command_shows_and_lists(tmp_path):
     listed = json.loads(RUNNER.invoke(app, ["claim", "--json"]).stdout)
-    assert [c["claim"] for c in listed["claims"]] == [c.name for c in CLAIMS]
+    assert [c["claim"] for c in listed["claims"]] == [c.name for c in claims()]
     shown = RUNNER.invoke(app, ["claim", "guo-sw-fgo", "--plot", str(tmp_path / "c.png")])
     assert "verdict:" in shown.stdout
     assert (tmp_path / "c.png").exists()

@@ -21,8 +21,7 @@ from simnav.estimator import make
 from simnav.leaderboard.cli import app
 from simnav.leaderboard.figures.panels import Bar, bars, broken
 from simnav.leaderboard.figures.style import Style
-from simnav.leaderboard.papers import ALIASES, PAPERS, key_of, sequential, stored
-from simnav.leaderboard.papers import paper as papers
+from simnav.leaderboard.papers import ALIASES, PAPERS, key_of, reading, sequential, stored
 from simnav.leaderboard.papers.comparison import (
     FEWEST,
     GAIN,
@@ -52,7 +51,7 @@ from simnav.trial import run_trial
 from tests.cases import ship
 
 ROOT = Path(__file__).parents[3]
-ALL = [papers.paper_of(key) for key in PAPERS]
+ALL = [reading.paper_of(key) for key in PAPERS]
 
 
 # -- the rule ------------------------------------------------------------------------------------------------
@@ -169,7 +168,7 @@ def test_size_of_a_gain_is_on_the_scale_of_ratios():
 
 def test_gross_errors_of_zhan_are_on_pseudoranges_as_printed():
     """From 1 to 60 m with either sign on half of the readings; the receiver's fixes have what follows from them."""
-    scenario = papers.paper_of("zhan-2026").scenario("uuv-lake-pseudoranges")
+    scenario = reading.paper_of("zhan-2026").scenario("uuv-lake-pseudoranges")
     drift, gross, _ = scenario.faults
     gross = gross.model_copy(update={"start": 10.0})
     recording = record(scenario.model_copy(update={"duration": 30.0, "faults": (drift, gross)}), 500)
@@ -325,7 +324,7 @@ def test_kinds_of_rows_are_counted_apart():
     results = [result(e, seed, **scores) for e in "ab" for seed in range(3)]
     findings = [found(row, results) for row in rows]
     assert [f.verdict for f in findings] == ["agrees", "agrees", "agrees", "differs", "ours"]
-    nothing = Reproduction(papers.paper_of("guo-2026"), range(3), findings, {}, [])
+    nothing = Reproduction(reading.paper_of("guo-2026"), range(3), findings, {}, [])
     assert summary(nothing).endswith(
         "figures: 1 agrees; one-sided bounds: 1 agrees; one-sided bounds on time and memory: 1 agrees, 1 differs"
     )
@@ -418,10 +417,10 @@ def test_what_is_undecided_in_the_stored_results_is_so_for_no_lack_of_runs(paper
 
 def test_stored_results_that_are_missing_or_damaged_get_a_sentence(tmp_path):
     with pytest.raises(ValueError, match=r"no stored results of guo-2026: .*guo-2026.parquet is missing"):
-        stored.shipped_reproduction(papers.paper_of("guo-2026"), tmp_path)
+        stored.shipped_reproduction(reading.paper_of("guo-2026"), tmp_path)
     (tmp_path / "guo-2026.parquet").write_bytes(b"PAR1 not really")
     with pytest.raises(ValueError, match="cannot be read"):
-        stored.shipped_reproduction(papers.paper_of("guo-2026"), tmp_path)
+        stored.shipped_reproduction(reading.paper_of("guo-2026"), tmp_path)
 
 
 # -- the papers ----------------------------------------------------------------------------------------------
@@ -491,18 +490,18 @@ def test_filters_are_there_and_fit(paper):
 
 def test_papers_figures():
     """Table 2 of Mao, Wang and Fu (2025) and Table 3 of Zhan et al. (2026), as printed."""
-    rows = {(r.method, r.score): r.paper for r in papers.paper_of("mao-2025").rows() if isinstance(r, Value)}
+    rows = {(r.method, r.score): r.paper for r in reading.paper_of("mao-2025").rows() if isinstance(r, Value)}
     east, north = (
         [figure for (_, score), figure in rows.items() if score == f"sigma_{axis}_rmse" and figure is not None]
         for axis in ("east", "north")
     )
     assert east == [3.65, 1.86, 1.28, 1.20]
     assert north == [3.55, 1.65, 1.37, 1.07]
-    first = [r for r in papers.paper_of("zhan-2026").tables[0].rows if isinstance(r, Value)]
+    first = [r for r in reading.paper_of("zhan-2026").tables[0].rows if isinstance(r, Value)]
     position = {r.method: r.paper for r in first if r.score == "east_rmse"}
     assert position["KF"] == 2.6649
     # The gains that the paper prints follow from its table.
-    gains = (r for r in papers.paper_of("zhan-2026").rows() if isinstance(r, Gain))
+    gains = (r for r in reading.paper_of("zhan-2026").rows() if isinstance(r, Gain))
     claims = {r.score: r.paper for r in gains if r.paper is not None}
     for score in ("east_rmse", "north_rmse"):
         of = {r.method: r.paper for r in first if r.score == score}
@@ -516,7 +515,7 @@ def test_second_set_of_intervals():
 
 
 def test_a_variant_is_a_scenario_of_its_own():
-    paper = papers.paper_of("zhan-2026")
+    paper = reading.paper_of("zhan-2026")
     clean = paper.scenario("uuv-lake-clean")
     assert clean.id == "uuv-lake-clean-v1"
     assert {f.kind for f in clean.faults} == {"multipath"}
@@ -608,10 +607,10 @@ def tiny(tmp_path, monkeypatch):
             Figure("Figure 6", "Gain", "gains", where, ("Wrong", "Right"), {"Gain [%]": "horizontal_rmse"}),
             Figure("", "Distribution", "distribution", where, ("Right",)),
         ),
-        not_shown=(NotShown("Figure 7", "The pond", "a photograph"),),
+        not_shown=(NotShown(number="Figure 7", what="The pond", why="a photograph"),),
         notes=("One note.",),
     )
-    monkeypatch.setattr("simnav.leaderboard.papers.paper.paper_of", lambda key: paper)
+    monkeypatch.setattr("simnav.leaderboard.papers.reading.paper_of", lambda key: paper)
 
     def none_are_stored(paper: Paper) -> Reproduction:
         raise ValueError
@@ -798,7 +797,7 @@ def test_of_a_gain_the_ratio_of_the_errors_is_compared():
 
 def test_keys_and_aliases():
     assert [key_of(alias) for alias in ALIASES] == list(PAPERS)
-    assert papers.paper_of("003") is papers.paper_of("zhan-2026")
+    assert reading.paper_of("003") is reading.paper_of("zhan-2026")
     for paper in ALL:
         assert paper.doi or paper.key == "mao-2025"
         assert paper.title in paper.citation
@@ -814,7 +813,7 @@ def test_options_that_contradict_each_other_get_a_sentence():
 
 def test_a_paper_can_be_cut_to_some_methods():
     """So that a comparison of two quick filters can have its 200 runs."""
-    whole = papers.paper_of("jiang-2026")
+    whole = reading.paper_of("jiang-2026")
     part = whole.only(["EKF", "UKF"])
     assert {m.name for m in part.methods} == {"EKF", "UKF"}
     assert 0 < len(list(part.rows())) < len(list(whole.rows()))
