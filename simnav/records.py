@@ -66,7 +66,9 @@ class Record:
 
     @property
     def _numba_type_(self) -> Any:
-        """What Numba asks an object for."""
+        """What Numba asks an object for; TypeError if compiled functions cannot take it."""
+        if not self.compiled:
+            raise TypeError(f"{type(self).__name__} holds a Python function, and a compiled function is to take it")
         return self.numba_type()
 
     @cached_property

@@ -218,7 +218,8 @@ class KalmanEstimator(Solver):
     def choice(self, instruments: Instruments) -> Choice:
         """How the noise of each reading is chosen in a run."""
         own = self.adaptation
-        return own.choice(self._names, self.model.size) if isinstance(own, NoiseAdaptation) else no_choice()
+        ruled = isinstance(own, NoiseAdaptation) and own.ruled
+        return own.choice(self._names, self.model.size) if ruled else no_choice()
 
     def _use(
         self,

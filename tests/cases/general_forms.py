@@ -15,6 +15,8 @@ from simnav.estimators.models.inertial import InertialModel, roll_pitch_yaw
 from simnav.estimators.models.propagation import (
     BLOCK,
     BLOCK_COLUMNS,
+    Motion,
+    Samples,
     accumulate_error,
     advance_inertial,
     correct_inertial,
@@ -34,19 +36,19 @@ class GeneralInertial(GeneralModel):
     def initial(self, start, instruments):
         imu = InertialModel()
         covariance = imu.begin(start, Instruments([], instruments.imu, instruments.step))
-        self._noise, self._samples, self._first = imu._noise, imu._samples, 0
-        self._kept = imu._memory, imu._turn, imu._clock
+        self._noise, self._samples, self._first = imu._noise, imu.samples, 0
+        self._kept = imu.motion.increments, imu.motion.turn, imu.motion.clock
         return np.concatenate([imu.position, imu.velocity, imu.dcm.ravel(), imu.bias]), covariance
 
     def load(self, imu):
-        self._samples, self._first = (imu.time, imu.interval, imu.angular_rate, imu.specific_force), 0
+        self._samples, self._first = Samples(imu.time, imu.interval, imu.angular_rate, imu.specific_force), 0
 
     def _moved(self, x, elapsed):
         state = x[:3].copy(), x[3:6].copy(), x[6:15].reshape(3, 3).copy(), x[15:].copy()
         position, velocity, dcm, bias = state
         memory, turn, clock = (kept.copy() for kept in self._kept)
         until, blocks = self.time + elapsed, np.empty((int(elapsed / BLOCK) + 2, BLOCK_COLUMNS))
-        moving = position, velocity, dcm, memory, bias, turn, clock
+        moving = Motion(position, velocity, dcm, bias, memory, turn, clock)
         first, count = advance_inertial(moving, self._samples, self._first, until, self._noise, blocks)
         moved = np.concatenate([position, velocity, dcm.ravel(), bias])
         return moved, (memory, turn, clock), first, (blocks, count)

@@ -89,6 +89,11 @@ def test_a_field_of_another_type_is_refused() -> None:
         Machine(state=np.zeros(3), table=np.eye(2))
 
 
+def test_compiled_code_takes_no_python_function() -> None:
+    with pytest.raises(TypeError, match="Machine holds a Python function"):
+        run(machine(plainly), Scale(1.0, 0.0), 1)
+
+
 def without(x: float, y) -> float:  # type: ignore[no-untyped-def]
     """A function with an annotation too few."""
     return x

@@ -184,7 +184,8 @@ def analysed(reset_locals: bool) -> FederatedEstimator:
                 F = np.kron(np.eye(len(self.at)), F)
                 self.actual = F @ self.actual @ F.T + np.kron(self.all, Q)
 
-        def _take(self, m, *rest):
+        def correct(self, dynamics, choice, readings, k, prediction):
+            m = self._measurements[k]
             at, P = self.at[m.instrument], self._locals[m.instrument].covariance.copy()
             _, H, R = self.model.measure(m)
             gain = P @ H.T @ np.linalg.inv(H @ P @ H.T + R)
@@ -192,7 +193,7 @@ def analysed(reset_locals: bool) -> FederatedEstimator:
             A[at, at] -= gain @ H
             self.actual = A @ self.actual @ A.T
             self.actual[at, at] += gain @ R @ gain.T
-            super()._take(m, *rest)
+            return super().correct(dynamics, choice, readings, k, prediction)
 
         def _fuse(self):
             before = {name: local.covariance.copy() for name, local in self._locals.items()}

@@ -1,31 +1,35 @@
-"""One kernel a measurement or a step, where nothing adapts: the same numbers, and never in a hook's way."""
+"""The loop of the filters: the same numbers compiled, with kernels from Python, and with the methods of a model."""
 
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from simnav.estimator import make
-from simnav.estimators.adaptations.adaptive_step import step_rule
 from simnav.estimators.adaptations.adkf import AdaptiveFactor
-from simnav.estimators.adaptations.base import Adaptation
 from simnav.estimators.adaptations.gating import ChiSquareGate
+from simnav.estimators.adaptations.robust import HuberWeights
 from simnav.estimators.adaptations.sage_husa import SageHusa
 from simnav.estimators.algebra.joseph import project
-from simnav.estimators.composition import Row
 from simnav.estimators.models.channels import by_channel, instrument_of
 from simnav.estimators.models.inertial import InertialModel
-from simnav.estimators.rows.kalman import Ekf, Ekf23
-from simnav.estimators.solvers.kalman import KalmanEstimator
+from simnav.estimators.rows.kalman import Ekf
+from simnav.estimators.solvers.filter_step import filter_step
+from simnav.estimators.solvers.kalman import FilterFunctions, KalmanEstimator
 from simnav.scenario import load
 from simnav.source import record
 from simnav.types import Measurement
 
 
-class StepByStep(Adaptation):
-    """Changes nothing, but might."""
+class ByMethods(KalmanEstimator):
+    """The plain filter, whose functions are methods in Python."""
+
+    def functions(self):
+        choose = super().functions().choose
+        return FilterFunctions(self.propagate, self.predict, choose, self.inflate, self.correct, self.retract)
 
 
 def test_projection():
@@ -42,53 +46,22 @@ def test_projection():
     np.testing.assert_array_equal(again[1], predicted)
 
 
-@pytest.mark.parametrize("row", [Ekf, Ekf23])
-def test_it_is_the_same_filter(recording_of, row: type[Row]):
-    recording = recording_of(2, 60.0)
-    plain, stepwise = row(), row()
-    stepwise.solver.adaptation = StepByStep()
-    for estimator in (plain, stepwise):
-        estimator.reset(recording.start, recording.instruments)
-    taken = counted(plain.model, "assimilate"), counted(plain.model, "assimilate_step")
-    for packet in recording.steps():
-        a, b = plain.update(packet), stepwise.update(packet)
-        assert a.diagnostics == pytest.approx(b.diagnostics, rel=1e-6, nan_ok=True)
-        np.testing.assert_allclose(a.position, b.position, rtol=1e-12)
-        for state in ("velocity", "dcm", "bias", "calibration"):
-            np.testing.assert_allclose(*(getattr(e.model, state) for e in (plain, stepwise)), rtol=1e-9, atol=1e-9)
-        np.testing.assert_allclose(a.covariance, b.covariance, rtol=1e-8, atol=1e-14)
-    assert taken[row is Ekf][0] > 50
-    assert taken[row is Ekf23][0] == 0
-
-
-def counted(model, name: str) -> list[int]:
-    """How often a method of a model had a result."""
-    method, times = getattr(model, name), [0]
-
-    def counting(*args):
-        used = method(*args)
-        times[0] += used is not None
-        return used
-
-    setattr(model, name, counting)
-    return times
-
-
 ADAPTIVE = ("iae", "rae", "sage-husa", "vb-akf", "huber-kf", "igg3", "mckf", "student-t", "adkf", "adkf-paper", "imm")
 FACTORS = ("adkf:factor=two-segment", "adkf:factor=exponential")
 
 
 @pytest.mark.parametrize("row", ["ekf", "gated-ekf", "fading-ekf", *ADAPTIVE, *FACTORS])
-def test_a_step_in_one_call_has_the_same_bits(recording_of, row: str):
+def test_compiled_and_plain_have_the_same_bits(recording_of, row: str):
     """Readings between the samples of the IMU, two at one time, many of them, wrong ones, none, and no IMU."""
     recording = recording_of(2, 40.0)
     name, _, option = row.partition(":")
     parameters = dict([option.split("=")]) if option else {}
     whole, single = make(name, **parameters), make(name, **parameters)
-    single.solver.takes_steps = False
     for estimator in (whole, single):
         estimator.reset(recording.start, recording.instruments)
-    times, rng, used = counted(whole.model, "assimilate_step"), np.random.default_rng(3), set()
+    assert whole.solver._compiled
+    single.solver._compiled = False
+    rng, used = np.random.default_rng(3), set()
     flagged = 0
     for k, packet in enumerate(recording.steps()):
         aids = [m for _ in range(4) for m in packet.aids] if k % 5 == 1 else packet.aids if k % 5 else []
@@ -107,13 +80,47 @@ def test_a_step_in_one_call_has_the_same_bits(recording_of, row: str):
             np.testing.assert_array_equal(getattr(whole.model, state), getattr(single.model, state))
         np.testing.assert_array_equal(whole.covariance, single.covariance)
         used.add(tuple(value for name, value in a.diagnostics.items() if name.startswith("sigma_")))
-    assert times[0] == 40
     assert (len(used) > 5) == (name in ADAPTIVE)
     assert (flagged > 5) == (row == "gated-ekf")
     if isinstance(whole.solver.adaptation, AdaptiveFactor) and name == "adkf":
-        kept = [e.solver.adaptation.prediction.arrays(whole.model.size)[-1] for e in (whole, single)]
+        kept = [e.solver.adaptation.prediction.arrays(whole.model.size)["kept"] for e in (whole, single)]
         np.testing.assert_array_equal(*kept)
         assert kept[0][1:].all()  # the motion was inflated
+
+
+@pytest.mark.parametrize("adaptation", [None, SageHusa, HuberWeights, AdaptiveFactor])
+def test_kernels_and_methods_are_the_same_filter(recording_of, adaptation):
+    recording = recording_of(2, 60.0)
+    filters = [kind(InertialModel(), adaptation and adaptation()) for kind in (KalmanEstimator, ByMethods)]
+    for estimator in filters:
+        estimator.reset(recording.start, recording.instruments)
+    assert [f._compiled for f in filters] == [True, False]
+    for packet in recording.steps():
+        a, b = (estimator.update(packet) for estimator in filters)
+        assert a.diagnostics == pytest.approx(b.diagnostics, rel=1e-6, nan_ok=True)
+        np.testing.assert_allclose(a.position, b.position, rtol=1e-12)
+        for state in ("velocity", "dcm", "bias", "calibration"):
+            np.testing.assert_allclose(*(getattr(e.model, state) for e in filters), rtol=1e-9, atol=1e-9)
+        np.testing.assert_allclose(a.covariance, b.covariance, rtol=1e-8, atol=1e-14)
+
+
+def test_the_whole_step_runs_without_a_compiler(recording_of):
+    """The plain sources of the loop, the adaptation and the model: what a kernel is made of."""
+    recording = recording_of(2, 3.0)
+    compiled, plain = (KalmanEstimator(InertialModel(), HuberWeights()) for _ in range(2))
+    for estimator in (compiled, plain):
+        estimator.reset(recording.start, recording.instruments)
+    made = plain._filter
+    names = ("propagate", "predict", "choose", "inflate", "correct", "retract")
+    plain._filter = SimpleNamespace(
+        dynamics=made.dynamics, choice=made.choice, **{name: getattr(made, name).function for name in names}
+    )
+    plain._compiled = False
+    plain._filter.choose = made.choose  # what was chosen is reported where the kernel is handed over
+    for packet in recording.steps():
+        a, b = compiled.update(packet), plain.update(packet)
+        np.testing.assert_allclose(a.position, b.position, rtol=1e-14)
+        np.testing.assert_allclose(a.covariance, b.covariance, rtol=1e-9, atol=1e-16)
 
 
 def test_an_adaptation_that_chooses_in_its_own_way_is_asked(recording_of, run_over):
@@ -131,8 +138,7 @@ def test_an_adaptation_that_chooses_in_its_own_way_is_asked(recording_of, run_ov
     for full in (False, True):
         adaptation = SageHusa(full=full)
         adaptation.reset(instruments)
-        rule = step_rule(adaptation, list(instruments), np.ones(15))
-        assert (rule is None) == full  # NumPy bounds a full matrix
+        assert adaptation.choice(list(instruments), 15).compiled != full  # NumPy bounds a full matrix
 
 
 def test_a_gate_counts_channels_in_python():
@@ -141,7 +147,7 @@ def test_a_gate_counts_channels_in_python():
         gate = ChiSquareGate()
         gate.reset(instruments)
         channels = any(sheet.name != instrument_of(sheet) for sheet in instruments.values())
-        assert (step_rule(gate, list(instruments), np.ones(15)) is None) == channels
+        assert gate.choice(list(instruments), 15).compiled != channels
     assert channels
 
 
@@ -149,20 +155,25 @@ def test_a_gate_counts_channels_in_python():
 def test_a_factor_that_only_numpy_computes_has_no_rule(recording_of, own: dict[str, str]):
     adaptation = AdaptiveFactor(**own)
     adaptation.reset(recording_of(2, 5.0).instruments)
-    assert step_rule(adaptation, list(adaptation.instruments), np.ones(15)) is None
+    assert not adaptation.choice(list(adaptation.instruments), 15).compiled
 
 
-@pytest.mark.parametrize("hook", ["_observe", "_absorb"])
-def test_a_solver_that_does_it_in_its_own_way_is_asked(recording_of, run_over, hook: str):
+@pytest.mark.parametrize("name", ["predict", "correct", "retract"])
+def test_a_solver_replaces_one_function(recording_of, run_over, name: str):
     seen = []
 
-    def own(self, argument):
-        seen.append(argument)
-        return getattr(KalmanEstimator, hook)(self, argument)
+    class Own(KalmanEstimator):
+        def functions(self):
+            functions = super().functions()
+
+            def own(*arguments):
+                seen.append(arguments)
+                return getattr(functions, name)(*arguments)
+
+            return functions.replaced(**{name: own})
 
     recording = recording_of(2, 5.0)
-    estimator = type("Hooked", (KalmanEstimator,), {hook: own, "assimilates": False})(InertialModel())
-    run_over(estimator, recording)
+    run_over(Own(InertialModel()), recording)
     assert len(seen) == sum(map(len, (p.aids for p in recording.steps())))
 
 
@@ -189,17 +200,21 @@ def test_singular_or_meaningless_measurements_change_nothing(recording_of):
     estimator.reset(recording.start, recording.instruments)
     model, P = estimator.model, estimator.covariance
     name = next(s.name for s in recording.instruments.of_kind("gnss_position"))
-    model.noise[name] = np.zeros((3, 3))
-    m = Measurement(0.0, name, "gnss_position", model.position.copy())
-    dx = np.empty(model.size)
+    model.noise[name][:] = 0.0
     P[:3], P[:, :3] = 0.0, 0.0
     P[6:9], P[:, 6:9] = 0.0, 0.0
-    before, state = P.copy(), model.snapshot()
-    assert model.assimilate(m, P, dx)[0] == -1.0
+    estimator.solver.dynamics.aids.noises[:] = 0.0
     compass = next(s for s in recording.instruments.of_kind("gyrocompass", "magnetic_compass"))
     upward = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
     model.dcm[:] = upward
-    assert model.assimilate(Measurement(0.0, compass.name, compass.kind, np.ones(1)), P, dx)[0] == -1.0
+    before, state = P.copy(), model.snapshot()
+    for m in (
+        Measurement(0.0, name, "gnss_position", model.position.copy()),
+        Measurement(0.0, compass.name, compass.kind, np.ones(1)),
+    ):
+        readings = estimator.solver._arrays.fill([m])
+        filter_step(estimator.solver._filter, readings, model.samples, 1, 0.0)
+        assert readings.nis[0] == -1.0
     np.testing.assert_array_equal(P, before)
     np.testing.assert_array_equal(model.position, state[0])
     np.testing.assert_array_equal(model.dcm, upward)
