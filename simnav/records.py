@@ -47,7 +47,7 @@ class Record:
         """The type of its reference in compiled code."""
         return _type_of(cls)
 
-    @property
+    @cached_property
     def compiled(self) -> bool:
         """Whether compiled functions can take it: all functions in it are kernels."""
         values = [getattr(self, name) for name in self.numba_fields]

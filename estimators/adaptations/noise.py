@@ -7,7 +7,7 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from simnav.compiled import Kernel
+from simnav.compiled import Kernel, ready
 from simnav.estimators.algebra.direct_update import posterior
 from simnav.estimators.models.filtering import Prediction, room_for
 from simnav.types import KINDS, Array, Instruments
@@ -149,17 +149,17 @@ class NoiseAdaptation(Adaptation):
 
     def adapt(self, innovation: Innovation) -> Array | None:
         """Choose the noise of one measurement (`choose_noise`). An instrument without noise is not adapted."""
-        m, residual, predicted, nominal, covariance, cross = innovation
+        m, residual, predicted, nominal, covariance, _ = innovation
         if self._choice is None:
             self._choice = self.choice(list(self.index), 0 if covariance is None else len(covariance))
         reading, row = self._reading, self.index[m.instrument]
         reading.instrument[0], reading.time[0], reading.inflation[0], reading.reported[0] = row, m.time, 1.0, 0.0
         reading.rejected[0], reading.sigma[0, 0] = False, np.nan
         self._innovation, self.inflation = innovation, 1.0
-        empty = np.empty((0, len(residual)))
-        prediction = Prediction(residual, empty if cross is None else cross, predicted, nominal, np.empty_like(nominal))
-        choose = choose_noise if self._choice.compiled else choose_noise.function
-        choose(self._choice, _NO_COVARIANCE if covariance is None else covariance, reading, 0, prediction)
+        d = len(residual)
+        prediction = Prediction(ready(residual), np.empty((0, d)), ready(predicted), ready(nominal), np.empty((d, d)))
+        choose = choose_noise.unchecked if self._choice.compiled else choose_noise.function
+        choose(self._choice, _NO_COVARIANCE if covariance is None else ready(covariance), reading, 0, prediction)
         self.inflation = float(reading.inflation[0])
         if reading.rejected[0]:
             return None

@@ -24,16 +24,16 @@ class AidTable(NamedTuple):
     Attributes
     ----------
     codes : (i, 4) array of int
-        Measurement equation, number of components, and places of bias and scale factor in the error; -1 for none.
+        Measurement equation, and places in the error; the model knows their meaning.
     lever_arms : (i, 3) array
         In body axes [m].
-    noises : (i, 9) array
-        Covariance of the white noise, its d d elements one after the other.
+    figures : (i, 9) array
+        Figures of the equation: of an inertial model the elements of the covariance of the white noise.
     """
 
     codes: IntegerMatrix
     lever_arms: Matrix
-    noises: Matrix
+    figures: Matrix
 
 
 class Dynamics(Record):
@@ -83,8 +83,6 @@ class Readings(Record):
         Time of validity [s].
     value : (k, 3) array
         What was measured.
-    innovation : (k, 3) array
-        Measured minus predicted.
     nis : (k,) array
         Normalised innovation squared; -1 where the reading was not used.
     size : (k,) array
@@ -103,7 +101,6 @@ class Readings(Record):
     components: IntegerVector
     time: Vector
     value: Matrix
-    innovation: Matrix
     nis: Vector
     size: Vector
     sigma: Matrix
@@ -159,7 +156,7 @@ def room_for(count: int) -> Readings:
     whole: Any = np.int64
     return Readings(
         instrument=np.zeros(count, whole), components=np.zeros(count, whole), time=np.zeros(count),
-        value=np.zeros((count, 3)), innovation=np.zeros((count, 3)), nis=np.zeros(count), size=np.zeros(count),
+        value=np.zeros((count, 3)), nis=np.zeros(count), size=np.zeros(count),
         sigma=np.zeros((count, 3)), reported=np.zeros(count), inflation=np.ones(count),
         rejected=np.zeros(count, np.bool_), wrong=np.zeros(count, np.bool_),
     )  # fmt: skip
@@ -180,9 +177,9 @@ class ReadingsOfSteps:
 
     def fill(self, measurements: Sequence[Measurement]) -> Readings:
         """The measurements as arrays; those of the call before are overwritten."""
-        into = self._readings
-        if len(measurements) > len(into.time):
-            into = self._readings = room_for(2 * len(measurements))
+        into, count = self._readings, len(measurements)
+        if count > len(into.time):
+            into = self._readings = room_for(2 * count)
         for k, m in enumerate(measurements):
             (into.instrument[k], into.components[k]), into.time[k] = self._row[m.instrument], m.time
             into.value[k, : len(m.value)] = m.value

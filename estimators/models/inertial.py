@@ -164,6 +164,7 @@ class InertialModel(ErrorModel):
         self.position, self.velocity, self.dcm, self.bias = motion.position, motion.velocity, motion.dcm, motion.bias
         self.calibration = self.numbers[MOTION_NUMBERS:]
         self.raw_rate, self.raw_force = motion.clock[12:15], motion.clock[6:9]
+        self._viewed = State(self.position, self.velocity, self.dcm, self.raw_rate, self.bias, self.calibration)
 
     @property
     def time(self) -> float:
@@ -357,7 +358,7 @@ class InertialModel(ErrorModel):
         elapsed = until - self.time
         if elapsed <= 0.0:
             return
-        self.next_sample[0] = propagate_inertial(
+        self.next_sample[0] = propagate_inertial.unchecked(
             self.motion, self.samples, int(self.next_sample[0]), until, self._noise,
             (self.transition, self.process_noise, covariance), (self.calibration, self._decay, self._density), elapsed,
         )  # fmt: skip
@@ -394,7 +395,7 @@ class InertialModel(ErrorModel):
             return Linearised(*found[:2], noise)
         jacobian, noise = self._jacobians[name], self.noise[name]
         innovation, value = np.empty(len(noise)), measurement.value.astype(np.float64)
-        if not observe(self.aid_parameters[name], value, self._state(), innovation, jacobian):
+        if not observe.unchecked(self.aid_parameters[name], value, self._state(), innovation, jacobian):
             return None
         if name in self.uncalibrated:
             sheet = self.instruments[name]
@@ -402,7 +403,7 @@ class InertialModel(ErrorModel):
         return Linearised(innovation, jacobian, noise)
 
     def _state(self) -> State:
-        return State(self.position, self.velocity, self.dcm, self.raw_rate, self.bias, self.calibration)
+        return self._viewed
 
     def state_of_own(self) -> State:
         """The state for `observe_own`: with delays among the states, the rate has the specific force behind it."""

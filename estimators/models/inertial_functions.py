@@ -69,7 +69,7 @@ def predict(dynamics: Dynamics, readings: Readings, k: int, prediction: Predicti
     )
     for a in range(d):
         for b in range(d):
-            prediction.nominal[a, b] = aids.noises[row, a * d + b]
+            prediction.nominal[a, b] = aids.figures[row, a * d + b]
     return predict_reading(
         Aid(code, aids.lever_arms[row], bias_at, scale_at), readings.value[k, :d], state, dynamics.covariance,
         prediction.innovation, prediction.cross, prediction.predicted,

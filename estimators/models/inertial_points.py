@@ -225,7 +225,7 @@ class InertialPoints(InertialModel, PointModel):
         for k in range(1, pieces + 1):
             position, velocity, dcm, time = self.position.copy(), self.velocity.copy(), self.dcm.copy(), self.time
             self.propagate(noise, until if k == pieces else begin + elapsed * k / pieces)
-            propagate_points(
+            propagate_points.unchecked(
                 position, velocity, dcm, self.velocity, self.dcm, self.time - time, self._noise[2], self._noise[4],
                 errors,
             )  # fmt: skip
@@ -244,5 +244,5 @@ class InertialPoints(InertialModel, PointModel):
             assert found is not None  # `measure` says something of it
             return found
         differences = np.empty((len(errors), len(self.noise[name])))
-        observe_points(self.aid_parameters[name], self._state(), errors, differences)
+        observe_points.unchecked(self.aid_parameters[name], self._state(), errors, differences)
         return differences

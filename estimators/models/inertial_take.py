@@ -95,7 +95,7 @@ def take_inertial(
     """
     until, spacing, ahead = times
     state, aids_table = motion_of(dynamics.numbers), dynamics.aids
-    codes, noises, calibration = aids_table.codes, aids_table.noises, dynamics.numbers[MOTION_NUMBERS:]
+    codes, noises, calibration = aids_table.codes, aids_table.figures, dynamics.numbers[MOTION_NUMBERS:]
     which, stamps, values, clock = readings.instrument, readings.time, readings.value, state.clock
     transition, process_noise, decay = dynamics.transition, dynamics.process_noise, dynamics.decay
     motion, motion_noise = motion_since

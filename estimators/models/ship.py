@@ -20,7 +20,9 @@ turn rate and the current are additions, because a log measures the speed throug
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import cos, radians, sin
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,10 +36,12 @@ from simnav.types import KINDS, NO_SIDE, Array, Datasheet, Estimate, InitialStat
 from .base import ErrorModel, Linearised
 from .declared_errors import bias_of
 from .equations import equation_of
+from .filtering import AidTable, Dynamics, ModelFunctions
 from .levered import is_own, with_lever_arms
 from .many_readings import of_instruments
 from .measurements import wrap
 from .moving_chain import MovingModel
+from .ship_functions import SHIP_FUNCTIONS, SHIP_NUMBERS, ship_state
 from .ship_kernels import (
     BODY_VELOCITY,
     HEADING,
@@ -104,6 +108,8 @@ class ShipModel(MovingModel):
     """
 
     state = ("position", "x")
+    #: True if the kernels of `simnav.estimators.models.ship_functions` may replace its methods.
+    fused: ClassVar[bool] = True
     moving = (slice(0, 0), slice(0, 0))  # there is no IMU: the process noise covers manoeuvres
 
     def __init__(
@@ -119,6 +125,42 @@ class ShipModel(MovingModel):
         self.turn_rate, self.turn_time = radians(turn_rate_deg), turn_time
         self.current, self.current_time = current, current_time
         self.sway = sway
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """A copy: the named blocks of its state are views of the flat one."""
+        vars(self).update(state)
+        if "numbers" in state:
+            self._bind()
+
+    def _bind(self) -> None:
+        """Name the blocks of the flat state; x has u, psi, r, c and biases at their indices."""
+        self._clock, self.position, self.x = ship_state.function(self.numbers)
+
+    @property
+    def time(self) -> float:
+        """Time of the state [s]."""
+        return float(self._clock[0])
+
+    @time.setter
+    def time(self, time: float) -> None:
+        self._clock[0] = time
+
+    def functions(self) -> ModelFunctions | None:
+        """As `ErrorModel.functions`; None if an instrument has an equation of its own."""
+        return SHIP_FUNCTIONS if self.fused and not self.own else None
+
+    def dynamics(self, covariance: Array, names: Sequence[str]) -> Dynamics:
+        """As `ErrorModel.dynamics`."""
+        codes, figures = np.zeros((len(names), 4), np.int64), np.zeros((len(names), 9))
+        for i, name in enumerate(names):
+            if name in self.aids:
+                codes[i, :3], figures[i, :7], _ = self.aids[name]
+        return Dynamics(
+            numbers=self.numbers, covariance=covariance, transition=self.transition, process_noise=np.empty((0, 0)),
+            constants=np.array([self.turn_time]), decay=self.decay, density=self.density,
+            first_variances=covariance.diagonal().copy(), correction=np.empty(self.size),
+            next_sample=np.zeros(1, np.int64), aids=AidTable(codes, np.zeros((len(names), 3)), figures),
+        )  # fmt: skip
 
     def observes(self, instrument: Datasheet) -> bool:
         """Whether it is a position, velocity, speed or heading, or has an observation of its own and no clock."""
@@ -145,8 +187,6 @@ class ShipModel(MovingModel):
         self.instruments = instruments = with_lever_arms(instruments, drifting=False)
         if not any(self.observes(s) for s in instruments.values()):
             raise UnsuitableScenario("the ship model needs GNSS, a compass or a log; there is none of them")
-        self.time = start.time
-        self.position = np.array(start.position, dtype=np.float64)
         self.blocks = StateBlocks(U)
         for block in self._motion():
             self.blocks.add("ship", block.name, block.rates())
@@ -160,9 +200,12 @@ class ShipModel(MovingModel):
         self.decay, self.density = np.concatenate([[0.0, 0.0], decay]), np.concatenate([[0.0, 0.0], density])
         self.transition = np.eye(n)
         self._height_variance = float(start.covariance[2, 2])
+        self.numbers = np.zeros(SHIP_NUMBERS + n)
+        self._bind()
+        self.time = start.time
+        self.position[:] = start.position
         self._tabulate()
         psi = float(start.attitude[2])
-        self.x = np.zeros(n)  # u, psi, r, c, biases at their indices; the position is kept apart
         self.x[PSI] = psi
         P = np.zeros((n, n))
         P[:2, :2] = start.covariance[:2, :2]

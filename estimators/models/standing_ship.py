@@ -31,6 +31,7 @@ class StandingShip(ShipModel):
         Time without a fix after which the position stays where it is [s].
     """
 
+    fused = False
     memory = ("_last_fix",)
 
     def __init__(self, patience: float = 1.5):

@@ -18,7 +18,7 @@ from simnav.estimators.adaptations.choice import Choice
 from simnav.estimators.algebra.joseph import joseph_update
 from simnav.estimators.models.filtering import Dynamics, Prediction, Readings
 from simnav.estimators.models.propagation import Samples
-from simnav.kernel_types import Matrix
+from simnav.kernel_types import Matrix, Vector
 from simnav.records import Record
 
 __all__ = ["Filter", "correct", "filter_step", "inflate_all", "use_nominal"]
@@ -58,6 +58,15 @@ class Filter(Record):
 
 
 @kernel
+def norm(vector: Vector) -> float:
+    """The Euclidean norm of a vector."""
+    square = 0.0
+    for a in range(vector.size):
+        square += vector[a] * vector[a]
+    return sqrt(square)
+
+
+@kernel
 def filter_step(f: Filter, readings: Readings, samples: Samples, count: int, until: float) -> None:
     """Use the readings of a step, each at its own time, and propagate to the end of the step.
 
@@ -66,7 +75,8 @@ def filter_step(f: Filter, readings: Readings, samples: Samples, count: int, unt
     f : Filter
         The filter; its state and its covariance are updated.
     readings : Readings
-        In order of their times; one that is later than ``until`` is used then. What became of each is written into it.
+        In order of their times, as `ReadingsOfSteps` makes them; one that is later than ``until`` is used then. What
+        became of each is written into it.
     samples : Samples
         The IMU samples of the step.
     count : int
@@ -76,25 +86,21 @@ def filter_step(f: Filter, readings: Readings, samples: Samples, count: int, unt
     """
     n = f.dynamics.covariance.shape[0]
     for k in range(count):
-        f.propagate(f.dynamics, samples, min(readings.time[k], until))
-        d = readings.components[k]
+        f.propagate(f.dynamics, samples, min(float(readings.time[k]), until))
+        d = int(readings.components[k])
         prediction = Prediction(np.empty(d), np.empty((n, d)), np.empty((d, d)), np.empty((d, d)), np.empty((d, d)))
-        readings.nis[k], readings.sigma[k, :], readings.reported[k] = -1.0, np.nan, 0.0
+        readings.nis[k], readings.sigma[k, 0], readings.reported[k] = -1.0, np.nan, 0.0
         readings.inflation[k], readings.rejected[k], readings.wrong[k] = 1.0, False, False
         if not f.predict(f.dynamics, readings, k, prediction):
             continue
-        square = 0.0
-        for a in range(d):
-            readings.innovation[k, a] = prediction.innovation[a]
-            square += prediction.innovation[a] * prediction.innovation[a]
-        readings.size[k] = sqrt(square)
+        readings.size[k] = norm(prediction.innovation)
         f.choose(f.choice, f.dynamics.covariance, readings, k, prediction)
         if readings.rejected[k]:
             continue
         if readings.inflation[k] != 1.0:
             f.inflate(f.dynamics, readings, k, prediction)
-        readings.nis[k] = f.correct(f.dynamics, f.choice, readings, k, prediction)
-        if readings.nis[k] >= 0.0:
+        readings.nis[k] = nis = f.correct(f.dynamics, f.choice, readings, k, prediction)
+        if nis >= 0.0:
             f.retract(f.dynamics)
     f.propagate(f.dynamics, samples, until)
 

@@ -22,6 +22,7 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
+from simnav.compiled import Kernel, ready
 from simnav.estimators.adaptations.base import Adaptation, Innovation
 from simnav.estimators.adaptations.choice import Choice, choose_noise, no_choice
 from simnav.estimators.adaptations.intersection import weaken_position
@@ -213,13 +214,19 @@ class KalmanEstimator(Solver):
         self.dynamics = self.model.dynamics(self.covariance, self._names)
         functions = self.functions()._asdict()
         self._together = functions.pop("together")
-        return Filter(dynamics=self.dynamics, choice=self.choice(instruments), **functions)
+        self._reports = functions["choose"] is choose_noise
+        choice, known = self.choice(instruments), all(isinstance(f, Kernel) for f in functions.values())
+        if not known:  # Python calls the kernels among them: their arguments are those of their annotations
+            functions = {name: f.unchecked if isinstance(f, Kernel) else f for name, f in functions.items()}
+            functions["choose"] = self.choose if self.adaptation is None and not self._reports else functions["choose"]
+        return Filter(dynamics=self.dynamics, choice=choice, **functions)
 
     def choice(self, instruments: Instruments) -> Choice:
         """How the noise of each reading is chosen in a run."""
         own = self.adaptation
-        ruled = isinstance(own, NoiseAdaptation) and own.ruled
-        return own.choice(self._names, self.model.size) if ruled else no_choice()
+        if isinstance(own, NoiseAdaptation) and own.ruled:
+            return own.choice(self._names, self.model.size)
+        return no_choice()
 
     def _use(
         self,
@@ -235,14 +242,13 @@ class KalmanEstimator(Solver):
         step = filter_step.unchecked if self._compiled else filter_step.function
         step(self._filter, readings, samples, count, until)
         nis, size, rejected = readings.nis.tolist(), readings.size.tolist(), readings.rejected.tolist()
-        chosen = self._filter.choose is choose_noise
-        if chosen:
+        if self._reports:
             sigma, reported = readings.sigma.tolist(), readings.reported.tolist()
         for k, m in enumerate(measurements):
             if rejected[k]:
                 flagged.append((m.instrument, m.time))
                 continue
-            if chosen:
+            if self._reports:
                 self._report_choice(m, sigma[k], reported[k])
             self._note(m, nis[k], size[k], diagnostics)
 
@@ -268,14 +274,15 @@ class KalmanEstimator(Solver):
         if linearised is None:
             return False
         prediction.innovation[:], prediction.nominal[:] = linearised.innovation, linearised.noise
-        jacobian = np.ascontiguousarray(linearised.jacobian, dtype=np.float64)
-        project(self.covariance, jacobian, prediction.cross, prediction.predicted)
+        project.unchecked(self.covariance, ready(linearised.jacobian), prediction.cross, prediction.predicted)
         return True
 
     def choose(self, choice: Choice, covariance: Array, readings: Readings, k: int, prediction: Prediction) -> None:
-        """Ask an adaptation that chooses in Python."""
+        """Ask an adaptation that chooses in Python; without one the noise is that of the datasheet."""
         own, m = self.adaptation, self._measurements[k]
-        assert own is not None
+        if own is None:
+            prediction.noise[...] = prediction.nominal
+            return
         innovation, cross, predicted, nominal, noise = prediction
         chosen = own.adapt(Innovation(m, innovation, predicted, nominal, covariance, cross))
         if chosen is None:
@@ -305,7 +312,7 @@ class KalmanEstimator(Solver):
             self._iterations, self._iterated = max(self._iterations, count), True
         else:
             self._iterated = False
-            nis = joseph_update(covariance, cross, predicted + noise, innovation, correction)
+            nis = joseph_update.unchecked(covariance, cross, predicted + noise, innovation, correction)
         if nis >= 0.0 and self.smoother is not None:
             self.smoother.use(correction, self._linearised, noise)
         return nis

@@ -146,7 +146,7 @@ class SigmaPointEstimator(KalmanEstimator):
         if until <= self.model.time:
             return
         points = self._points
-        draw_points(self.covariance, self._spread, points)
+        draw_points.unchecked(self.covariance, self._spread, points)
         noise = self.model.propagate_points(points, until)
         mean, self.covariance[:] = self._moments(points)
         self.covariance += noise
@@ -159,7 +159,7 @@ class SigmaPointEstimator(KalmanEstimator):
         if linearised is None:
             return False
         points = self._points
-        draw_points(self.covariance, self._spread, points)
+        draw_points.unchecked(self.covariance, self._spread, points)
         values = self.model.observe_points(m, points)
         mean, prediction.predicted[:] = self._moments(values)
         prediction.innovation[:], prediction.nominal[:] = linearised.innovation - mean, linearised.noise

@@ -203,7 +203,7 @@ def test_singular_or_meaningless_measurements_change_nothing(recording_of):
     model.noise[name][:] = 0.0
     P[:3], P[:, :3] = 0.0, 0.0
     P[6:9], P[:, 6:9] = 0.0, 0.0
-    estimator.solver.dynamics.aids.noises[:] = 0.0
+    estimator.solver.dynamics.aids.figures[:] = 0.0
     compass = next(s for s in recording.instruments.of_kind("gyrocompass", "magnetic_compass"))
     upward = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
     model.dcm[:] = upward

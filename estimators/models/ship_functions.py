@@ -1,0 +1,88 @@
+"""The equations of the ship model as the functions of a filter, over its flat state."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from simnav.compiled import helper, kernel
+from simnav.estimators.algebra.joseph import project
+from simnav.kernel_types import Vector
+from simnav.types import Array
+
+from .filtering import Dynamics, ModelFunctions, Prediction, Readings
+from .propagation import Samples
+from .ship_kernels import advance_ship, correct_ship, observe_ship
+
+__all__ = ["SHIP_FUNCTIONS", "SHIP_NUMBERS", "ShipState", "ship_state"]
+
+
+class ShipState(NamedTuple):
+    """The named blocks of a flat state of a ship.
+
+    Attributes
+    ----------
+    clock : (1,) array
+        Time of the state [s].
+    position : (3,) array
+        Latitude, longitude [rad] and height [m].
+    x : (n,) array
+        The other states (`simnav.estimators.models.ship_kernels`).
+    """
+
+    clock: Vector
+    position: Vector
+    x: Vector
+
+
+#: Numbers of a flat state before its n states.
+SHIP_NUMBERS = 4
+
+
+@helper
+def ship_state(numbers: Array) -> ShipState:
+    """The named blocks of a flat state, as views."""
+    return ShipState(numbers[0:1], numbers[1:4], numbers[SHIP_NUMBERS:])
+
+
+@kernel(passed=True)
+def propagate(dynamics: Dynamics, samples: Samples, until: float) -> None:
+    """Advance the state and its covariance to a time; the constant of the motion is the time of the turn rate."""
+    state = ship_state(dynamics.numbers)
+    elapsed = until - state.clock[0]
+    if elapsed > 0.0:
+        advance_ship(
+            state.position, state.x, dynamics.covariance, dynamics.transition, dynamics.decay, dynamics.density,
+            dynamics.constants[0], elapsed,
+        )  # fmt: skip
+        state.clock[0] = until
+
+
+@kernel(passed=True)
+def predict(dynamics: Dynamics, readings: Readings, k: int, prediction: Prediction) -> bool:
+    """Compute what a reading should be, and the covariance of that (`observe_ship`)."""
+    row, d, aids, state = readings.instrument[k], readings.components[k], dynamics.aids, ship_state(dynamics.numbers)
+    jacobian = np.zeros((d, state.x.size))
+    observe_ship(
+        aids.codes[row], aids.figures[row], state.position, state.x, readings.value[k, 0], readings.value[k, d - 1],
+        prediction.innovation, jacobian, prediction.nominal,
+    )  # fmt: skip
+    project(dynamics.covariance, jacobian, prediction.cross, prediction.predicted)
+    return True
+
+
+@kernel(passed=True)
+def retract(dynamics: Dynamics) -> None:
+    """Add the correction to the state."""
+    state = ship_state(dynamics.numbers)
+    correct_ship(state.position, state.x, dynamics.correction)
+
+
+@kernel(passed=True)
+def predict_again(dynamics: Dynamics, readings: Readings, k: int, prediction: Prediction) -> None:
+    """There is no IMU: the process noise covers manoeuvres, and nothing is inflated."""
+    predict(dynamics, readings, k, prediction)
+
+
+SHIP_FUNCTIONS = ModelFunctions(propagate, predict, retract, predict_again)
