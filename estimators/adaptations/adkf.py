@@ -10,6 +10,7 @@ import numpy as np
 
 from simnav.compiled import helper, kernel
 from simnav.estimators.algebra.direct_update import normalised_square
+from simnav.estimators.models.filtering import Prediction
 from simnav.kernel_types import Matrix, Vector
 from simnav.types import Array, Instruments
 
@@ -72,15 +73,7 @@ PRINTED, FUNCTION, C0, C1, TWO, SMALLEST = range(6)
 
 
 @kernel(passed=True)
-def adkf_noise(
-    settings: Vector,
-    memory: Vector,
-    shared: Vector,
-    innovation: Vector,
-    predicted: Matrix,
-    nominal: Matrix,
-    noise: Matrix,
-) -> float:
+def adkf_noise(settings: Vector, memory: Vector, shared: Vector, prediction: Prediction) -> float:
     """Divide the nominal noise by the factor of the residual statistic (`AdaptiveFactor`).
 
     Returns
@@ -88,6 +81,12 @@ def adkf_noise(
     float
         The factor; 0 if S is singular, and then the noise is the nominal one.
     """
+    innovation, predicted, nominal, noise = (
+        prediction.innovation,
+        prediction.predicted,
+        prediction.nominal,
+        prediction.noise,
+    )
     copied(nominal, noise)
     if settings[PRINTED] > 0.0:
         statistic = _printed_residual(innovation, predicted, nominal)

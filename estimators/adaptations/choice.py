@@ -53,7 +53,7 @@ class Choice(Record):
         Settings and memory of the test (`simnav.estimators.adaptations.prediction.judge_prediction`).
     """
 
-    rule: Callable[[Vector, Vector, Vector, Vector, Matrix, Matrix, Matrix], float]
+    rule: Callable[[Vector, Vector, Vector, Prediction], float]
     estimates: bool
     inflates_disturbed: bool
     tests: bool
@@ -147,9 +147,7 @@ def choose_noise(choice: Choice, covariance: Matrix, readings: Readings, k: int,
         else:
             shared, memory = choice.shared, choice.memories[choice.first[i] : choice.first[i + 1]]
             shared[TIME], shared[INFLATION], shared[REJECT] = readings.time[k], 1.0, 0.0
-            readings.reported[k] = choice.rule(
-                choice.settings[i], memory, shared, innovation, predicted, nominal, noise
-            )
+            readings.reported[k] = choice.rule(choice.settings[i], memory, shared, prediction)
             readings.inflation[k], readings.rejected[k] = shared[INFLATION], shared[REJECT] > 0.0
             if readings.rejected[k]:
                 return
@@ -157,16 +155,9 @@ def choose_noise(choice: Choice, covariance: Matrix, readings: Readings, k: int,
 
 
 @kernel(passed=True)
-def keep_nominal(
-    settings: Vector,
-    memory: Vector,
-    shared: Vector,
-    innovation: Vector,
-    predicted: Matrix,
-    nominal: Matrix,
-    noise: Matrix,
-) -> float:
+def keep_nominal(settings: Vector, memory: Vector, shared: Vector, prediction: Prediction) -> float:
     """The rule that uses the noise of the datasheet."""
+    nominal, noise = prediction.nominal, prediction.noise
     copied(nominal, noise)
     return 0.0
 

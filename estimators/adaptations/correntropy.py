@@ -9,6 +9,7 @@ import numpy as np
 
 from simnav.compiled import kernel
 from simnav.estimators.algebra.direct_update import posterior
+from simnav.estimators.models.filtering import Prediction
 from simnav.kernel_types import Matrix, Vector
 
 from .noise import WeightedNoise
@@ -71,16 +72,14 @@ def correntropy_noise(
 
 
 @kernel(passed=True)
-def correntropy_rule(
-    settings: Vector,
-    memory: Vector,
-    shared: Vector,
-    innovation: Vector,
-    predicted: Matrix,
-    nominal: Matrix,
-    noise: Matrix,
-) -> float:
+def correntropy_rule(settings: Vector, memory: Vector, shared: Vector, prediction: Prediction) -> float:
     """Call `correntropy_noise`; settings: bandwidth, smallest weight, iterations, whether it begins with the update."""
+    innovation, predicted, nominal, noise = (
+        prediction.innovation,
+        prediction.predicted,
+        prediction.nominal,
+        prediction.noise,
+    )
     return correntropy_noise(
         innovation, predicted, nominal, settings[0], settings[1], int(settings[2]), settings[3] > 0.0, noise
     )

@@ -5,7 +5,8 @@ from __future__ import annotations
 from math import exp, isnan
 
 from simnav.compiled import kernel
-from simnav.kernel_types import Matrix, Vector
+from simnav.estimators.models.filtering import Prediction
+from simnav.kernel_types import Vector
 
 from .noise import NoiseAdaptation
 from .rules import INFLATION, OWN, TIME, copied
@@ -14,16 +15,9 @@ __all__ = ["FadingMemory", "fading_noise"]
 
 
 @kernel(passed=True)
-def fading_noise(
-    settings: Vector,
-    memory: Vector,
-    shared: Vector,
-    innovation: Vector,
-    predicted: Matrix,
-    nominal: Matrix,
-    noise: Matrix,
-) -> float:
+def fading_noise(settings: Vector, memory: Vector, shared: Vector, prediction: Prediction) -> float:
     """Inflate P by the time since the last measurement (`FadingMemory`); the noise is the nominal one; 0."""
+    nominal, noise = prediction.nominal, prediction.noise
     copied(nominal, noise)
     if not isnan(shared[OWN]):
         shared[INFLATION] = exp((shared[TIME] - shared[OWN]) / settings[0])

@@ -10,7 +10,8 @@ from simnav.compiled import kernel
 from simnav.estimators.algebra.chi_square import chi_square_limits
 from simnav.estimators.algebra.direct_update import normalised_square
 from simnav.estimators.models.channels import ChannelDatasheet
-from simnav.kernel_types import Matrix, Vector
+from simnav.estimators.models.filtering import Prediction
+from simnav.kernel_types import Vector
 from simnav.types import Array, Instruments, Measurement
 
 from .base import Innovation
@@ -26,19 +27,12 @@ HEARD, FAILING = range(2)
 
 
 @kernel(passed=True)
-def gate_noise(
-    settings: Vector,
-    memory: Vector,
-    shared: Vector,
-    innovation: Vector,
-    predicted: Matrix,
-    nominal: Matrix,
-    noise: Matrix,
-) -> float:
+def gate_noise(settings: Vector, memory: Vector, shared: Vector, prediction: Prediction) -> float:
     """Make the test of `ChiSquareGate`, without the witnesses among channels; 1 if it fails, else 0."""
-    copied(nominal, noise)
+    copied(prediction.nominal, prediction.noise)
     time = memory[HEARD] = shared[TIME]
-    if normalised_square(innovation, predicted, nominal) <= settings[LIMITS + innovation.size]:
+    square = normalised_square(prediction.innovation, prediction.predicted, prediction.nominal)
+    if square <= settings[LIMITS + prediction.innovation.size]:
         memory[FAILING] = nan
         return 0.0
     if isnan(memory[FAILING]):

@@ -9,6 +9,7 @@ import numpy as np
 
 from simnav.compiled import helper, kernel
 from simnav.estimators.algebra.direct_update import posterior
+from simnav.estimators.models.filtering import Prediction
 from simnav.kernel_types import Matrix, Vector
 from simnav.types import Array
 
@@ -178,15 +179,7 @@ def _contradicted(settings: Array, place: int, estimate: Array, nominal: Array, 
 
 
 @kernel(passed=True)
-def innovation_noise(
-    settings: Vector,
-    memory: Vector,
-    shared: Vector,
-    innovation: Vector,
-    predicted: Matrix,
-    nominal: Matrix,
-    noise: Matrix,
-) -> float:
+def innovation_noise(settings: Vector, memory: Vector, shared: Vector, prediction: Prediction) -> float:
     """Estimate the noise (`InnovationBased`), and write it into ``noise`` within its bounds, or the nominal one.
 
     Returns
@@ -194,6 +187,12 @@ def innovation_noise(
     float
         Length of the window; its negative if the innovations contradict the nominal noise.
     """
+    innovation, predicted, nominal, noise = (
+        prediction.innovation,
+        prediction.predicted,
+        prediction.nominal,
+        prediction.noise,
+    )
     m = innovation.size
     rows = _rows(settings, memory, m)
     if settings[RESIDUAL] == 0.0:

@@ -20,7 +20,7 @@ from .rules import INFLATION, OWN, REJECT, TIME, bound, scale
 __all__ = ["EstimatedNoise", "NoiseAdaptation", "Posterior", "Scope", "WeightedNoise", "scaled"]
 
 Scope = Literal["fixes", "all"]
-_NO_COVARIANCE = np.empty((0, 0))
+_NO_COVARIANCE = _NO_CROSS = np.empty((0, 0))
 
 
 class Posterior:
@@ -157,7 +157,7 @@ class NoiseAdaptation(Adaptation):
         reading.rejected[0], reading.sigma[0, 0] = False, np.nan
         self._innovation, self.inflation = innovation, 1.0
         d = len(residual)
-        prediction = Prediction(ready(residual), np.empty((0, d)), ready(predicted), ready(nominal), np.empty((d, d)))
+        prediction = Prediction(ready(residual), _NO_CROSS, ready(predicted), ready(nominal), np.empty((d, d)))
         choose = choose_noise.unchecked if self._choice.compiled else choose_noise.function
         choose(self._choice, _NO_COVARIANCE if covariance is None else ready(covariance), reading, 0, prediction)
         self.inflation = float(reading.inflation[0])
@@ -166,23 +166,20 @@ class NoiseAdaptation(Adaptation):
         self.noted(m.instrument, reading.sigma[0].tolist(), float(reading.reported[0]))
         return prediction.noise
 
-    def _ask(
-        self, settings: Array, memory: Array, shared: Array, residual: Array, predicted: Array, nominal: Array,
-        noise: Array,
-    ) -> float:  # fmt: skip
+    def _ask(self, settings: Array, memory: Array, shared: Array, prediction: Prediction) -> float:
         """The rule of an adaptation that chooses in Python."""
         chosen = self.choose(self._innovation)
         shared[INFLATION], shared[REJECT] = self.inflation, chosen is None
         if chosen is not None:
-            noise[...] = chosen
+            prediction.noise[...] = chosen
         return 0.0
 
     def ask(self, rule: Kernel[..., float], innovation: Innovation, noise: Array) -> float:
         """What a kernel of a rule returns for a measurement; it overwrites the noise."""
         m, residual, predicted, nominal, *_ = innovation
-        shared = self.rule_shared
+        shared, prediction = self.rule_shared, Prediction(residual, _NO_CROSS, predicted, nominal, noise)
         shared[TIME], shared[INFLATION], shared[REJECT] = m.time, 1.0, 0.0
-        return rule(*self.memory_of(m.instrument), shared, residual, predicted, nominal, noise)
+        return rule(*self.memory_of(m.instrument), shared, prediction)
 
     def choose(self, innovation: Innovation) -> Array | None:
         """The (m, m) noise to use, or None to reject the measurement; for an adaptation without a rule."""

@@ -6,7 +6,8 @@ from collections.abc import Callable
 from functools import partial
 
 from simnav.compiled import helper, kernel
-from simnav.kernel_types import Matrix, Vector
+from simnav.estimators.models.filtering import Prediction
+from simnav.kernel_types import Vector
 from simnav.types import Array
 
 from .base import Innovation
@@ -67,32 +68,28 @@ def _weigh(w0: float, w1: float, w2: float, smallest: float, nominal: Array, noi
 
 
 @kernel(passed=True)
-def huber_noise(
-    settings: Vector,
-    memory: Vector,
-    shared: Vector,
-    innovation: Vector,
-    predicted: Matrix,
-    nominal: Matrix,
-    noise: Matrix,
-) -> float:
+def huber_noise(settings: Vector, memory: Vector, shared: Vector, prediction: Prediction) -> float:
     """Divide the nominal noise by Huber's weights; the least. The settings are k and the smallest weight."""
+    innovation, predicted, nominal, noise = (
+        prediction.innovation,
+        prediction.predicted,
+        prediction.nominal,
+        prediction.noise,
+    )
     u0, u1, u2 = standardised(innovation, predicted, nominal)
     k = settings[0]
     return _weigh(huber(u0, k), huber(u1, k), huber(u2, k), settings[1], nominal, noise)
 
 
 @kernel(passed=True)
-def igg3_noise(
-    settings: Vector,
-    memory: Vector,
-    shared: Vector,
-    innovation: Vector,
-    predicted: Matrix,
-    nominal: Matrix,
-    noise: Matrix,
-) -> float:
+def igg3_noise(settings: Vector, memory: Vector, shared: Vector, prediction: Prediction) -> float:
     """Divide the nominal noise by IGG-III weights; the least. The settings are k0, k1, 2 and the smallest weight."""
+    innovation, predicted, nominal, noise = (
+        prediction.innovation,
+        prediction.predicted,
+        prediction.nominal,
+        prediction.noise,
+    )
     u0, u1, u2 = standardised(innovation, predicted, nominal)
     k0, k1, two = settings[0], settings[1], settings[2]
     return _weigh(

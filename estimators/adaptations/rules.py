@@ -1,8 +1,8 @@
 """Rules: the functions by which adaptations choose the noise of a reading.
 
-A rule is called ``rule(settings, memory, shared, innovation, predicted, nominal, noise)``. It receives its settings and
-its memory for an instrument, what all instruments share, the innovation (m,), H P H' (m, m) and the nominal R (m, m).
-It updates its memory, overwrites the last array with the noise to be used, and returns a number to be reported, or 0.
+A rule is called ``rule(settings, memory, shared, prediction)``. It receives its settings and its memory for an
+instrument, what all instruments share, and a `Prediction`: the innovation, H P H' and the nominal R. It updates its
+memory, overwrites ``prediction.noise`` with the noise to be used, and returns a number to be reported, or 0.
 What is shared are the time of the reading [s], the factor on P and the rejection, which the rule may set (before they
 are 1 and 0), and a number of its own, at first NaN.
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from simnav.compiled import kernel
-from simnav.kernel_types import Matrix, Vector
+from simnav.estimators.models.filtering import Prediction
+from simnav.kernel_types import Vector
 from simnav.types import Array
 
 from .base import Innovation
@@ -22,16 +23,14 @@ COUNT, BEGUN, ESTIMATE = range(3)
 
 
 @kernel(passed=True)
-def sage_husa_noise(
-    settings: Vector,
-    memory: Vector,
-    shared: Vector,
-    innovation: Vector,
-    predicted: Matrix,
-    nominal: Matrix,
-    noise: Matrix,
-) -> float:
+def sage_husa_noise(settings: Vector, memory: Vector, shared: Vector, prediction: Prediction) -> float:
     """Update the estimate by the recursion of `SageHusa`, and write it into ``noise`` within its bounds; 0."""
+    innovation, predicted, nominal, noise = (
+        prediction.innovation,
+        prediction.predicted,
+        prediction.nominal,
+        prediction.noise,
+    )
     m = innovation.size
     estimate = memory[ESTIMATE : ESTIMATE + m * m].reshape((m, m))
     if memory[BEGUN] == 0.0:

@@ -7,6 +7,7 @@ import numpy as np
 from simnav.compiled import helper, kernel
 from simnav.estimators.algebra.cholesky import factorise, invert_factor
 from simnav.estimators.algebra.direct_update import posterior
+from simnav.estimators.models.filtering import Prediction
 from simnav.kernel_types import Matrix, Vector
 from simnav.types import Array
 
@@ -77,16 +78,14 @@ def student_weight(innovation: Vector, predicted: Matrix, noise: Matrix, dof: fl
 
 
 @kernel(passed=True)
-def student_t_noise(
-    settings: Vector,
-    memory: Vector,
-    shared: Vector,
-    innovation: Vector,
-    predicted: Matrix,
-    nominal: Matrix,
-    noise: Matrix,
-) -> float:
+def student_t_noise(settings: Vector, memory: Vector, shared: Vector, prediction: Prediction) -> float:
     """Divide the nominal noise by `student_weight`, which is returned; settings: degrees of freedom, iterations."""
+    innovation, predicted, nominal, noise = (
+        prediction.innovation,
+        prediction.predicted,
+        prediction.nominal,
+        prediction.noise,
+    )
     weight = student_weight(innovation, predicted, nominal, settings[0], int(settings[1]))
     for i in range(innovation.size):
         for j in range(innovation.size):

@@ -8,6 +8,7 @@ import numpy as np
 
 from simnav.compiled import kernel
 from simnav.estimators.algebra.direct_update import posterior
+from simnav.estimators.models.filtering import Prediction
 from simnav.kernel_types import Matrix, Vector
 from simnav.types import Array
 
@@ -71,16 +72,14 @@ SHAPE, SCALES = range(2)
 
 
 @kernel(passed=True)
-def variational_bayes_noise(
-    settings: Vector,
-    memory: Vector,
-    shared: Vector,
-    innovation: Vector,
-    predicted: Matrix,
-    nominal: Matrix,
-    noise: Matrix,
-) -> float:
+def variational_bayes_noise(settings: Vector, memory: Vector, shared: Vector, prediction: Prediction) -> float:
     """Make one step of `VariationalBayes`, and write the noise of its last iteration into ``noise``; 0."""
+    innovation, predicted, nominal, noise = (
+        prediction.innovation,
+        prediction.predicted,
+        prediction.nominal,
+        prediction.noise,
+    )
     memory[SHAPE] = settings[FORGETTING] * memory[SHAPE] + 0.5
     scales = memory[SCALES : SCALES + innovation.size]
     for i in range(innovation.size):
