@@ -192,7 +192,8 @@ def test_a_learning_agent(tmp_path, monkeypatch, capsys):
 @pytest.mark.parametrize(
     ("page", "number"), [("how-to/combine-pieces.md", 0), ("how-to/combine-pieces.md", 1),
                          ("how-to/combine-pieces.md", 2), ("how-to/combine-pieces.md", 3),
-                         ("how-to/combine-pieces.md", 5),
+                         ("how-to/combine-pieces.md", 4),
+                         ("how-to/combine-pieces.md", 6),
                          ("how-to/filterpy.md", 0)],
 )  # fmt: skip
 def test_estimators_of_the_guides_keep_the_contract(tmp_path, page, number):
@@ -204,7 +205,7 @@ def test_estimators_of_the_guides_keep_the_contract(tmp_path, page, number):
 
 def test_parameters_that_two_pieces_have_in_common():
     names = dict[str, Any]()
-    exec(blocks("how-to/combine-pieces.md", "python")[4], names)
+    exec(blocks("how-to/combine-pieces.md", "python")[5], names)
     assert (names["row"].adaptation.dof, names["row"].smoother.dof) == (8.0, 6.0)
 
 
