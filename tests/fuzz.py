@@ -7,6 +7,7 @@ well; any other exception is a traceback for a user, and is counted.
 from __future__ import annotations
 
 import argparse
+import math
 import random
 import re
 import sys
@@ -16,14 +17,16 @@ import warnings
 from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import simnav.scenarios
 from simnav.leaderboard.results.errors import sentence
 from simnav.log.delimited import read_csv
 from simnav.log.nmea import read_nmea
 from simnav.scenario import parse
+from simnav.scenario.draws import Template, has_draws
 
-__all__ = ["fuzz_logs", "fuzz_tomls"]
+__all__ = ["fuzz_draws", "fuzz_logs", "fuzz_tomls"]
 
 _VALUES = [
     "0", "-1", "1e11", "1e308", "-1e308", "5e-324", "nan", "inf", "-inf", "9" * 5000, '""', '"x"', "true", "[]", "{}",
@@ -96,6 +99,59 @@ def fuzz_tomls(number: int, seed: int = 0) -> Counter[str]:
     return _count(number, seed, one)
 
 
+#: Keys that mean something to a draw, and some that could be taken for a path.
+_KEYS = [
+    "uniform", "log_uniform", "normal", "integers", "choice", "weights", "present", "draw", "times", "plus", "cases",
+    "a", "b", "a.b", "a[0]", "choice[0]", "", "speed_m_s",
+]  # fmt: skip
+_PLAIN = [0, 1, 2, 2.5, 7, True, False]
+_NUMBERS = [*_PLAIN, -1, 1e308, -1e308, 5e-324, 10**30, -(10**30), 10**400, math.inf, math.nan, "a", "x"]
+
+
+def _anything(chance: random.Random, depth: int) -> Any:
+    """A value of a scenario file, with draws in places where nobody puts them."""
+    kind = chance.randrange(9) if depth else chance.randrange(3)
+    if kind < 3:
+        return chance.choice(_NUMBERS if chance.random() < 0.1 else _PLAIN)
+    if kind == 3:
+        return [_anything(chance, depth - 1) for _ in range(chance.randrange(4))]
+    if kind == 4:
+        return {chance.choice(_KEYS): _anything(chance, depth - 1) for _ in range(chance.randrange(4))}
+    more = {"present": _anything(chance, depth - 1)} if chance.random() < 0.1 else {}
+    if kind == 5:
+        ends = [1, 3] if chance.random() < 0.8 else [chance.choice(_NUMBERS), chance.choice(_NUMBERS)]
+        return {chance.choice(_KEYS[:4]): ends, **more}
+    if kind == 6:
+        options = [_anything(chance, depth - 1) for _ in range(chance.randrange(1, 4))]
+        weights = {"weights": [chance.choice(_NUMBERS) for _ in options]} if chance.random() < 0.1 else {}
+        return {"choice": options, **weights, **more}
+    if kind == 7:
+        return {"draw": chance.choice(_KEYS[11:]), "cases": {
+            chance.choice([*_KEYS, "true", "1"]): _anything(chance, depth - 1) for _ in range(chance.randrange(4))
+        }}  # fmt: skip
+    form: dict[str, Any] = {"draw": chance.choice(_KEYS[11:])}
+    for key in ("times", "plus"):
+        if chance.random() < 0.5:
+            form[key] = _anything(chance, depth - 1)
+    return form | more
+
+
+def fuzz_draws(number: int, seed: int = 0) -> Counter[str]:
+    """Tables of random draws, one within the other: each has values at the ends of all ranges and for a seed."""
+
+    def one(chance: random.Random) -> None:
+        keys = _KEYS if chance.random() < 0.1 else _KEYS[11:]
+        table = {chance.choice(keys): _anything(chance, 3) for _ in range(chance.randint(1, 2))}
+        if chance.random() < 0.8:
+            table["draw"] = {name: _anything(chance, 2) for name in _KEYS[11:]}
+        template = Template(table, "fuzz.toml")
+        for drawn in (template.middle(), template.drawn(1)[0], *(table for table, _ in template.extremes())):
+            if has_draws(drawn) or "absent" in repr(drawn):
+                raise RuntimeError(f"{drawn!r} still has draws")
+
+    return _count(number, seed, one)
+
+
 def fuzz_logs(number: int, seed: int = 0) -> Counter[str]:
     """CSV and NMEA logs, broken."""
     with tempfile.TemporaryDirectory() as folder:
@@ -116,10 +172,15 @@ def main() -> int:
     """Print the counts; 1 where there was a traceback."""
     arguments = argparse.ArgumentParser(prog="python -m tests.fuzz", description=__doc__)
     arguments.add_argument("--tomls", type=int, default=10_000)
+    arguments.add_argument("--draws", type=int, default=10_000)
     arguments.add_argument("--logs", type=int, default=3_000)
     arguments.add_argument("--seed", type=int, default=0)
     given = arguments.parse_args()
-    found = {"TOMLs": fuzz_tomls(given.tomls, given.seed), "logs": fuzz_logs(given.logs, given.seed)}
+    found = {
+        "TOMLs": fuzz_tomls(given.tomls, given.seed),
+        "draws": fuzz_draws(given.draws, given.seed),
+        "logs": fuzz_logs(given.logs, given.seed),
+    }
     for what, counts in found.items():
         print(f"{what}: {counts['read']} read, {counts['refused']} refused")
         for name, count in counts.items():

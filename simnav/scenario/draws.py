@@ -17,7 +17,9 @@ change the others.
 from __future__ import annotations
 
 import copy
+import json
 import math
+import sys
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, TypeAlias
@@ -35,6 +37,8 @@ Draws: TypeAlias = dict[str, Any]
 _KINDS = ("uniform", "log_uniform", "normal", "integers", "choice")
 #: A normal variate is cut off at so many sigmas, so that a scenario can be checked for all of its draws.
 _CUT = 4.0
+#: Whole numbers are smaller, as the generator of random numbers asks for.
+_LARGEST = 10**18
 #: Random draws with which a scenario is tried when it is loaded, besides the ends of each range.
 _TRIES = 12
 
@@ -81,9 +85,12 @@ class Distribution:
             raise SpecError(f"{where}.{kind} = {values!r}: the lowest should be less than the highest")
         if kind == "log_uniform" and not a > 0.0:
             raise SpecError(f"{where}.log_uniform = {values!r}: the lowest should be greater than 0")
-        if kind == "integers" and not (isinstance(a, int) and isinstance(b, int)):
-            raise SpecError(f"{where}.integers = {values!r} should be two whole numbers")
-        return cls(kind, (a, b))
+        if kind == "integers" and not all(isinstance(x, int) and abs(x) < _LARGEST for x in values):
+            raise SpecError(f"{where}.integers = {values!r} should be two whole numbers of at most 18 digits")
+        found = cls(kind, (a, b))
+        if not _is_number(float(b) - float(a)) or not all(map(_is_number, found.ends())):
+            raise SpecError(f"{where}.{kind} = {values!r}: the range is too wide for a floating-point number")
+        return found
 
     def sample(self, rng: np.random.Generator) -> Any:
         """Draw a value."""
@@ -130,7 +137,8 @@ def _highest(distribution: Distribution) -> Any:
 
 
 def _is_number(value: Any) -> bool:
-    return isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
+    """Whether it is a finite number; whole numbers end where floating-point numbers do."""
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) <= sys.float_info.max
 
 
 def _options(values: Any, weights: Any, where: str) -> tuple[tuple[Any, ...], tuple[float, ...]]:
@@ -142,6 +150,8 @@ def _options(values: Any, weights: Any, where: str) -> tuple[tuple[Any, ...], tu
         raise SpecError(f"{where}.weights = {weights!r} should be {len(values)} numbers, one an option")
     if min(weights) < 0.0 or not sum(weights) > 0.0:
         raise SpecError(f"{where}.weights = {weights!r} should not be negative, and not all 0")
+    if not _is_number(sum(map(float, weights))):
+        raise SpecError(f"{where}.weights = {weights!r}: their sum should be a finite number")
     return tuple(values), tuple(map(float, weights))
 
 
@@ -156,7 +166,25 @@ def _is_reference(value: Any) -> bool:
 _KINDS_SET = frozenset(_KINDS)
 #: Table of an instrument that few files have; a path may begin it.
 _FACTORS = "times_datasheet"
-_DROPPED = object()
+
+
+class _Dropped:
+    """What is left of a table with ``present = false``: nothing. Copies of it are the same object."""
+
+    def __repr__(self) -> str:
+        return "absent"
+
+    def __copy__(self) -> _Dropped:
+        return self
+
+
+_DROPPED = _Dropped()
+
+
+def _below(where: str, key: str) -> str:
+    """The path of a key of a table. A key that could be taken for a longer path stands in quotes."""
+    part = key if key and not set(key) & set('.[]"') else json.dumps(key)
+    return f"{where}.{part}" if where else part
 
 
 def has_draws(table: Mapping[str, Any]) -> bool:
@@ -200,12 +228,17 @@ class Template:
         named = table.get("draw", {})
         if not isinstance(named, Mapping):
             raise SpecError(f"{source}: draw = {named!r} should be a table of named draws ([draw])")
+        for key in table:
+            if key in _KINDS_SET or key == "present":
+                raise SpecError(
+                    f"{source}: {key} = {table[key]!r}: a whole file is not drawn; this belongs into a table"
+                )
         self._named: Mapping[str, Any] = named
         self._body = {key: value for key, value in table.items() if key != "draw"}
         self.distributions: dict[str, Distribution] = {}
         try:
             for name, value in named.items():
-                self._collect(value, f"draw.{name}")
+                self._collect(value, _below("draw", name))
             self._collect(self._body, "")
         except SpecError as error:
             raise SpecError(f"{source}: {error}") from None
@@ -218,15 +251,19 @@ class Template:
     def _collect(self, value: Any, where: str) -> None:
         """Find and read all distributions, and check all references."""
         if _is_distribution(value):
-            found = self.distributions.setdefault(where, Distribution.read(value, where))
+            found = self.distributions[where] = Distribution.read(value, where)
             for i, option in enumerate(found.values if found.kind == "choice" else ()):
                 self._collect(option, f"{where}.choice[{i}]")
             self._collect(value.get("present", True), f"{where}.present")
+        elif _is_reference(value):
+            _check_reference(value, where, self._named)
+            for key in ("times", "plus"):
+                self._collect(value.get(key), f"{where}.{key}")
+            for case, inner in value.get("cases", {}).items():
+                self._collect(inner, _below(f"{where}.cases", case))
         elif isinstance(value, dict):
-            if _is_reference(value):
-                _check_reference(value, where, self._named)
             for key, inner in value.items():
-                self._collect(inner, f"{where}.{key}" if where else str(key))
+                self._collect(inner, _below(where, key))
         elif isinstance(value, list):
             for i, inner in enumerate(value):
                 self._collect(inner, f"{where}[{i}]")
@@ -328,7 +365,7 @@ class _Resolution:
             if name in self._pending:
                 raise SpecError(f"draw.{name} refers to itself, by way of {' and '.join(self._pending)}")
             self._pending.append(name)
-            self._values[name] = self._value(self._named[name], f"draw.{name}")
+            self._values[name] = self._value(self._named[name], _below("draw", name))
             self._pending.pop()
         return self._values[name]
 
@@ -340,11 +377,7 @@ class _Resolution:
         if _is_reference(value):
             return self._reference(value, where)
         if isinstance(value, dict):
-            inner = {
-                key: self._value(v, f"{where}.{key}" if where else str(key))
-                for key, v in value.items()
-                if key != "present"
-            }
+            inner = {key: self._value(v, _below(where, key)) for key, v in value.items() if key != "present"}
             return {key: v for key, v in inner.items() if v is not _DROPPED}
         if isinstance(value, list):
             items = [self._value(v, f"{where}[{i}]") for i, v in enumerate(value)]
@@ -374,14 +407,17 @@ class _Resolution:
                 raise SpecError(
                     f"{where}.cases: there is none for {value['draw']} = {case!r}{closest(case, list(value['cases']))}"
                 )
-            return self._value(value["cases"][case], f"{where}.cases.{case}")
+            return self._value(value["cases"][case], _below(f"{where}.cases", case))
         if len(value) == 1:
             return copy.copy(drawn)
         times, plus = (self._value(value.get(k, d), f"{where}.{k}") for k, d in (("times", 1.0), ("plus", 0.0)))
         for key, number in ((f"draw.{value['draw']}", drawn), (f"{where}.times", times), (f"{where}.plus", plus)):
             if not _is_number(number):
                 raise SpecError(f"{key} = {number!r} should be a number")
-        return times * drawn + plus
+        result = times * drawn + plus
+        if not _is_number(result):
+            raise SpecError(f"{where} = {times!r} * {drawn!r} + {plus!r} should be a finite number")
+        return result
 
 
 def with_values(table: Mapping[str, Any], values: Mapping[str, Any], source: str = "<toml>") -> dict[str, Any]:

@@ -17,7 +17,7 @@ from typing import Any
 
 from simnav.leaderboard.campaign.confinement import bubblewrap
 from simnav.leaderboard.results import store
-from tests.fuzz import fuzz_logs, fuzz_tomls
+from tests.fuzz import fuzz_draws, fuzz_logs, fuzz_tomls
 from tests.hostile.answers import fuzz_answers
 from tests.hostile.attacks import CHEATS, Harm, cheats, plain, vandals
 from tests.hostile.channels import told
@@ -25,8 +25,8 @@ from tests.hostile.meetings import seen
 
 __all__ = ["kills", "parts", "rows"]
 
-KILLS, TOMLS, LOGS, ANSWERS = 100, 10_000, 3_000, 4_000
-_KILLS, _TOMLS, _LOGS, _ANSWERS = 10, 10, 3, 10  # parts of each
+KILLS, TOMLS, DRAWS, LOGS, ANSWERS = 100, 10_000, 20_000, 3_000, 4_000
+_KILLS, _TOMLS, _DRAWS, _LOGS, _ANSWERS = 10, 10, 2, 3, 10  # parts of each
 
 _CAMPAIGN = """
 import sys
@@ -51,6 +51,7 @@ def parts() -> dict[str, Callable[[], Any]]:
         found[f"vandals-{kind}"] = partial(_in_folder, lambda folder, kind=kind: asdict(vandals(folder, kind)))
     found |= {f"kills-{k}": partial(kills, KILLS // _KILLS, k) for k in range(_KILLS)}
     found |= {f"tomls-{k}": partial(_tracebacks, fuzz_tomls, TOMLS // _TOMLS, k) for k in range(_TOMLS)}
+    found |= {f"draws-{k}": partial(_tracebacks, fuzz_draws, DRAWS // _DRAWS, k) for k in range(_DRAWS)}
     found |= {f"logs-{k}": partial(_tracebacks, fuzz_logs, LOGS // _LOGS, k) for k in range(_LOGS)}
     found |= {f"answers-{k}": partial(_raised, ANSWERS // _ANSWERS, k) for k in range(_ANSWERS)}
     return found
@@ -78,9 +79,9 @@ def rows(found: Mapping[str, Any]) -> Iterator[tuple[str, str, str, bool]]:
     yield f"campaigns with other results after {killed} SIGKILLs", f"{differ} of {campaigns}", "0", not differ
     raised = sum(len(found[f"answers-{k}"]) for k in range(_ANSWERS))
     yield "runs with random answers that end a campaign", f"{raised} of {ANSWERS}", "0", not raised
-    for what, count, blocks in (("tomls", TOMLS, _TOMLS), ("logs", LOGS, _LOGS)):
+    for what, count, blocks in (("tomls", TOMLS, _TOMLS), ("draws", DRAWS, _DRAWS), ("logs", LOGS, _LOGS)):
         bad = sum(len(found[f"{what}-{k}"]) for k in range(blocks))
-        name = what.replace("tomls", "TOMLs")
+        name = {"tomls": "TOMLs", "draws": "tables of draws"}.get(what, what)
         yield f"broken {name} that give a traceback", f"{bad} of {count}", "0", not bad
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from simnav.leaderboard.campaign.confinement.attempt import chosen_confinement
 from simnav.warmup import warmup
-from tests.fuzz import fuzz_logs, fuzz_tomls
+from tests.fuzz import fuzz_draws, fuzz_logs, fuzz_tomls
 from tests.hostile.answers import fuzz_answers
 from tests.hostile.attacks import ANSWERS, CHEATS, VANDALS, cheats, vandals
 from tests.hostile.channels import told
@@ -62,6 +62,6 @@ def test_no_answer_ends_a_campaign() -> None:
 
 def test_no_broken_file_gives_a_traceback() -> None:
     """A sample; ``python -m tests.fuzz`` does thousands."""
-    found = fuzz_tomls(60, seed=1) + fuzz_logs(60, seed=1)
+    found = fuzz_tomls(60, seed=1) + fuzz_draws(2000, seed=1) + fuzz_logs(60, seed=1)
     assert set(found) <= {"read", "refused"}
     assert found["refused"] > 10

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pickle
 import tomllib
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -253,6 +254,32 @@ def test_a_bad_distribution_gets_a_sentence(old: str, new: str, sentence: str):
     assert sentence in str(error.value)
     assert str(error.value).startswith("f.toml: ")
     assert "\n" not in str(error.value)
+
+
+def test_a_whole_file_is_not_drawn():
+    """Found by `python -m tests.audit security`: a line moved out of the table of an instrument."""
+    path = Path(__file__).parents[2] / "cases" / "presence_of_a_file.toml"
+    with pytest.raises(SpecError, match=r"present = .* a whole file is not drawn; this belongs into a table"):
+        parse(path.read_text(encoding="utf-8"))
+
+
+def test_keys_that_look_like_paths_have_draws_of_their_own():
+    table = {"a": {"b": {"choice": [1, 2]}}, "a.b": {"choice": [{"c": {"uniform": [3, 4]}}]}, "": {"uniform": [5, 6]}}
+    drawn, draws = Template(table, "test").drawn(0)
+    assert drawn["a"]["b"] in (1, 2)
+    assert 3 < drawn["a.b"]["c"] < 4
+    assert 5 < drawn[""] < 6
+    assert set(draws) == {"a.b", '"a.b"', '"a.b".choice[0].c', '""'}
+
+
+def test_a_case_may_have_the_name_of_a_distribution():
+    table = {"draw": {"x": {"choice": ["choice"]}}, "y": {"draw": "x", "cases": {"choice": 3, "uniform": 4}}}
+    assert Template(table, "test").drawn(0)[0] == {"y": 3}
+
+
+def test_a_draw_that_is_absent_leaves_its_key_out():
+    table = {"draw": {"x": {"present": False}}, "y": {"draw": "x"}, "z": 1}
+    assert Template(table, "test").drawn(0)[0] == {"z": 1}
 
 
 def test_the_head_of_a_file_with_a_drawn_duration(tmp_path, monkeypatch):
