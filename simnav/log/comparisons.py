@@ -26,7 +26,7 @@ from simnav.types import KINDS, Array
 __all__ = ["COURSE_FROM", "GAP", "MOST", "Inertial", "Streams", "comparisons"]
 
 #: Times at which streams are compared at most; interval of the IMU [s].
-MOST, _INTERVAL = 800, 1.0
+MOST, _INTERVAL = 600, 1.0
 #: Holes of the reference that are bridged, in its usual spacings.
 GAP = 3.0
 #: A course has a meaning from this speed on [m/s]; over so many seconds it is taken.
@@ -37,9 +37,9 @@ _TURN_OVER = 4.0
 _PHASES = np.array([-0.375, -0.125, 0.125, 0.375])
 #: Prior standard deviations of parameters of small effect.
 _MOUNTING, _GYROSCOPE, _ACCELEROMETER = np.radians(4.0), 0.003, 0.3
-_ARM, _ANTENNA, _SCALE, _DVL_BIAS = 2.0, 15.0, 0.03, 0.05
+_ARM, _ANTENNA, _SCALE, _DVL_BIAS = 2.0, 5.0, 0.03, 0.05
 #: Usual sizes of differences: turn in a second [rad], force [m/s^2], velocity [m/s], heading, position [m].
-_TURN, _FORCE, _SPEED, _HEADING, _PLACE = np.radians(0.3), 0.3, 0.15, np.radians(4.0), 4.0
+_TURN, _FORCE, _SPEED, _HEADING, _PLACE = np.radians(0.3), 0.3, 0.15, np.radians(4.0), 2.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,8 +149,22 @@ class Streams:
     def _with_reference(self, other: Streams, *, same: bool) -> Streams:
         """Splines are made once."""
         if same:
-            other.__dict__["reference"] = self.reference
+            other.__dict__.update(reference=self.reference, known=self.known)
         return other
+
+    @cached_property
+    def known(self) -> dict[tuple[Any, ...], Array]:
+        """What the reference says at times at which it was asked already."""
+        return {}
+
+    def _once(self, what: str, time: Array, found: Callable[[], Array]) -> Array:
+        if not len(time):
+            return found()
+        key = (what, self.late, len(time), float(time[0]), float(time[-1]))
+        if key not in self.known:
+            self.known[key] = found()
+            self.known[key].flags.writeable = False
+        return self.known[key]
 
     @cached_property
     def spacing(self) -> float:
@@ -176,13 +190,19 @@ class Streams:
 
     def places(self, time: Array) -> Array:
         """(n, 3) positions of the reference [rad, rad, m]."""
-        return self.reference.states(time + self.late).position
+        return self._once("position", time, lambda: self.reference.states(time + self.late).position)
 
     def velocities(self, time: Array) -> Array:
         """(n, 3) velocities of the reference, else by differences of its positions over a few seconds [m/s]."""
-        found = self.reference.states(time + self.late).velocity
-        derived = self.moved(time, max(2.0, 2.0 * self.spacing))
-        return np.where(np.isfinite(found), found, derived)
+
+        def both() -> Array:
+            found = self.reference.states(time + self.late).velocity
+            whole = bool(np.isfinite(found).all())
+            return (
+                found if whole else np.where(np.isfinite(found), found, self.moved(time, max(2.0, 2.0 * self.spacing)))
+            )
+
+        return self._once("velocity", time, both)
 
     def moved(self, time: Array, span: float) -> Array:
         """(n, 3) mean velocities from differences of the positions about n times [m/s].
@@ -190,15 +210,19 @@ class Streams:
         They are averaged over a spacing of the positions: between two fixes an interpolation has less noise than at a
         fix, and a delay of half a spacing would seem the better one.
         """
-        found = []
-        for shift in _PHASES * self.spacing:
-            a, b = self.places(time + shift - 0.5 * span), self.places(time + shift + 0.5 * span)
-            found.append(relative_position(b, a) / span)
-        return np.asarray(np.mean(found, axis=0))
+
+        def mean() -> Array:
+            found = []
+            for shift in _PHASES * self.spacing:
+                a, b = self.places(time + shift - 0.5 * span), self.places(time + shift + 0.5 * span)
+                found.append(relative_position(b, a) / span)
+            return np.asarray(np.mean(found, axis=0))
+
+        return self._once(f"moved {span}", time, mean)
 
     def attitudes(self, time: Array) -> Array:
         """(n, 3) roll, pitch, yaw of the reference [rad]."""
-        return self.reference.states(time + self.late).attitude
+        return self._once("attitude", time, lambda: self.reference.states(time + self.late).attitude)
 
     def headings(self) -> dict[str, Callable[[Array], Array]]:
         """By name, what gives the heading at n times [rad]: the reference and the compasses."""
@@ -334,7 +358,7 @@ def _turn_of_gravity(s: Streams) -> Residual | None:
     middle = time + _INTERVAL
     before, after = _imu(s).forces(time, middle), _imu(s).forces(middle, middle + _INTERVAL)
     turned = _imu(s).turns(time + 0.5 * _INTERVAL, middle + 0.5 * _INTERVAL)
-    known = np.isfinite(turned).all(axis=1)
+    known = np.asarray(np.isfinite(turned).all(axis=1), dtype=np.bool_)
     dcm = dcm_from_rotation_vector(np.where(known[:, None], turned, 0.0))
     difference = after - np.asarray(np.einsum("nji,nj->ni", dcm, before))
     difference[~known] = np.nan
@@ -437,6 +461,13 @@ def _rotated(s: Streams, time: Array) -> tuple[Array, Array] | None:
     pose = s.pose(time)
     if pose is None:
         return None
+    if s.attitude is not None:
+        dcm = s._once("dcm", time, lambda: _turned(s, time, pose)[0])
+        return dcm, s._once("rate", time, lambda: _turned(s, time, pose)[1])
+    return _turned(s, time, pose)
+
+
+def _turned(s: Streams, time: Array, pose: Array) -> tuple[Array, Array]:
     around = np.stack([p for p in (s.pose(time - 0.5), s.pose(time + 0.5)) if p is not None])
     dcm = dcm_from_rpy(np.nan_to_num(pose))
     before, after = dcm_from_rpy(np.nan_to_num(around))
@@ -471,14 +502,17 @@ def _velocity(s: Streams, name: str) -> Residual | None:
 
 def _fix(s: Streams, name: str) -> Residual | None:
     """Positions of an instrument and of the reference, apart by a lever arm or a constant offset."""
-    time, value = _picked(s.instruments[name][1], s.begin)
+    _, series, arm = s.instruments[name]
+    time, value = _picked(series, s.begin)
     place = s.places(time)
     d = value.shape[1]
     measured = value if d == 3 else np.column_stack([value, place[:, 2]])
     difference = relative_position(measured, np.where(np.isfinite(place), place, np.nan))[:, :d]
     turned = _rotated(s, time)
-    arm = () if turned is None else ((np.nan_to_num(turned[0])[:, :d], _ANTENNA),)
-    return _residual(difference, _PLACE, (_constant(len(time), d), _ANTENNA), *arm)
+    if turned is None:
+        return _residual(difference, _PLACE, (_constant(len(time), d), _ANTENNA))
+    dcm = np.nan_to_num(turned[0])[:, :d]
+    return _residual(difference - dcm @ arm, _PLACE, (_constant(len(time), d), _ANTENNA), (dcm, _ANTENNA))
 
 
 def _heading(s: Streams, name: str) -> Residual | None:

@@ -99,7 +99,7 @@ def fit(residual: Residual) -> Fit:
     count = known.sum(axis=0)
     parameters, left = np.zeros(p), value
     samples, mean_square = np.zeros(d), np.zeros(d)
-    for _ in range(3):
+    for turn in range(3):
         left = value - design @ parameters if p else value
         weight = np.zeros((n, d))
         for i in range(d):
@@ -108,7 +108,8 @@ def fit(residual: Residual) -> Fit:
                 continue
             limit = max(_FAR * _NORMAL * float(np.median(np.abs(here))), 1e-12)
             clipped = np.clip(here, -limit, limit)
-            samples[i] = effective_samples(clipped)
+            if turn != 1:
+                samples[i] = effective_samples(clipped)
             mean_square[i] = float(np.mean(clipped**2))
             scale = _NU * residual.size[i] ** 2 + samples[i] * mean_square[i]
             weight[known[:, i], i] = (samples[i] + _NU) * samples[i] / (scale * count[i])

@@ -416,7 +416,7 @@ def _of_vector(
 
 def _of_heading(name: str, table: str, where: LogInstrumentSpec, series: Series) -> Iterator[_Reading]:
     """Sign and zero of a heading: clockwise from north, or anticlockwise from east; mounted backwards or across."""
-    column = where.columns[0]
+    column, mounted = where.columns[0], float(np.round(np.degrees(where.mounting[2]), 6))
     for sign in _FLIPS:
         for yaw in (0.0, 90.0, 180.0, -90.0):
             if sign > 0.0 and yaw == 0.0:
@@ -427,10 +427,10 @@ def _of_heading(name: str, table: str, where: LogInstrumentSpec, series: Series)
                 changes = [(table, "frame", "geodetic" if where.frame == "enu" else "enu")]
             else:
                 changes += [(table, "columns", [_flip(column)])] if sign < 0.0 else []
-                changes += [(table, "mounting_deg", [0.0, 0.0, -yaw])] if yaw else []
-            if not frame and (where.frame == "enu" or (yaw and any(where.mounting))):
+                changes += [(table, "mounting_deg", [0.0, 0.0, mounted - yaw])] if yaw else []
+            if not frame and where.frame == "enu":
                 continue
-            value = wrap_angle(sign * series.value + np.radians(yaw))
+            value = wrap_angle(sign * (series.value + where.mounting[2]) - where.mounting[2] + np.radians(yaw))
             other = "north, clockwise" if where.frame == "enu" else "east, anticlockwise"
             what = f"{'minus ' if sign < 0.0 else ''}{column}" + (f" and {yaw:g} deg" if yaw else "")
             what = f"the heading of {name!r} is " + (f"counted from {other}" if frame else what)
