@@ -20,7 +20,7 @@ import numpy as np
 
 from simnav.types import Array
 
-__all__ = ["Fit", "Residual", "effective_samples", "fit", "log_ratio"]
+__all__ = ["Fit", "Residual", "effective_samples", "fit", "log_ratios"]
 
 #: Degrees of freedom of the prior of a variance.
 _NU = 4.0
@@ -122,12 +122,12 @@ def fit(residual: Residual) -> Fit:
     return Fit(samples, mean_square, residual.size, 0.5 * float(np.sum((parameters / residual.spread) ** 2)))
 
 
-def log_ratio(other: Fit, present: Fit) -> float:
-    """Logarithm of the likelihood of one reading over that of another, by the same comparison."""
+def log_ratios(other: Fit, present: Fit) -> Array:
+    """Logarithms of the likelihood of one reading over that of another, by component; without the penalties."""
     samples = np.minimum(other.samples, present.samples)
     prior = _NU * present.size**2
 
     def density(one: Fit) -> Array:
         return -0.5 * (samples + _NU) * np.log(prior + samples * one.mean_square)
 
-    return float(np.sum((density(other) - density(present))[samples > 0.0])) - other.penalty + present.penalty
+    return np.asarray(np.where(samples > 0.0, density(other) - density(present), 0.0))

@@ -23,7 +23,7 @@ from simnav.kinds import BODY_VELOCITY, HEADING, VELOCITY
 from simnav.log.channel import Series, read_channel, skip_of
 from simnav.log.comparisons import Inertial, Streams, comparisons
 from simnav.log.imu_series import read_imu
-from simnav.log.likelihood import Fit, fit, log_ratio
+from simnav.log.likelihood import Fit, fit, log_ratios
 from simnav.log.units import DIMENSIONS, factor
 from simnav.spec import SpecError
 from simnav.types import KINDS, Array
@@ -35,8 +35,9 @@ if TYPE_CHECKING:
 __all__ = ["ProbableReading", "probable_readings"]
 
 #: Another reading is far more likely from this log likelihood ratio on, if it also leaves at most this part of the
-#: product of all mean squares: of many samples a slight difference is significant, too, but may be one of the models.
-_FAR, _PART = 12.0, 0.5
+#: product of the mean squares of all components with a log likelihood ratio above the third figure: of many samples a
+#: slight difference is significant, too, but may be one of the models.
+_FAR, _PART, _TELLING = 12.0, 0.5, 3.0
 #: What speaks so much against a reading is not made good by other comparisons, which are left out.
 _AGAINST = -40.0
 #: Delays that are tried [s]; `simnav.log.alignment` finds shorter ones.
@@ -199,10 +200,10 @@ def _best(log: RecordedSpec, streams: Streams) -> tuple[_Reading, ProbableReadin
             if residual is None:
                 continue
             fitted = fit(residual)
-            ratio += log_ratio(fitted, present[parts])
-            both = (fitted.samples > 0.0) & (present[parts].samples > 0.0)
-            before, after = ((f.mean_square + 0.1 * f.size**2)[both] for f in (present[parts], fitted))
-            left += float(np.sum(np.log(after / before)))
+            each = log_ratios(fitted, present[parts])
+            ratio += float(each.sum()) - fitted.penalty + present[parts].penalty
+            before, after = (f.mean_square + 0.1 * f.size**2 for f in (present[parts], fitted))
+            left += float(np.sum(np.log(after / before)[np.abs(each) > _TELLING]))
         readings.setdefault(reading.stream, []).append((reading, ratio, left < np.log(_PART)))
     likeliest: tuple[_Reading, ProbableReading] | None = None
     for stream, tried in readings.items():
