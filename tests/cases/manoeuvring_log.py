@@ -135,7 +135,9 @@ def make_log(root: Path, *, steady: bool = False) -> None:
     roll, pitch = sway * 0.12 * np.sin(0.7 * time), sway * (0.07 * np.sin(0.55 * time + 1.0) + 0.03)
     ahead = 2.0 + sway * (0.8 * np.sin(0.06 * time) + 0.3 * np.sin(0.21 * time))
     aside, down = sway * 0.25 * np.sin(0.08 * time + 2.0), sway * 0.3 * np.sin(0.05 * time)
-    velocity = np.stack([ahead * np.cos(yaw) - aside * np.sin(yaw), ahead * np.sin(yaw) + aside * np.cos(yaw), down], -1)
+    velocity = np.stack(
+        [ahead * np.cos(yaw) - aside * np.sin(yaw), ahead * np.sin(yaw) + aside * np.cos(yaw), down], -1
+    )
     attitude = np.stack([roll, pitch, yaw], axis=-1)
     samples, position = increments(time, np.array([0.8, 0.2, -20.0]), velocity, attitude)
     rates = samples.angular_rate + np.radians(0.02) * chance.standard_normal(samples.angular_rate.shape)
