@@ -312,13 +312,15 @@ def draft(streams: Sequence[Stream], name: str = "my-log", file: str | None = No
 
 
 def _solution(found: Sequence[Guess]) -> dict[str, Guess] | None:
-    """Position, velocity, roll and pitch, and heading of one stream that has them all, where other streams have fixes,
-    an IMU or a velocity: it is a solution of all of them, or the truth."""
+    """Position, velocity, roll and pitch, and heading of one stream that has them all, where other streams aid.
+
+    It is a solution of all of them, or the truth. Where no other stream has fixes or a velocity, its own are needed.
+    """
     by_stream: dict[int, dict[str, Guess]] = {}
     for guess in found:
         by_stream.setdefault(id(guess.stream), {}).setdefault(guess.quantity, guess)
     whole = [g for g in by_stream.values() if {"position", "velocity", "level", "heading"} <= set(g)]
-    measured = ("position", "angular_rate", "dvl", "speed")
+    measured = ("position", "dvl", "speed")
     chosen = max(whole, key=lambda g: len(g["position"].stream.time), default=None)
     if chosen is None or not any(set(g) & set(measured) for g in by_stream.values() if g is not chosen):
         return None
