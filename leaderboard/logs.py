@@ -131,8 +131,24 @@ def inspect_log(request: InspectRequest) -> tuple[list[Stream], list[str]]:
         streams, failed = inspect_log([absolute(path) for path in given])
         if target is not None and streams:
             words = "".join(c if c.isascii() and c.isalnum() else " " for c in target.stem.lower()).split()
-            write_whole(target, draft(streams, "-".join(words) or "my-log", target.name))
+            text = draft(streams, "-".join(words) or "my-log", target.name)
+            write_whole(target, _as_read_probably(text, target))
     return streams, failed
+
+
+def _as_read_probably(text: str, target: Path) -> str:
+    """The draft of a scenario with the readings of its streams that are far more likely, and their probability."""
+    from simnav.log.channel import list_recordings
+    from simnav.log.draft import rewritten
+    from simnav.log.readings import probable_readings
+    from simnav.scenario import parse
+
+    try:
+        scenario = parse(text, source=target.name)
+        assert scenario.log is not None
+        return rewritten(text, probable_readings(scenario, list_recordings(scenario.log)[0]))
+    except (ValueError, OSError):  # nothing to compare yet: 'simnav check' says what the draft lacks
+        return text
 
 
 @call(AlignRequest)

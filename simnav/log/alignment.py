@@ -9,7 +9,7 @@ sum of squares. Residuals of an instrument are correlated, so that its sigmas ar
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,6 +20,7 @@ from simnav.kinds import BODY_VELOCITY, DEPTH, HEADING, HORIZONTAL_POSITION, POS
 from simnav.log.channel import Series, list_recordings, read_channel
 from simnav.log.imu_alignment import imu_alignment
 from simnav.log.imu_series import ImuSeries, read_imu
+from simnav.log.readings import ProbableReading, probable_readings
 from simnav.log.source import LogSource
 from simnav.types import KINDS, Array, NavigationStates
 
@@ -37,6 +38,8 @@ _LEAST = 20
 #: A lever arm is only found where the vessel turns: below this standard error [m].
 _KNOWN = 2.0
 _NORMAL = 1.4826
+#: A mounting [rad] or a lever arm of a DVL [m] that is larger is probably none.
+_STEEP, _LONG = np.radians(10.0), 5.0
 #: A scale is found where speeds differ by this part of the largest.
 _SPREAD = 0.3
 #: A delay is another one than none if the sum of squares falls by this multiple of the variance of a residual.
@@ -121,7 +124,35 @@ def align(scenario: Scenario, seed: int = 0) -> list[Alignment]:
         found.append(_aligned(recording, name, spec.kind, series, source))
     if log.imu is not None and log.reference.attitude is not None:
         found.append(_aligned_imu(recording, source, read_imu(log, log.imu, recording)))
-    return found
+    kinds = {name: spec.kind for name, spec in source.scenario.aids.items()}
+    return _warned(found, kinds, probable_readings(source.scenario, recording))
+
+
+def _warned(found: list[Alignment], kinds: Mapping[str, str], other: list[ProbableReading]) -> list[Alignment]:
+    """The results, with a warning where a stream is probably read wrongly, or a figure is too large to be one."""
+    wrong = {r.stream: r for r in other}
+    of_imu = next((wrong[n] for n in ("imu", "gyroscope", "accelerometer") if n in wrong), None)
+    everywhere = [r for n, r in wrong.items() if n.startswith("reference") or n == "positions"]
+    warned = []
+    for one in found:
+        said = [one.remark]
+        reading = of_imu if one.instrument == "imu" else wrong.get(one.instrument)
+        for r in filter(None, [reading, *everywhere]):
+            said.append(f"do not use these figures: {r.sentence()}")
+        if len(said) == 1:
+            said += [
+                f"a {n.replace('_', ' ')} of {np.degrees(v):.3g} deg is mostly a wrong axis; look at each axis first"
+                for n, (v, e) in one.parameters.items()
+                if n.startswith("mounting") and abs(v) > max(_STEEP, 3.0 * e)
+            ]
+            body = one.instrument in kinds and KINDS[kinds[one.instrument]].equation == BODY_VELOCITY
+            said += [
+                f"a {n.replace('_', ' ')} of {v:.3g} m is mostly a wrong axis or clock of a DVL; look at them first"
+                for n, (v, e) in one.parameters.items()
+                if body and n.startswith("lever_arm") and abs(v) > max(_LONG, 3.0 * e)
+            ]
+        warned.append(replace(one, remark="; ".join(filter(None, said))))
+    return warned
 
 
 def _aligned_imu(recording: str, source: LogSource, imu: ImuSeries) -> Alignment:

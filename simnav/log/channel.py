@@ -289,12 +289,13 @@ def read_channel(spec: RecordedSpec, channel: ChannelSpec, what: str, recording:
         rows, value = rows[given], value[given]
     if len(rows) == 0:
         raise LogError(f"{table.source}: there is no {what} in it")
-    if channel.frame != "geodetic":
-        assert spec.origin is not None
-        if not kind.geodetic:
-            raise LogError(f"{table.source}: frame = {channel.frame!r} is for positions, and {what} is none")
+    if channel.frame != "geodetic" and kind.geodetic:
+        if spec.origin is None:
+            raise LogError(f"{table.source}: frame = {channel.frame!r} of {what} needs [log.origin]")
         value = geodetic_from_local(value, spec.origin, channel.frame)[:, : len(names)]
     _check_range(value, kind, columns, table, rows)
+    if channel.frame != "geodetic" and not kind.geodetic:
+        value = _of_frame(value, kind, channel.frame, f"{table.source}: frame = {channel.frame!r}")
     if channel.variation is not None or channel.variation_model is not None:
         if kind.role != "heading":
             raise LogError(f"{table.source}: variation_deg and variation_model are for headings, and {what} is none")
@@ -388,6 +389,18 @@ def _mounted(value: Array, kind: Kind, mounting: Sequence[float], label: str) ->
     raise LogError(
         f"{label}: it is for velocities in body axes, and for headings with roll and pitch 0; turn other values before"
     )
+
+
+def _of_frame(value: Array, kind: Kind, frame: str, label: str) -> Array:
+    """Headings, or roll, pitch and yaw, of axes forward, left, up in east, north, up: in those of simnav."""
+    cyclic = [c.cyclic for c in kind.components]
+    if frame != "enu" or not all(cyclic) or len(cyclic) not in (1, 3):
+        raise LogError(f"{label} is for positions, headings and attitudes ('enu'); {kind.quantity} is none of them")
+    turned = value.copy()
+    turned[:, -1] = 0.5 * np.pi - value[:, -1]
+    if len(cyclic) == 3:
+        turned[:, 1] = -value[:, 1]
+    return turned
 
 
 def _check_units(

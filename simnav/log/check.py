@@ -11,6 +11,7 @@ import numpy as np
 
 from simnav.log.channel import Series, list_recordings, read_channel
 from simnav.log.imu_series import read_imu
+from simnav.log.readings import probable_readings
 from simnav.log.source import LogSource
 from simnav.log.table import LogError
 from simnav.spec import SpecError
@@ -37,7 +38,8 @@ class LogFinding:
         Name of the recording (empty for the only one), and what was read: ``imu``, an instrument,
         ``reference.position``, ``run``.
     level : {"ok", "note", "error"}
-        ``note``: something was left out or looks wrong, and the run is possible. ``error``: no run is possible.
+        ``note``: something was left out or looks wrong, and the run is possible. ``error``: no run is possible, or the
+        other streams say that this one is read wrongly (`simnav.log.readings`).
     sentence : str
         What it is, with file, field and value, and what would be right.
     """
@@ -65,7 +67,7 @@ class LogCheck:
 
     @property
     def passed(self) -> bool:
-        """Whether every recording can be run."""
+        """Whether every recording can be run, and its streams agree."""
         return not any(f.level == "error" for f in self.findings)
 
     def to_dict(self) -> dict[str, Any]:
@@ -103,6 +105,11 @@ def check_log(scenario: Scenario) -> LogCheck:
             known = {f.sentence for f in found}
             run = _read(recording, "run", lambda seed=seed: LogSource(scenario, seed))  # type: ignore[misc]
             found += [f for f in run if f.sentence not in known]
+            if not any(f.level == "error" for f in found if f.recording == recording):
+                found += [
+                    LogFinding(recording, r.stream, "error", r.sentence())
+                    for r in probable_readings(scenario, recording)
+                ]
     return LogCheck(scenario.id, tuple(found))
 
 

@@ -11,16 +11,17 @@ from pathlib import Path
 import numpy as np
 
 from simnav.log.inspection import Stream
+from simnav.log.readings import ProbableReading
 from simnav.log.units import dimension
 from simnav.log.variation import dated
 from simnav.types import Array
 
-__all__ = ["Guess", "draft", "guesses"]
+__all__ = ["Guess", "draft", "guesses", "rewritten"]
 
 _AXES = r"(?:_|\.|\[|\s|-)?"
 _LABEL = {
     "angular_rate": r"gyr?o?|g|w|ang(ular)?[_.]?(vel(ocity)?|rate)|omega|imu[_.]g|w_rs_s",
-    "specific_force": r"acc?(el)?(eration)?|a|f|linear[_.]acc(eleration)?|imu[_.]a|a_rs_s",
+    "specific_force": r"acc?(el)?(eration)?|a|f|specific[_.]force|linear[_.]acc(eleration)?|imu[_.]a|a_rs_s",
 }
 #: Names of files and topics that say what their columns x, y, z are.
 _OWN_NAME = {"angular_rate": r"gyr", "specific_force": r"acc(?!urac)"}
@@ -40,9 +41,13 @@ _NAMES: dict[str, tuple[str, ...]] = {
     },
     "heading": (r"^(true[_.]?)?(heading|hdg|yaw)\b|^(heading|yaw)_",),
     "level": (r"^roll\b|^roll_", r"^pitch\b|^pitch_"),
-    "velocity": (r"^(vel(ocity)?[_.]?n(orth)?|vn)\b", r"^(vel(ocity)?[_.]?e(ast)?|ve)\b"),
-    "dvl": tuple(rf"^(dvl[_.]?(v|vel)?[_.]?{axis}|ground_{name}|v_?{name}|v{axis})\b" for axis, name in _DVL),
-    "speed": (r"^(speed|stw|water_?speed)\b",),
+    "velocity": tuple(
+        rf"^(vel(ocity)?[_.]?{name[0]}({name[1:]})?|v{name[0]})(_m_s)?\b" for name in ("north", "east", "down")
+    ),
+    "dvl": tuple(
+        rf"^(dvl[_.]?(v|vel)?[_.]?{axis}|ground_{name}|v_?{name}|v{axis}|{name}_m_s)\b" for axis, name in _DVL
+    ),
+    "speed": (r"^(speed|stw|water_?speed)(_m_s)?\b",),
     "depth": (r"^depth\b|^depth_(m|meter)",),
 }
 #: Kinds of instruments that a quantity becomes, with a sigma to begin with.
@@ -50,6 +55,7 @@ _INSTRUMENTS = {
     "position": ("gnss", 'kind = "gnss_position"', "sigma_m = [2.0, 2.0, 4.0]"),
     "heading": ("gyrocompass", 'kind = "gyrocompass"', "sigma_deg = 1.0"),
     "dvl": ("dvl", 'kind = "dvl"', "sigma_m_s = 0.05"),
+    "velocity": ("gnss_velocity", 'kind = "gnss_velocity"', "sigma_m_s = 0.1"),
     "speed": ("speed_log", 'kind = "speed_log"', "sigma_m_s = 0.3"),
     "depth": ("depth", 'kind = "depth"', "sigma_m = 0.3"),
 }
@@ -76,7 +82,7 @@ _LENGTH, _SPEED = "length", "speed"
 #: What each quantity is measured in; of a position the angle stands for the first two columns.
 _DIMENSIONS = {
     "position": ("angle", "angle", _LENGTH), "angular_rate": ("angular rate",) * 3,
-    "specific_force": ("acceleration",) * 3, "heading": ("angle",), "level": ("angle",) * 2, "velocity": (_SPEED,) * 2,
+    "specific_force": ("acceleration",) * 3, "heading": ("angle",), "level": ("angle",) * 2, "velocity": (_SPEED,) * 3,
     "dvl": (_SPEED,) * 3, "speed": (_SPEED,), "depth": (_LENGTH,),
 }  # fmt: skip
 
@@ -115,7 +121,7 @@ def guesses(stream: Stream) -> Iterator[Guess]:
         found = []
         for pattern in patterns:
             found += _first(names, pattern)
-        if len(found) < len(patterns) and not (quantity == "position" and len(found) == 2):
+        if len(found) < len(patterns) and not (quantity in ("position", "velocity") and len(found) == 2):
             continue
         values = np.stack([stream.table.column(n)[1] for n in found], axis=-1)
         values = values[np.isfinite(values).all(axis=1)]
@@ -179,15 +185,15 @@ def _signed(quantity: str, columns: Sequence[str], values: Array) -> tuple[str, 
     """Signs of columns: gravity must point up, and axes forward, left, up become forward, starboard, down."""
     if quantity == "specific_force" and float(np.mean(values[:, 2])) > 0.0:
         return columns[0], f"-{columns[1]}", f"-{columns[2]}"
-    if quantity == "position" and len(columns) == 2:
-        return (*columns, "=0")
+    if quantity in ("position", "velocity") and len(columns) == 2:
+        return (*columns, "=0" if quantity == "position" else "=nan")
     return tuple(columns)
 
 
 def _units(stream: Stream, quantity: str, values: Array) -> tuple[str, ...]:
     size, width = float(np.percentile(np.abs(values), 99.0)), int(values.shape[1])
     if stream.form == "nmea":
-        return ("1",) * (3 if quantity == "position" else width)
+        return ("1",) * (3 if quantity in ("position", "velocity") else width)
     if quantity == "position":
         angle = "rad" if np.abs(values[:, 0]).max() < 1.58 and np.abs(values[:, 1]).max() < 3.15 else "deg"
         if np.abs(values[:, :2]).max() > 361.0:
@@ -200,7 +206,7 @@ def _units(stream: Stream, quantity: str, values: Array) -> tuple[str, ...]:
         return ("g" if norm < 2.0 else "m_s2" if norm < 50.0 else "mg",) * 3
     if quantity in ("heading", "level"):
         return ("deg" if size > 6.3 else "rad",) * width
-    return ("m" if quantity == "depth" else "m_s",) * width
+    return ("m" if quantity == "depth" else "m_s",) * (3 if quantity == "velocity" else width)
 
 
 def draft(streams: Sequence[Stream], name: str = "my-log", file: str | None = None) -> str:
@@ -221,11 +227,17 @@ def draft(streams: Sequence[Stream], name: str = "my-log", file: str | None = No
         TOML. It can be run where one of the streams has positions; otherwise it says what is missing.
     """
     found = [g for s in streams for g in guesses(s)]
+    reference = _solution(found)
+    if reference is not None:  # it is compared with, and is no instrument
+        found = [g for g in found if g.stream is not reference["position"].stream]
     best: dict[str, Guess] = {}
     for guess in found:
+        if guess.quantity == "velocity" and guess.columns[2] == "=nan":  # course and speed are no instrument yet
+            continue
         if guess.quantity not in best or _worth(guess) > _worth(best[guess.quantity]):
             best[guess.quantity] = guess
-    position = best.get("position")
+    fixes = best.get("position")
+    position = fixes if reference is None else reference["position"]
     if position is None:
         return (
             f"# No columns with latitude and longitude were found in {len(streams)} streams. A scenario needs\n"
@@ -236,7 +248,9 @@ def draft(streams: Sequence[Stream], name: str = "my-log", file: str | None = No
         both = [(r, f) for r in found for f in found if r.stream is f.stream
                 and (r.quantity, f.quantity) == ("angular_rate", "specific_force")]  # fmt: skip
         rate, force = both[0] if both else (rate, force)
-    used = [position, *(g for q, g in best.items() if q in _INSTRUMENTS and q != "position")]
+    if reference is None:
+        best.pop("velocity", None)  # of the same receiver as the reference
+    used = [position, *(g for q, g in best.items() if q in _INSTRUMENTS)]
     if rate is not None and force is not None:
         used += [rate, force]
     keys = _file_keys(used)
@@ -258,7 +272,7 @@ def draft(streams: Sequence[Stream], name: str = "my-log", file: str | None = No
         f"folder = {json.dumps(str(position.stream.path.resolve().parent))}",
         'begin = "moving"                 # check: the course of the moving vessel is its heading at the start',
     ]
-    if "heading" in best or span < 20.0:
+    if "heading" in best or reference is not None or span < 20.0:
         lines[-1] = f"# {lines[-1]}"
     for (_, topic), (stream, key) in keys.items():
         lines += ["", *_file(stream, key, topic)]
@@ -266,28 +280,58 @@ def draft(streams: Sequence[Stream], name: str = "my-log", file: str | None = No
         lines += ["", *_imu(rate, force, keys)]
     for quantity, guess in best.items():
         if quantity in _INSTRUMENTS:
-            lines += ["", *_channel(f"log.instruments.{_INSTRUMENTS[quantity][0]}", guess, keys)]
+            lines += ["", *_channel(f"log.instruments.{_declared(guess, reference)[0]}", guess, keys)]
             if quantity == "position":
                 if _graded(guess):
                     lines.append('sigma = ["sdn", "sde", "sdu"]')
-                lines.append(f"every = {_EVERY}                     # every tenth fix to the estimators ...")
+                if reference is None:
+                    lines.append(f"every = {_EVERY}                     # every tenth fix to the estimators ...")
     if _graded(position):
         lines += ["", "[log.reference]",
                   'quality = "Q"                  # only fixed and float solutions are scored']  # fmt: skip
     lines += ["", *_channel("log.reference.position", position, keys)]
-    lines.append(f"hold_out = {_EVERY}                  # ... and the others to compare with")
+    if reference is None:
+        lines.append(f"hold_out = {_EVERY}                  # ... and the others to compare with")
+    else:
+        lines += ["", *_channel("log.reference.velocity", reference["velocity"], keys)]
+        level, heading = reference["level"], reference["heading"]
+        attitude = Guess(level.stream, "attitude", level.columns + heading.columns, level.units + heading.units)
+        lines += ["", *_channel("log.reference.attitude", attitude, keys)]
     if rate is not None and force is not None:
         hertz = 1.0 / float(np.median(np.diff(rate.stream.time)))
         lines += ["", "[instruments.imu]", f"rate_hz = {_round(hertz)}",
                   'grade = "mems"                   # check: or the figures of its datasheet']  # fmt: skip
     for quantity, guess in best.items():
         if quantity in _INSTRUMENTS:
-            label, kind, sigma = _INSTRUMENTS[quantity]
+            label, kind, sigma = _declared(guess, reference)
             hertz = 1.0 / max(1e-3, float(np.median(np.diff(guess.stream.time)))) if len(guess.stream.time) > 1 else 1.0
             hertz *= 1.0 - (_repeated(guess) if _stale(guess) else 0.0)
-            hertz = hertz / _EVERY if quantity == "position" else hertz
+            hertz = hertz / _EVERY if quantity == "position" and reference is None else hertz
             lines += ["", f"[instruments.{label}]", kind, f"rate_hz = {_round(hertz)}", f"{sigma}   # check"]
     return "\n".join(lines) + "\n"
+
+
+def _solution(found: Sequence[Guess]) -> dict[str, Guess] | None:
+    """Position, velocity, roll and pitch, and heading of one stream that has them all, where other streams aid.
+
+    It is a solution of all of them, or the truth. Where no other stream has fixes or a velocity, its own are needed.
+    """
+    by_stream: dict[int, dict[str, Guess]] = {}
+    for guess in found:
+        by_stream.setdefault(id(guess.stream), {}).setdefault(guess.quantity, guess)
+    whole = [g for g in by_stream.values() if {"position", "velocity", "level", "heading"} <= set(g)]
+    measured = ("position", "dvl", "speed")
+    chosen = max(whole, key=lambda g: len(g["position"].stream.time), default=None)
+    if chosen is None or not any(set(g) & set(measured) for g in by_stream.values() if g is not chosen):
+        return None
+    return chosen
+
+
+def _declared(guess: Guess, reference: dict[str, Guess] | None) -> tuple[str, str, str]:
+    """Name, kind and sigma of an instrument; of positions without a height, beside a reference, a horizontal one."""
+    if guess.quantity == "position" and reference is not None and guess.columns[2] == "=0":
+        return "fix", 'kind = "terrain_fix"', "sigma_m = [5.0, 5.0]"
+    return _INSTRUMENTS[guess.quantity]
 
 
 def _round(value: float) -> str:
@@ -347,6 +391,9 @@ def _channel(table: str, guess: Guess, keys: _Keys) -> list[str]:
     if stream.talker is not None:
         lines.append(f'talker = "{stream.talker}"')
     columns = list(guess.columns)
+    units = list(guess.units)
+    if table == "log.instruments.fix":
+        columns, units = columns[:2], units[:2]
     lines.append(f"columns = {json.dumps(columns)}")
     if _stale(guess):
         lines.append("drop_repeated = true            # check: many values are those of the row before")
@@ -357,7 +404,7 @@ def _channel(table: str, guess: Guess, keys: _Keys) -> list[str]:
             else "variation_deg = 0.0            # check: the variation of the place, positive east"
         )
     if set(guess.units) != {"1"}:
-        lines.append(f"units = {json.dumps(list(guess.units))}   # check")
+        lines.append(f"units = {json.dumps(units)}   # check")
     return lines
 
 
@@ -393,14 +440,37 @@ def _imu(rate: Guess, force: Guess, keys: _Keys) -> list[str]:
     flipped = force.columns[2].startswith("-")
     one = _key_of(keys, rate) == _key_of(keys, force)
     two = [] if one else [f'specific_force_file = "{_key_of(keys, force)}"   # check: offset_s of its clock']
+    means = rate.columns[0].startswith("angular_rate_x") and one  # as 'simnav export' writes them
     rates = [rate.columns[0], *(f"-{c}" if flipped else c for c in rate.columns[1:])]
     return [
         "[log.imu]",
         f'file = "{_key_of(keys, rate)}"',
         *two,
-        'samples = "instantaneous"        # check: or "means", "increments"',
+        'samples = "means"' if means else 'samples = "instantaneous"        # check: or "means", "increments"',
         f"angular_rate = {json.dumps(rates)}   # check: forward, starboard, down; or say mounting_deg",
         f'angular_rate_unit = "{rate.units[0]}"   # check',
         f"specific_force = {json.dumps(list(force.columns))}",
         f'specific_force_unit = "{force.units[0]}"',
     ]
+
+
+def rewritten(text: str, readings: Sequence[ProbableReading]) -> str:
+    """A draft with other readings of its streams, each with its probability.
+
+    Parameters
+    ----------
+    text : str
+        From `draft`.
+    readings : sequence of ProbableReading
+        What is far more likely than what the draft says.
+    """
+    lines = text.splitlines()
+    for reading in readings:
+        for table, key, value in reading.changes:
+            first = lines.index(f"[{table}]") + 1
+            ends = (k for k in range(first, len(lines)) if not lines[k] or lines[k].startswith("["))
+            last = next(ends, len(lines))
+            new = f"{key} = {value}   # check: so with probability {reading.shown}"
+            at = next((k for k in range(first, last) if lines[k].partition("=")[0].strip() == key), None)
+            lines[first if at is None else at : first if at is None else at + 1] = [new]
+    return "\n".join(lines) + "\n"

@@ -41,6 +41,8 @@ _DATE = re.compile(r"^\s*(date|day|%?\s*ymd)\b", re.I)
 _LARGE = ((1e17, "ns"), (1e14, "us"), (1e11, "ms"))
 #: Columns of an IMU.
 _INERTIAL = re.compile(r"(?:^|[./])(a|g|w|acc|gyr|gyro|accel|omega)[_ .]?[xyz123](?![a-z0-9])", re.I)
+#: Files of a folder that hold no streams: what 'simnav export' writes beside them, and texts.
+_START, _TEXTS = "start.json", (".md", ".toml")
 #: Formats whose files hold arrays or columns by name, with a time or several.
 _OF_ARRAYS = ("mat", "hdf5", "parquet")
 #: Formats whose files have several tables, besides NMEA and bags.
@@ -128,7 +130,7 @@ def inspect_log(paths: Sequence[Path]) -> tuple[list[Stream], list[str]]:
     for path in paths:
         if path.is_dir():
             inside = sorted(p for p in path.iterdir() if not p.name.startswith("."))
-            here = [p for p in inside if p.is_file()]
+            here = [p for p in inside if p.is_file() and p.name != _START and p.suffix.lower() not in _TEXTS]
             if not here:
                 folders = ", ".join(p.name for p in inside)
                 raise LogError(

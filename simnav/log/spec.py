@@ -72,7 +72,9 @@ class ChannelSpec(_Grown):
         Of the columns, one or one each (keys of `LOG_UNITS`, also with a factor before, like ``"1e-7 deg"``); SI and
         radians where left out, as in NMEA sentences once they are read.
     frame : {"geodetic", "enu", "ned"}
-        Of a position: latitude, longitude, height, or local Cartesian around ``[log.origin]``.
+        Of a position: latitude, longitude, height, or local Cartesian around ``[log.origin]``. Of a heading and of
+        roll, pitch, yaw ``enu``: those of axes forward, left, up in east, north, up; yaw counts from east,
+        anticlockwise.
     every : int
         Take only the rows 0, every, 2 every, ...
     hold_out : int or None
@@ -394,7 +396,7 @@ class RecordedSpec(_Grown):
                 raise ValueError(f"{name}: the file {channel.file!r} is {reader.title}; say which 'sentence'")
             if not reader.sentences and not channel.columns:
                 raise ValueError(f"{name}: 'columns' is missing")
-            if channel.frame != "geodetic" and self.origin is None:
+            if channel.frame != "geodetic" and self.origin is None and name == "reference.position":
                 raise ValueError(f"{name}.frame = {channel.frame!r} needs [log.origin]")
         if any(reference.lever_arm) and reference.attitude is None:
             raise ValueError("reference.lever_arm_m needs [log.reference.attitude]")

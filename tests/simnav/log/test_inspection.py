@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from simnav.leaderboard.logs import export
 from simnav.log import LogError, LogSource
 from simnav.log.check import check_log, described
 from simnav.log.delimited import read_csv
@@ -26,8 +27,11 @@ def test_a_draft_of_tables_can_be_run(tiny, tmp_path):
     path = tmp_path / "my-log.toml"
     path.write_text(draft(streams, "my-log"))
     scenario = load(path)
-    report = check_log(scenario)
-    assert report.passed, report
+    # The file's axes are starboard, forward, up: no size of a column tells, but the other streams do.
+    (wrong,) = [f for f in check_log(scenario).findings if f.level == "error"]
+    assert wrong.part == "gyroscope"
+    assert 'angular_rate = ["gy", ' in wrong.sentence
+    assert 'angular_rate_unit = "deg_s"' in wrong.sentence
     source = LogSource(scenario, 0)
     assert set(source.instruments) == {"gnss", "gyrocompass"}
     assert source.duration > 30.0
@@ -225,3 +229,24 @@ def test_arrays_with_several_times_are_several_streams(tmp_path):
     source = LogSource(load(toml), 0)
     assert source.duration > 30.0
     assert source.advance(source.duration).imu.specific_force[:, 2] == pytest.approx(-9.8)
+
+
+@pytest.mark.parametrize("name", ["coastal-voyage", "auv-survey", "ship-straight", "gnss-outage"])
+def test_the_draft_of_an_export_runs_without_an_edit(tmp_path, name):
+    scenario = load(name)
+    scenario = scenario.model_copy(update={"duration": min(scenario.duration, 40.0), "faults": ()})
+    export([scenario], tmp_path / "run", truth=True)
+    streams, failed = inspect_log([tmp_path / "run"])
+    assert not failed
+    path = tmp_path / "drafted.toml"
+    path.write_text(draft(streams, "drafted", path.name))
+    made = load(path)
+    assert made.log.reference.position.file == "truth"
+    assert made.log.reference.velocity is not None
+    assert made.log.reference.attitude is not None
+    assert (made.log.imu is not None) == (tmp_path / "run" / "imu.csv").exists()
+    quantities = {"gnss", "gnss_velocity", "dvl", "speed_log", "gyrocompass", "depth"}
+    exported = {p.stem for p in (tmp_path / "run").glob("*.csv")} & quantities
+    assert exported <= set(made.log.instruments)
+    assert check_log(made).passed
+    assert LogSource(made, 0).duration > 30.0

@@ -1,0 +1,577 @@
+"""How the streams of a log are probably read: axes, signs, units, frames and clocks, compared by likelihood.
+
+A reading of a stream (which axis is which, which sign, which unit, how late) is a hypothesis. The likelihood of each is
+that of all comparisons in which the stream takes part (`simnav.log.comparisons`), over that of the reading which the
+scenario has. The reading as it is has the prior probability one half; all others of the stream share the rest. The most
+likely reading of all streams is taken, the streams are read with it, and the search begins anew, until no other reading
+is far more likely: so two mistakes are found as well as one.
+"""
+
+from __future__ import annotations
+
+import itertools
+import json
+import warnings
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from simnav.geometry.rotation import dcm_from_rpy, wrap_angle
+from simnav.kinds import BODY_VELOCITY, HEADING, VELOCITY
+from simnav.log.channel import Series, read_channel, skip_of
+from simnav.log.comparisons import Inertial, Streams, comparisons
+from simnav.log.imu_series import read_imu
+from simnav.log.likelihood import Fit, fit, log_ratios
+from simnav.log.units import DIMENSIONS, factor
+from simnav.spec import SpecError
+from simnav.types import KINDS, Array
+
+if TYPE_CHECKING:
+    from simnav.log.spec import ChannelSpec, LogInstrumentSpec, RecordedSpec
+    from simnav.scenario import Scenario
+
+__all__ = ["ProbableReading", "probable_readings"]
+
+#: Another reading is far more likely from this log likelihood ratio on, if it also leaves at most this part of the
+#: product of the mean squares of all components with a log likelihood ratio above the third figure: of many samples a
+#: slight difference is significant, too, but may be one of the models.
+_FAR, _PART, _TELLING = 12.0, 0.5, 3.0
+#: What speaks so much against a reading is not made good by other comparisons, which are left out.
+_AGAINST = -40.0
+#: Delays that are tried [s]; `simnav.log.alignment` finds shorter ones.
+_DELAYS = np.arange(0.5, 5.01, 0.5)
+#: Readings whose log likelihoods differ by less are told apart by the number of changes.
+_SAME = 1.0
+#: Mistakes that are looked for, one after the other.
+_ROUNDS = 4
+_FLIPS = (1.0, -1.0)
+#: The mean specific force of a vessel points up by at least this [m/s^2].
+_UPRIGHT = 4.0
+#: The 48 matrices that permute axes and change signs.
+_AXES = tuple(
+    np.eye(3)[list(order)] * np.array(signs)[:, None]
+    for order in itertools.permutations(range(3))
+    for signs in itertools.product(_FLIPS, repeat=3)
+)
+
+
+@dataclass(frozen=True)
+class ProbableReading:
+    """Another reading of a stream than the scenario's, which is far more likely.
+
+    Attributes
+    ----------
+    stream : str
+        ``imu``, ``gyroscope``, ``accelerometer``, the name of an instrument, or ``reference.position`` and the like.
+    changes : tuple of (str, str, str)
+        What to write: table, key and value, as TOML.
+    what : str
+        What it is, in words.
+    log_ratio : float
+        Logarithm of its likelihood over that of the reading as it is.
+    probability : float
+        Of this reading, among all readings of the stream that were tried.
+    present : float
+        The probability of the reading as it is.
+    alike : int
+        How many other readings are as likely, because the motion does not tell them apart.
+    """
+
+    stream: str
+    changes: tuple[tuple[str, str, str], ...]
+    what: str
+    log_ratio: float
+    probability: float
+    present: float
+    alike: int = 0
+
+    @property
+    def shown(self) -> str:
+        """The probability as text; no model is surer than 0.9999."""
+        return f"{min(self.probability, 0.9999):.{2 if self.probability < 0.995 else 4}g}"
+
+    def sentence(self) -> str:
+        """As text, with the line to write."""
+        lines = "; ".join(f"{key} = {value} of [{table}]" for table, key, value in self.changes)
+        alike = f" ({self.alike} others fit as well, the motion does not tell them apart)" if self.alike else ""
+        return (
+            f"{self.what}: the other streams say so with probability {self.shown}{alike}; "
+            f"as it is read now it has {self.present:.1g}; write {lines}"
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class _Reading:
+    """A hypothesis: the streams read so, the streams that it alters, how many changes it is, and what to write."""
+
+    stream: str
+    parts: tuple[str, ...]
+    alter: Callable[[Streams], Streams]
+    number: float
+    what: str
+    changes: tuple[tuple[str, str, Any], ...]
+    delay: float = 0.0
+
+
+def probable_readings(scenario: Scenario, recording: str) -> list[ProbableReading]:
+    """Readings that are far more likely than those of a scenario.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        With a ``[log]``, whose channels can be read.
+    recording : str
+        Name of the recording.
+
+    Returns
+    -------
+    list of ProbableReading
+        Empty where the scenario reads its streams rightly, or the motion says nothing.
+
+    Raises
+    ------
+    LogError
+        If a channel cannot be read.
+    """
+    log = scenario.log
+    assert log is not None
+    found: list[ProbableReading] = []
+    for _ in range(_ROUNDS):
+        streams = _read(scenario, log, recording)
+        best = _best(log, streams)
+        if best is None:
+            break
+        reading, told = best
+        try:
+            log = _written(log, reading.changes)
+            _read(scenario, log, recording)
+        except (SpecError, ValueError):
+            break
+        found.append(told)
+    return found
+
+
+def _read(scenario: Scenario, log: RecordedSpec, recording: str) -> Streams:
+    """All streams of a recording."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        reference = {
+            n: None if c is None else read_channel(log, c, n, recording)
+            for n in ("position", "velocity", "attitude")
+            if (c := getattr(log.reference, n)) is not None or n != "position"
+        }
+        imu = None if log.imu is None else Inertial(read_imu(log, log.imu, recording))
+        sheets = scenario.instruments_sheet()
+        instruments, field = {}, {}
+        for name, spec in scenario.aids.items():
+            where = log.instruments.get(name)
+            if where is None or where.source != "file":
+                continue
+            series = read_channel(log, where.channel(), spec.kind, recording)
+            instruments[name] = spec.kind, series, np.asarray(sheets[name].lever_arm, dtype=np.float64)
+            if "field" in sheets[name].details:
+                field[name] = np.asarray(sheets[name].details["field"], dtype=np.float64)
+    position = reference["position"]
+    assert position is not None
+    begin = max(float(position.time[0]), -np.inf if imu is None else float(imu.series.edge[0]))
+    return Streams(position, reference["velocity"], reference["attitude"], imu, instruments, field,
+                   begin + skip_of(log, recording))  # fmt: skip
+
+
+def _best(log: RecordedSpec, streams: Streams) -> tuple[_Reading, ProbableReading] | None:
+    """The reading that is most likely by far, if there is one."""
+    compared = comparisons(streams)
+    present: dict[tuple[str, ...], Fit] = {}
+    for parts, compare in compared.items():
+        residual = compare(streams)
+        if residual is not None:
+            present[parts] = fit(residual)
+    readings: dict[str, list[tuple[_Reading, float, bool]]] = {}
+    for reading in _readings(log, streams):
+        involved = [p for p in present if set(p) & set(reading.parts)]
+        if not involved:
+            continue
+        other = reading.alter(streams)
+        ratio, left = 0.0, 0.0
+        for parts in involved:
+            residual = compared[parts](other) if ratio > _AGAINST else None
+            if residual is None:
+                continue
+            fitted = fit(residual)
+            each = log_ratios(fitted, present[parts])
+            ratio += float(each.sum()) - fitted.penalty + present[parts].penalty
+            before, after = (f.mean_square + 0.1 * f.size**2 for f in (present[parts], fitted))
+            left += float(np.sum(np.log(after / before)[np.abs(each) > _TELLING]))
+        readings.setdefault(reading.stream, []).append((reading, ratio, left < np.log(_PART)))
+    likeliest: tuple[_Reading, ProbableReading] | None = None
+    for stream, tried in readings.items():
+        told = _told(stream, tried)
+        if told is not None and (likeliest is None or told[1].log_ratio > likeliest[1].log_ratio + _SAME):
+            likeliest = told
+    return likeliest
+
+
+def _told(stream: str, tried: list[tuple[_Reading, float, bool]]) -> tuple[_Reading, ProbableReading] | None:
+    """The likeliest reading of one stream, with its probability, if it is far more likely than the present one."""
+    ratios = np.array([ratio for _, ratio, _ in tried])
+    top = float(ratios.max())
+    if top < _FAR:
+        return None
+    alike = [t for t in tried if t[1] > top - _SAME]
+    reading, ratio, much = min(alike, key=lambda t: (t[0].number, -t[1]))
+    # The delay next to the best one is another figure of the same reading.
+    others = [t for t in alike if t[0].number == reading.number and not (reading.delay and t[0].delay)]
+    if not much:
+        return None
+    weight = np.exp(ratios - top) / len(tried)
+    same = np.array([bool(reading.delay) and t[0].delay * reading.delay > 0.0 for t in tried])
+    total = float(weight.sum() + np.exp(-top))
+    own = float(weight[same].sum()) if same.any() else float(np.exp(ratio - top)) / len(tried)
+    changes = tuple((table, key, json.dumps(value)) for table, key, value in reading.changes)
+    return reading, ProbableReading(stream, changes, reading.what, ratio, own / total, float(np.exp(-top)) / total,
+                                    max(0, len(others) - 1))  # fmt: skip
+
+
+def _readings(log: RecordedSpec, s: Streams) -> Iterator[_Reading]:
+    """All hypotheses about all streams."""
+    if s.imu is not None and log.imu is not None:
+        yield from _of_imu(log, s)
+    for name, (kind, series, _) in s.instruments.items():
+        where, table = log.instruments[name], f"log.instruments.{name}"
+        equation, components = KINDS[kind].equation, KINDS[kind].components
+        axes = len(components) == 3 and not KINDS[kind].geodetic
+        if where.columns and axes:
+            body = equation == BODY_VELOCITY or name in s.field
+            yield from _of_vector(name, table, where, series, body)
+        elif where.columns and len(components) == 1 and equation == HEADING:
+            yield from _of_heading(name, table, where, series)
+        elif where.columns and len(components) == 1:
+            yield from _of_scalar(name, table, where, series)
+        if equation == HEADING or equation in (BODY_VELOCITY, VELOCITY) or not axes:
+            yield from _late(name, table, where.offset, series)
+    yield from _of_positions(log, s)
+    if s.velocity is not None and log.reference.velocity is not None and log.reference.velocity.columns:
+        yield from _of_vector("reference.velocity", "log.reference.velocity", log.reference.velocity, s.velocity, False)
+    if s.attitude is not None and log.reference.attitude is not None and log.reference.attitude.columns:
+        yield from _of_attitude(log.reference.attitude, s.attitude)
+    yield from _reference_late(log, s)
+
+
+def _changed(matrix: Array) -> int:
+    """How many axes a matrix of signs and orders changes; a matrix of the other hand counts as one more."""
+    return int(np.sum(np.diag(matrix) != 1.0)) + int(np.linalg.det(matrix) < 0.0)
+
+
+def _flip(column: int | str) -> int | str:
+    if isinstance(column, int):
+        return -column
+    if column.startswith("="):
+        return f"={-float(column[1:]):g}" if column != "=nan" else column
+    return column[1:] if column.startswith("-") else f"-{column}"
+
+
+def _columns(columns: tuple[int | str, ...], matrix: Array) -> list[int | str]:
+    """The columns of a stream whose values are turned by a matrix of signs and orders."""
+    order = np.argmax(np.abs(matrix), axis=1)
+    return [columns[j] if matrix[i, j] > 0.0 else _flip(columns[j]) for i, j in enumerate(order)]
+
+
+def _shown(columns: list[int | str]) -> str:
+    return ", ".join(map(str, columns))
+
+
+def _of_imu(log: RecordedSpec, s: Streams) -> Iterator[_Reading]:
+    """Axes and signs of gyroscopes and accelerometers, each alone and together; units of the gyroscopes; delay."""
+    imu = log.imu
+    assert imu is not None
+    mounting = dcm_from_rpy(np.asarray(imu.mounting))
+
+    def read(**matrices: Array) -> Callable[[Streams], Streams]:
+        turned = {n: mounting @ m @ mounting.T for n, m in matrices.items()}
+        return lambda t: t.altered(imu=None if t.imu is None else t.imu.altered(**turned))
+
+    rates, forces = tuple(imu.angular_rate), tuple(imu.specific_force)
+    pull = s.imu.series.mean[:, 3:].mean(axis=0) if s.imu is not None else np.zeros(3)
+    other = {"rad_s": "deg_s", "deg_s": "rad_s", "rad": "deg", "deg": "rad", "1": "deg_s"}
+    units = [("", 1.0)]
+    if imu.angular_rate_unit in other:
+        unit = other[imu.angular_rate_unit]
+        units.append((unit, factor(unit) / factor(imu.angular_rate_unit)))
+    for matrix in _AXES:
+        for unit, times in units:
+            number = _changed(matrix) + (times != 1.0)
+            if number == 0:
+                continue
+            new = _columns(rates, matrix)
+            changes: list[tuple[str, str, Any]] = [("log.imu", "angular_rate", new)] if _changed(matrix) else []
+            changes += [("log.imu", "angular_rate_unit", unit)] if unit else []
+            what = f"the gyroscopes' forward, starboard, down are {_shown(new)}" + (f" in {unit}" if unit else "")
+            yield _Reading("gyroscope", ("gyroscope",), read(gyroscope=times * matrix), number, what, tuple(changes))
+        if not _changed(matrix):
+            continue
+        if (mounting @ matrix @ mounting.T @ pull)[2] > -_UPRIGHT:  # a vessel does not lie on its side
+            continue
+        new = _columns(forces, matrix)
+        yield _Reading("accelerometer", ("accelerometer",), read(accelerometer=matrix), _changed(matrix),
+                       f"the accelerometers' forward, starboard, down are {_shown(new)}",
+                       (("log.imu", "specific_force", new),))  # fmt: skip
+        both = _columns(rates, matrix), new
+        changes = [("log.imu", "angular_rate", both[0]), ("log.imu", "specific_force", both[1])]
+        yield _Reading("imu", ("gyroscope", "accelerometer"), read(gyroscope=matrix, accelerometer=matrix),
+                       _changed(matrix) + 0.5, f"the IMU's forward, starboard, down are {_shown(both[0])} and "
+                       f"{_shown(both[1])}", tuple(changes))  # fmt: skip
+    channels = [*log.instruments.values(), log.reference.position, log.reference.velocity, log.reference.attitude]
+    shared = any(c is not None and c.file == imu.file for c in channels)
+    file = log.files[imu.file]
+    if imu.specific_force_file is None and not shared and not isinstance(file.offset, tuple):
+        for by in _both_ways():
+            yield _Reading(
+                "imu", ("gyroscope", "accelerometer"),
+                lambda t, by=by: t.altered(imu=None if t.imu is None else t.imu.altered(delay=by)),  # type: ignore[misc]
+                1.0, f"the IMU is {_late_by(by)}", ((f"log.files.{imu.file}", "offset_s", _rounded(file.offset - by)),),
+                by,
+            )  # fmt: skip
+
+
+def _both_ways() -> list[float]:
+    return [float(sign * d) for d in _DELAYS for sign in _FLIPS]
+
+
+def _late_by(by: float) -> str:
+    return f"{abs(by):g} s {'late' if by > 0.0 else 'early'}"
+
+
+def _rounded(value: float) -> float:
+    return float(f"{value:.9g}") if abs(value) < 1e6 else round(value, 3)
+
+
+def _late(name: str, table: str, offset: float, series: Series) -> Iterator[_Reading]:
+    for by in _both_ways():
+        yield _Reading(name, (name,), _with_series(name, time=series.time - by), 1.0, f"{name!r} is {_late_by(by)}",
+                       ((table, "offset_s", _rounded(offset - by)),), by)  # fmt: skip
+
+
+def _with_series(name: str, **changes: Array) -> Callable[[Streams], Streams]:
+    """The streams with another series of an instrument, or of a part of the reference."""
+
+    def alter(t: Streams) -> Streams:
+        part = name.removeprefix("reference.")
+        return t.with_instrument(name, **changes) if part == name else t.with_reference(part, **changes)
+
+    return alter
+
+
+def _reference_late(log: RecordedSpec, s: Streams) -> Iterator[_Reading]:
+    parts = [n for n in ("position", "velocity", "attitude") if getattr(log.reference, n) is not None]
+    if s.imu is None and not s.instruments:
+        return
+    for by in _both_ways():
+        changes = tuple(
+            (f"log.reference.{n}", "offset_s", _rounded(getattr(log.reference, n).offset - by)) for n in parts
+        )
+        yield _Reading("reference", tuple(f"reference.{n}" for n in parts),
+                       lambda t, by=by: t.altered(late=by), 1.5, f"the reference is {_late_by(by)}",  # type: ignore[misc]
+                       changes, by)  # fmt: skip
+
+
+def _units_of(channel: ChannelSpec | LogInstrumentSpec, count: int) -> tuple[str, ...]:
+    given = channel.units
+    return (given,) * count if isinstance(given, str) else tuple(given) or ("1",) * count
+
+
+def _of_vector(
+    name: str, table: str, channel: ChannelSpec | LogInstrumentSpec, series: Series, body: bool,
+) -> Iterator[_Reading]:  # fmt: skip
+    """Axes, signs and units of three components."""
+    mounting = dcm_from_rpy(np.asarray(channel.mounting)) if body else np.eye(3)
+    units = _units_of(channel, 3)
+    told = ("m_s", "kn", "km_h", "cm_s", "mm_s")
+    speeds = [u for u in DIMENSIONS["speed"] if len(set(units)) == 1 and units[0] in (*told, "1") and u in told]
+    factors = [("", 1.0), *((u, factor(u) / factor(units[0])) for u in speeds)]
+    names = "forward, starboard, down" if body else "north, east, down"
+    whole = np.isfinite(series.value).all()
+    for matrix in _AXES:
+        if not whole and matrix[2, 2] != 1.0:  # course and speed: the third is not measured
+            continue
+        turned = mounting @ matrix @ mounting.T
+        value = np.column_stack([series.value[:, :2] @ turned[:2, :2].T, series.value[:, 2]]) if not whole else None
+        value = series.value @ turned.T if value is None else value
+        for unit, times in factors:
+            if unit and abs(times - 1.0) < 1e-9:
+                continue
+            number = _changed(matrix) + bool(unit)
+            if number == 0:
+                continue
+            new = _columns(channel.columns, matrix)
+            changes: list[tuple[str, str, Any]] = [(table, "columns", new)] if _changed(matrix) else []
+            if unit:
+                changes.append((table, "units", unit))
+            elif len(set(units)) > 1:
+                changes.append((table, "units", [units[j] for j in np.argmax(np.abs(matrix), axis=1)]))
+            what = f"{name!r} has {names} in {_shown(new)}" + (f", in {unit}" if unit else "")
+            yield _Reading(name, (name,), _with_series(name, value=times * value), number, what,
+                           tuple(changes))  # fmt: skip
+
+
+def _of_heading(name: str, table: str, where: LogInstrumentSpec, series: Series) -> Iterator[_Reading]:
+    """Sign and zero of a heading: clockwise from north, or anticlockwise from east; mounted backwards or across."""
+    column, mounted = where.columns[0], float(np.round(np.degrees(where.mounting[2]), 6))
+    for sign in _FLIPS:
+        for yaw in (0.0, 90.0, 180.0, -90.0):
+            if sign > 0.0 and yaw == 0.0:
+                continue
+            changes: list[tuple[str, str, Any]] = []
+            frame = (sign, yaw) == (-1.0, 90.0)  # it is its own inverse
+            if frame:
+                changes = [(table, "frame", "geodetic" if where.frame == "enu" else "enu")]
+            else:
+                changes += [(table, "columns", [_flip(column)])] if sign < 0.0 else []
+                changes += [(table, "mounting_deg", [0.0, 0.0, mounted - yaw])] if yaw else []
+            if not frame and where.frame == "enu":
+                continue
+            value = wrap_angle(sign * (series.value + where.mounting[2]) - where.mounting[2] + np.radians(yaw))
+            other = "north, clockwise" if where.frame == "enu" else "east, anticlockwise"
+            what = f"{'minus ' if sign < 0.0 else ''}{column}" + (f" and {yaw:g} deg" if yaw else "")
+            what = f"the heading of {name!r} is " + (f"counted from {other}" if frame else what)
+            yield _Reading(name, (name,), _with_series(name, value=value),
+                           float(len(changes)), what, tuple(changes))  # fmt: skip
+    unit = _units_of(where, 1)[0]
+    if unit in ("deg", "rad", "1"):
+        new = "rad" if unit == "deg" else "deg"
+        value = wrap_angle(series.value * factor(new) / factor(unit))
+        yield _Reading(name, (name,), _with_series(name, value=value), 1.0,
+                       f"the heading of {name!r} is in {new}", ((table, "units", new),))  # fmt: skip
+
+
+def _of_scalar(name: str, table: str, where: LogInstrumentSpec, series: Series) -> Iterator[_Reading]:
+    """Sign and unit of a speed or a depth."""
+    present = _units_of(where, 1)[0]
+    units = next((g for g in (("m_s", "kn", "km_h", "cm_s", "mm_s"), ("m", "ft", "cm", "km")) if present in g), ())
+    for sign in _FLIPS:
+        for unit in (present, *(u for u in units if u != present)):
+            if sign > 0.0 and unit == present:
+                continue
+            changes: list[tuple[str, str, Any]] = [(table, "columns", [_flip(where.columns[0])])] if sign < 0.0 else []
+            changes += [(table, "units", unit)] if unit != present else []
+            value = sign * series.value * factor(unit) / factor(present)
+            text = f"{name!r} is {'minus ' if sign < 0.0 else ''}{where.columns[0]}"
+            text += f" in {unit}" if unit != present else ""
+            yield _Reading(name, (name,), _with_series(name, value=value),
+                           float(len(changes)), text, tuple(changes))  # fmt: skip
+
+
+def _of_positions(log: RecordedSpec, s: Streams) -> Iterator[_Reading]:
+    """Latitude and longitude exchanged or with another sign: of the reference, of each fix, and of all of one file."""
+    fixes = [n for n, (kind, _, _) in s.instruments.items() if KINDS[kind].geodetic and log.instruments[n].columns]
+    channels: dict[str, Any] = {n: log.instruments[n] for n in fixes}
+    if log.reference.position.columns:
+        channels["reference.position"] = log.reference.position
+    groups: list[tuple[str, ...]] = [(n,) for n in channels]
+    if len(channels) > 1:
+        groups.append(tuple(channels))
+
+    def swapped(value: Array, swap: bool, north: float, east: float, local: Any) -> Array:
+        new = value.copy()
+        if local is None:
+            new[:, :2] = value[:, 1::-1] if swap else value[:, :2]
+            new[:, :2] *= north, east
+            return new
+        # Of a local frame the axes are exchanged about its origin.
+        away = value[:, :2] - (local.latitude, local.longitude)
+        across = np.cos(local.latitude)
+        metres = away * (1.0, across)
+        metres = (metres[:, ::-1] if swap else metres) * (north, east)
+        new[:, :2] = metres / (1.0, across) + (local.latitude, local.longitude)
+        return new
+
+    for group in groups:
+        for swap, north, east in itertools.product((False, True), _FLIPS, _FLIPS):
+            if not swap and north > 0.0 and east > 0.0:
+                continue
+            ways: dict[str, Array] = {}
+            changes: list[tuple[str, str, Any]] = []
+            for name in group:
+                channel = channels[name]
+                local = None if channel.frame == "geodetic" else log.origin
+                series = s.position if name == "reference.position" else s.instruments[name][1]
+                ways[name] = swapped(series.value, swap, north, east, local)
+                a, b = (1, 0) if channel.frame == "enu" else (0, 1)
+                first, second = channel.columns[a], channel.columns[b]
+                columns = list(channel.columns)
+                columns[a], columns[b] = (second, first) if swap else (first, second)
+                columns[a] = columns[a] if north > 0.0 else _flip(columns[a])
+                columns[b] = columns[b] if east > 0.0 else _flip(columns[b])
+                table = f"log.{name}" if name == "reference.position" else f"log.instruments.{name}"
+                if channel.frame == "ned" and swap and north > 0.0 and east > 0.0:
+                    ways[name][:, 2:] *= -1.0  # about the sea, near enough
+                    changes.append((table, "frame", "enu"))
+                else:
+                    changes.append((table, "columns", columns))
+            if any(np.abs(v[:, 0]).max() > 0.5 * np.pi for v in ways.values()):
+                continue
+            what = " and ".join(filter(None, [
+                "latitude and longitude (north and east) are exchanged" if swap else "",
+                "north has the other sign" if north < 0.0 else "",
+                "east has the other sign" if east < 0.0 else ""]))  # fmt: skip
+            yield _Reading(
+                group[0] if len(group) == 1 else "positions", group, _positions_as(ways),
+                0.9 * swap + (north < 0.0) + (east < 0.0) + 0.4 * (len(group) > 1), f"{' and '.join(group)}: {what}",
+                tuple(changes),
+            )  # fmt: skip
+
+
+def _positions_as(ways: Mapping[str, Array]) -> Callable[[Streams], Streams]:
+    def alter(t: Streams) -> Streams:
+        for name, value in ways.items():
+            t = _with_series(name, value=value)(t)
+        return t
+
+    return alter
+
+
+def _of_attitude(channel: ChannelSpec, series: Series) -> Iterator[_Reading]:
+    """Signs of roll, pitch and yaw, roll for pitch, and yaw counted from east."""
+    table = "log.reference.attitude"
+    a, b, c = series.value.T
+    if channel.frame == "enu":
+        b, c = -b, 0.5 * np.pi - c
+    for swap, roll, pitch, yaw, east in itertools.product((False, True), _FLIPS, _FLIPS, _FLIPS, (False, True)):
+        columns = list(channel.columns)
+        columns[:2] = columns[1::-1] if swap else columns[:2]
+        columns = [n if sign > 0.0 else _flip(n) for n, sign in zip(columns, (roll, pitch, yaw), strict=True)]
+        other_frame = east != (channel.frame == "enu")
+        changes: list[tuple[str, str, Any]] = [(table, "columns", columns)] if columns != list(channel.columns) else []
+        changes += [(table, "frame", "enu" if east else "geodetic")] if other_frame else []
+        if not changes:
+            continue
+        x, y, z = roll * (b if swap else a), pitch * (a if swap else b), yaw * c
+        value = np.stack([x, -y if east else y, wrap_angle(0.5 * np.pi - z if east else z)], axis=-1)
+        number = 2.0 * swap + (roll < 0.0) + (pitch < 0.0) + (yaw < 0.0) + other_frame
+        what = f"roll, pitch, yaw of the reference are {_shown(columns)}" + (
+            f", of axes {'east, north, up' if east else 'north, east, down'}" if other_frame else "")  # fmt: skip
+        yield _Reading("reference.attitude", ("reference.attitude",),
+                       _with_series("reference.attitude", value=value), number, what,
+                       tuple(changes))  # fmt: skip
+
+
+def _written(log: RecordedSpec, changes: tuple[tuple[str, str, Any], ...]) -> RecordedSpec:
+    """The ``[log]`` with some keys written anew."""
+    for table, key, value in changes:
+        name, scale = key, 1.0
+        if key.endswith("_deg"):
+            name, scale = key.removesuffix("_deg"), np.pi / 180.0
+        elif key.endswith("_s"):
+            name = key.removesuffix("_s")
+        new = tuple(v * scale if scale != 1.0 else v for v in value) if isinstance(value, list) else value
+        log = _set(log, [*table.split(".")[1:], name], new)
+    return log
+
+
+def _set(spec: Any, path: list[str], value: Any) -> Any:
+    if not path:
+        return value
+    if isinstance(spec, Mapping):
+        return {**spec, path[0]: _set(spec[path[0]], path[1:], value)}
+    return spec.model_copy(update={path[0]: _set(getattr(spec, path[0]), path[1:], value)})

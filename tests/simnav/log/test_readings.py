@@ -1,0 +1,172 @@
+"""What only a comparison of streams shows is found, with the line to write; a log that is right is left alone."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from simnav.leaderboard.logs import align, inspect_log
+from simnav.log.check import check_log
+from simnav.log.likelihood import effective_samples
+from simnav.log.readings import probable_readings
+from simnav.scenario import load, parse
+from tests.cases.manoeuvring_log import SCENARIO, make_log
+
+DATA = Path(os.environ.get("SIMNAV_DATA") or Path(__file__).parents[4] / "shared" / "data")
+
+#: What is written wrongly: text, its replacement; then table, key and value that are right.
+WRONG = {
+    "gyroscope x": ('"gx", "gy", "gz"', '"-gx", "gy", "gz"', "log.imu", "angular_rate", ["gx", "gy", "gz"]),
+    "gyroscope y": ('"gx", "gy", "gz"', '"gx", "-gy", "gz"', "log.imu", "angular_rate", ["gx", "gy", "gz"]),
+    "gyroscope z": ('"gx", "gy", "gz"', '"gx", "gy", "-gz"', "log.imu", "angular_rate", ["gx", "gy", "gz"]),
+    "gyroscope x for y": ('"gx", "gy", "gz"', '"gy", "gx", "gz"', "log.imu", "angular_rate", ["gx", "gy", "gz"]),
+    "gyroscope in degrees": (
+        '"gx", "gy", "gz"]', '"gx", "gy", "gz"]\nangular_rate_unit = "deg_s"', "log.imu", "angular_rate_unit", "rad_s",
+    ),
+    "accelerometer y": ('"ax", "ay", "az"', '"ax", "-ay", "az"', "log.imu", "specific_force", ["ax", "ay", "az"]),
+    "accelerometer x for y": ('"ax", "ay", "az"', '"ay", "ax", "az"', "log.imu", "specific_force", ["ax", "ay", "az"]),
+    "imu late": ('path = "imu.csv"', 'path = "imu.csv"\noffset_s = 1.5', "log.files.imu", "offset_s", 0.0),
+    "dvl forward, left, up": (
+        '"vx", "vy", "vz"', '"vx", "-vy", "-vz"', "log.instruments.dvl", "columns", ["vx", "vy", "vz"],
+    ),
+    "dvl left-handed": ('"vx", "vy", "vz"', '"vy", "vx", "vz"', "log.instruments.dvl", "columns", ["vx", "vy", "vz"]),
+    "dvl in knots": ('"vz"]\nunits = "m_s"', '"vz"]\nunits = "kn"', "log.instruments.dvl", "units", "m_s"),
+    "dvl late": ('"vx", "vy", "vz"]', '"vx", "vy", "vz"]\noffset_s = 2', "log.instruments.dvl", "offset_s", 0.0),
+    "compass anticlockwise": ('["hdg"]', '["-hdg"]', "log.instruments.compass", "columns", ["hdg"]),
+    "compass from east": (
+        '["hdg"]', '["hdg"]\nframe = "enu"', "log.instruments.compass", "frame", "geodetic",
+    ),
+    "compass across": (
+        '["hdg"]', '["hdg"]\nmounting_deg = [0, 0, 90]', "log.instruments.compass", "mounting_deg", [0.0, 0.0, 0.0],
+    ),
+    "depth up": ('["depth"]', '["-depth"]', "log.instruments.depth", "columns", ["depth"]),
+    "magnetometer": ('"mx", "my", "mz"', '"my", "mx", "-mz"', "log.instruments.magnetometer", "columns",
+                     ["mx", "my", "mz"]),
+    "reference: latitude for longitude": (
+        'file = "truth"\ncolumns = ["lat", "lon"', 'file = "truth"\ncolumns = ["lon", "lat"', "log.reference.position",
+        "columns", ["lat", "lon", "h"],
+    ),
+    "fix: latitude for longitude": (
+        'file = "aids"\ncolumns = ["lat", "lon"', 'file = "aids"\ncolumns = ["lon", "lat"', "log.instruments.gnss",
+        "columns", ["lat", "lon", "h"],
+    ),
+    "all: latitude for longitude": (
+        'columns = ["lat", "lon"', 'columns = ["lon", "lat"', "log.reference.position", "columns", ["lat", "lon", "h"],
+    ),
+    "velocity east, north, up": (
+        '"vn", "ve", "vd"', '"ve", "vn", "-vd"', "log.reference.velocity", "columns", ["vn", "ve", "vd"],
+    ),
+    "attitude of east, north, up": (
+        '"yaw"]', '"yaw"]\nframe = "enu"', "log.reference.attitude", "frame", "geodetic",
+    ),
+    "attitude: roll": ('"roll", "pitch"', '"-roll", "pitch"', "log.reference.attitude", "columns",
+                       ["roll", "pitch", "yaw"]),
+    "attitude: roll for pitch": ('"roll", "pitch"', '"pitch", "roll"', "log.reference.attitude", "columns",
+                                 ["roll", "pitch", "yaw"]),
+    "reference late": ('path = "truth.csv"', 'path = "truth.csv"\noffset_s = 2.0', "log.reference.velocity", "offset_s",
+                       -2.0),
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def root(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("readings")
+    make_log(folder)
+    return folder
+
+
+@pytest.fixture
+def log(root, monkeypatch):
+    monkeypatch.setenv("SIMNAV_DATA", str(root))
+
+
+def test_a_log_that_is_right(log):
+    report = check_log(parse(SCENARIO))
+    assert report.passed, report
+
+
+@pytest.mark.parametrize("wrong", WRONG)
+def test_a_wrong_reading_is_found_with_the_line_to_write(log, wrong):
+    old, new, table, key, right = WRONG[wrong]
+    assert old in SCENARIO
+    found = probable_readings(parse(SCENARIO.replace(old, new)), "")
+    assert len(found) == 1
+    written = {(t, k): json.loads(v) for t, k, v in found[0].changes}
+    assert written[table, key] == (pytest.approx(right) if isinstance(right, float) else right)
+    assert found[0].probability > 0.9
+    assert found[0].present < 1e-3
+
+
+def test_two_wrong_readings_are_found_one_after_the_other(log):
+    text = SCENARIO.replace('"gy", "gz"', '"gy", "-gz"').replace('"vx", "vy", "vz"', '"vx", "-vy", "-vz"')
+    report = check_log(parse(text))
+    assert not report.passed
+    said = [f.sentence for f in report.findings if f.level == "error"]
+    assert len(said) == 2
+    assert any('angular_rate = ["gx", "gy", "gz"] of [log.imu]' in s for s in said)
+    assert any('columns = ["vx", "vy", "vz"] of [log.instruments.dvl]' in s for s in said)
+
+
+@pytest.mark.parametrize("wrong", ["gyroscope x", "gyroscope z", "dvl forward, left, up", "dvl late"])
+def test_a_steady_vessel_tells_nothing(tmp_path, monkeypatch, wrong):
+    monkeypatch.setenv("SIMNAV_DATA", str(tmp_path))
+    make_log(tmp_path, steady=True)
+    assert not probable_readings(parse(SCENARIO), "")
+    assert not probable_readings(parse(SCENARIO.replace(*WRONG[wrong][:2])), "")
+
+
+def test_align_warns_of_figures_of_a_wrong_reading(log):
+    text = SCENARIO.replace('"gy", "gz"', '"gy", "-gz"').replace('"vx", "vy", "vz"', '"vx", "-vy", "-vz"')
+    remarks = {a.instrument: a.remark for a in align(parse(text))}
+    assert "do not use these figures" in remarks["imu"]
+    assert "do not use these figures" in remarks["dvl"]
+    assert "do not use" not in remarks["compass"]
+    assert not any("do not use" in a.remark or "wrong" in a.remark for a in align(parse(SCENARIO)))
+
+
+def test_the_draft_has_the_probable_reading(root, tmp_path):
+    folder = tmp_path / "log"
+    folder.mkdir()
+    header, *rows = (root / "manoeuvring" / "imu.csv").read_text().splitlines()
+    cells = [row.split(",") for row in rows]
+    for row in cells:
+        row[3] = repr(-float(row[3]))  # the gyroscope's third axis points up, those of the accelerometers down
+    (folder / "imu.csv").write_text("\n".join([header, *map(",".join, cells)]) + "\n")
+    (folder / "truth.csv").write_text((root / "manoeuvring" / "truth.csv").read_text())
+    target = tmp_path / "draft.toml"
+    inspect_log([folder], output=target)
+    line = next(x for x in target.read_text().splitlines() if x.startswith("angular_rate ="))
+    assert '"-gz"' in line
+    assert "with probability 0.9999" in line
+    assert check_log(load(target)).passed
+
+
+def test_correlated_samples_say_less():
+    chance = np.random.default_rng(3)
+    white = chance.standard_normal(4000)
+    assert effective_samples(white) == pytest.approx(4000.0, rel=0.1)
+    walk, rho = np.zeros(4000), 0.9
+    for k in range(1, 4000):
+        walk[k] = rho * walk[k - 1] + white[k]
+    assert effective_samples(walk) == pytest.approx(4000.0 * (1.0 - rho) / (1.0 + rho), rel=0.3)
+    assert effective_samples(np.ones(4000)) < 5.0
+
+
+@pytest.mark.parametrize("name", ["car-kitti", "ship-nbp1406", "auv-akit"])
+def test_the_recordings_of_the_catalogue_are_right(monkeypatch, name):
+    monkeypatch.setenv("SIMNAV_DATA", str(DATA))
+    if name != "car-kitti" and not (DATA / name.partition("-")[2]).is_dir():
+        pytest.skip(f"no folder {name.partition('-')[2]} in {DATA} (SIMNAV_DATA)")
+    assert check_log(load(name)).passed
+
+
+def test_the_recorded_car_with_a_gyroscope_of_the_wrong_sign():
+    import simnav.scenarios
+
+    text = (Path(simnav.scenarios.__file__).parent / "car-kitti.toml").read_text()
+    (found,) = probable_readings(parse(text.replace('"-omegaZ"', '"omegaZ"')), "")
+    assert found.changes == (("log.imu", "angular_rate", '["omegaX", "-omegaY", "-omegaZ"]'),)
