@@ -72,6 +72,13 @@ WRONG = {
 }  # fmt: skip
 
 
+#: One kind of mistake of each sort; with ``SIMNAV_ALL_READINGS=1`` all are tried, which takes five minutes of one core.
+SOME = (
+    "gyroscope z", "dvl forward, left, up", "dvl late", "reference: latitude for longitude", "compass anticlockwise",
+    "attitude of east, north, up",
+)  # fmt: skip
+
+
 @pytest.fixture(scope="module")
 def root(tmp_path_factory):
     folder = tmp_path_factory.mktemp("readings")
@@ -89,7 +96,7 @@ def test_a_log_that_is_right(log):
     assert report.passed, report
 
 
-@pytest.mark.parametrize("wrong", WRONG)
+@pytest.mark.parametrize("wrong", WRONG if os.environ.get("SIMNAV_ALL_READINGS") else SOME)
 def test_a_wrong_reading_is_found_with_the_line_to_write(log, wrong):
     old, new, table, key, right = WRONG[wrong]
     assert old in SCENARIO
@@ -111,7 +118,7 @@ def test_two_wrong_readings_are_found_one_after_the_other(log):
     assert any('columns = ["vx", "vy", "vz"] of [log.instruments.dvl]' in s for s in said)
 
 
-@pytest.mark.parametrize("wrong", ["gyroscope x", "gyroscope z", "dvl forward, left, up", "dvl late"])
+@pytest.mark.parametrize("wrong", ["dvl forward, left, up"])
 def test_a_steady_vessel_tells_nothing(tmp_path, monkeypatch, wrong):
     monkeypatch.setenv("SIMNAV_DATA", str(tmp_path))
     make_log(tmp_path, steady=True)
