@@ -19,8 +19,8 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from llvmlite import binding
-from numba.core import base, imputils, typeinfer, types
+from llvmlite import binding, ir
+from numba.core import base, imputils, pythonapi, typeinfer, types
 from numba.core import config as numba_config
 from numba.core.caching import FunctionCache, IndexDataCacheFile
 from numba.core.runtime.nrt import rtsys
@@ -37,6 +37,7 @@ _user_function: Any = imputils.user_function
 _Overloads: Any = base.OverloadSelector
 _Reference: Any = types.StructRef
 structures: Any = structref
+boxing: Any = pythonapi
 config: Any = numba_config
 
 
@@ -168,12 +169,38 @@ class _Structure:
     def __init__(self, meminfo: Any):
         self._meminfo = meminfo
 
-    @classmethod
-    def _numba_box_(cls, _: Any, meminfo: Any) -> _Structure:
-        return cls(meminfo)
+
+_POINTER: Any = types.MemInfoPointer(types.voidptr)
 
 
-structures.define_boxing(RecordType, _Structure)
+@boxing.box(RecordType)  # type: ignore[untyped-decorator]
+def _returned(kind: Any, value: Any, c: Any) -> Any:
+    """A record that compiled code returns to Python."""
+    structure = structures._Utils(c.context, c.builder, kind).get_struct_ref(value)
+    owner = c.pyapi.unserialize(c.pyapi.serialize_object(_Structure))
+    meminfo = c.box(_POINTER, structure.meminfo)
+    returned = c.pyapi.call_function_objargs(owner, [meminfo])
+    c.pyapi.decref(owner)
+    c.pyapi.decref(meminfo)
+    return returned
+
+
+@boxing.unbox(RecordType)  # type: ignore[untyped-decorator]
+def _taken(kind: Any, record: Any, c: Any) -> Any:
+    """A record that Python hands over to compiled code.
+
+    Its attribute is asked for by an interned string. By itself Numba makes a new string each time, and Python's cache
+    of attributes keeps some thousands of them.
+    """
+    intern = ir.FunctionType(c.pyapi.pyobj, [c.pyapi.cstring])
+    text = c.context.insert_const_string(c.builder.module, "_meminfo")
+    name = c.builder.call(c.pyapi._get_function(intern, name="PyUnicode_InternFromString"), [text])
+    owner = c.pyapi.object_getattr(record, name)
+    c.pyapi.decref(name)
+    meminfo = c.unbox(_POINTER, owner).value
+    structure = structures._Utils(c.context, c.builder, kind).new_struct_ref(meminfo)
+    c.pyapi.decref(owner)
+    return boxing.NativeValue(structure._getvalue())
 
 
 def record_type(name: str, fields: Mapping[str, Any]) -> Any:

@@ -20,6 +20,7 @@ from __future__ import annotations
 import dataclasses
 import sys
 from functools import cached_property
+from types import SimpleNamespace
 from typing import Any, ClassVar, dataclass_transform
 
 from simnav.compiled import Kernel
@@ -76,6 +77,21 @@ class Record:
         """The structure in compiled code, which Numba asks an object for."""
         values = [getattr(self, name) for name in self.numba_fields]
         return _constructor(type(self))(*(v.compile() if isinstance(v, Kernel) else v for v in values))._meminfo
+
+    @cached_property
+    def in_python(self) -> Any:
+        """Its fields for a caller in Python, which needs no check of the types of its arguments.
+
+        A kernel is entered without a check (`simnav.compiled.Kernel.unchecked`); one that is to take a record of this
+        record with a Python function in it is its plain source.
+        """
+        values = {name: getattr(self, name) for name in self.numba_fields}
+        plain = {type(v) for v in values.values() if isinstance(v, Record) and not v.compiled}
+        for name, value in values.items():
+            if isinstance(value, Kernel):
+                takes = set(hints_of(value.function).values())
+                values[name] = value.function if plain & takes else value.unchecked
+        return SimpleNamespace(**values)
 
     def __getstate__(self) -> dict[str, Any]:
         """Its fields: a copy has a structure of its own."""

@@ -215,10 +215,9 @@ class KalmanEstimator(Solver):
         functions = self.functions()._asdict()
         self._together = functions.pop("together")
         self._reports = functions["choose"] is choose_noise
-        choice, known = self.choice(instruments), all(isinstance(f, Kernel) for f in functions.values())
-        if not known:  # Python calls the kernels among them: their arguments are those of their annotations
-            functions = {name: f.unchecked if isinstance(f, Kernel) else f for name, f in functions.items()}
-            functions["choose"] = self.choose if self.adaptation is None and not self._reports else functions["choose"]
+        choice = self.choice(instruments)
+        if self.adaptation is None and not self._reports and not all(isinstance(f, Kernel) for f in functions.values()):
+            functions["choose"] = self.choose
         return Filter(dynamics=self.dynamics, choice=choice, **functions)
 
     def choice(self, instruments: Instruments) -> Choice:
@@ -239,8 +238,10 @@ class KalmanEstimator(Solver):
         """Use measurements in order of their times, propagate to a time, and record what became of each."""
         self._measurements, count = measurements, len(measurements)
         readings = self._arrays.fill(measurements)
-        step = filter_step.unchecked if self._compiled else filter_step.function
-        step(self._filter, readings, samples, count, until)
+        if self._compiled:
+            filter_step.unchecked(self._filter, readings, samples, count, until)
+        else:
+            filter_step.function(self._filter.in_python, readings, samples, count, until)
         nis, size, rejected = readings.nis.tolist(), readings.size.tolist(), readings.rejected.tolist()
         if self._reports:
             sigma, reported = readings.sigma.tolist(), readings.reported.tolist()
@@ -298,7 +299,7 @@ class KalmanEstimator(Solver):
             weaken_position(dynamics.covariance, readings.inflation[k])
         else:
             self.model.loosen(dynamics.covariance, readings.inflation[k], dynamics.first_variances)
-        self._filter.predict(dynamics, readings, k, prediction)
+        self._filter.in_python.predict(dynamics, readings, k, prediction)
 
     def correct(self, dynamics: Dynamics, choice: Choice, readings: Readings, k: int, prediction: Prediction) -> float:
         """Correct the covariance, and compute the correction of the state."""
@@ -328,7 +329,7 @@ class KalmanEstimator(Solver):
 
     def _use_together(self, group: Sequence[Measurement], until: float, diagnostics: dict[str, float | Array]) -> bool:
         """Use the measurements of a group; False if they have to be used one by one."""
-        self._filter.propagate(self.dynamics, self.model.samples, until)
+        self._filter.in_python.propagate(self.dynamics, self.model.samples, until)
         assert self._together is not None
         used = self._together(group, self.covariance, self.dynamics.correction)
         if used is None:

@@ -112,11 +112,10 @@ def test_the_whole_step_runs_without_a_compiler(recording_of):
         estimator.reset(recording.start, recording.instruments)
     made = plain._filter
     names = ("propagate", "predict", "choose", "inflate", "correct", "retract")
-    plain._filter = SimpleNamespace(
+    made.in_python = SimpleNamespace(
         dynamics=made.dynamics, choice=made.choice, **{name: getattr(made, name).function for name in names}
     )
     plain._compiled = False
-    plain._filter.choose = made.choose  # what was chosen is reported where the kernel is handed over
     for packet in recording.steps():
         a, b = compiled.update(packet), plain.update(packet)
         np.testing.assert_allclose(a.position, b.position, rtol=1e-14)
