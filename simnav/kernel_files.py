@@ -170,7 +170,8 @@ class _Structure:
         self._meminfo = meminfo
 
 
-_POINTER: Any = types.MemInfoPointer(types.voidptr)
+_pointer_to: Any = types.MemInfoPointer
+_POINTER: Any = _pointer_to(types.voidptr)
 
 
 @boxing.box(RecordType)  # type: ignore[untyped-decorator]

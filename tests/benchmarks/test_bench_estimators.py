@@ -10,6 +10,7 @@ import pytest
 
 from simnav.estimator import make
 from simnav.estimators.rows.kalman import Ekf
+from simnav.estimators.solvers.filter_step import filter_step
 from simnav.recording import Recording
 from simnav.scenario import parse
 from simnav.source import record
@@ -95,12 +96,12 @@ def test_update_without_propagation(benchmark, recording: Recording):
     for step in steps:
         estimator.update(step)
     aids = steps[-1].aids
-    covariance, correction = estimator.covariance.copy(), np.empty(estimator.model.size)
+    covariance, model = estimator.covariance.copy(), estimator.model
 
     def update() -> None:
         estimator.covariance[:] = covariance
-        for m in aids:
-            estimator.model.assimilate(m, estimator.covariance, correction)
+        readings = estimator._arrays.fill(aids)
+        filter_step(estimator._filter, readings, model.samples, len(aids), model.time)
 
     benchmark(update)
     assert len(aids) == 4

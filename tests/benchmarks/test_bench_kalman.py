@@ -48,6 +48,7 @@ def test_epoch(benchmark, recording: Recording, row: str):
 def test_update_only(benchmark, recording: Recording, row: str, kind: str):
     """Covariance propagation with given increments, and one measurement."""
     from simnav.estimators.models.propagation import propagate_covariance
+    from simnav.estimators.solvers.filter_step import filter_step
 
     estimator = make(row)
     estimator.reset(recording.start, recording.instruments)
@@ -56,13 +57,14 @@ def test_update_only(benchmark, recording: Recording, row: str, kind: str):
     model, covariance = estimator.model, estimator.covariance
     measurement: Measurement = next(m for m in packet.aids if m.kind == kind)
     state, before = model.snapshot(), covariance.copy()
-    none, correction = np.zeros(len(model.calibration)), np.empty(model.size)
+    none = np.zeros(len(model.calibration))
 
     def update():
         model.restore(state)
         covariance[:] = before
         propagate_covariance(covariance, model.transition, model.process_noise, model.calibration, none, none, 1.0)
-        model.assimilate(measurement, covariance, correction)
+        readings = estimator._arrays.fill([measurement])
+        filter_step(estimator._filter, readings, model.samples, 1, model.time)
 
     benchmark(update)
     assert np.trace(covariance[:3, :3]) <= np.trace(before[:3, :3]) * 1.5

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from copy import deepcopy
+
 import numpy as np
 import pytest
 
@@ -41,10 +43,8 @@ def model() -> tuple[ShipModel, np.ndarray]:
 
 
 def perturbed(model: ShipModel, e: np.ndarray) -> ShipModel:
-    other = ShipModel()
-    other.__dict__.update(model.__dict__)
-    other.position = earth.displace(model.position, np.array([e[0], e[1], 0.0]))
-    other.x = model.x.copy()
+    other = deepcopy(model)
+    other.position[:] = earth.displace(model.position, np.array([e[0], e[1], 0.0]))
     other.x[2:] += e[2:]
     return other
 
