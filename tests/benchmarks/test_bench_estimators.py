@@ -10,7 +10,6 @@ import pytest
 
 from simnav.estimator import make
 from simnav.estimators.rows.kalman import Ekf
-from simnav.estimators.solvers.filter_step import filter_step
 from simnav.recording import Recording
 from simnav.scenario import parse
 from simnav.source import record
@@ -100,8 +99,7 @@ def test_update_without_propagation(benchmark, recording: Recording):
 
     def update() -> None:
         estimator.covariance[:] = covariance
-        readings = estimator._arrays.fill(aids)
-        filter_step(estimator._filter, readings, model.samples, len(aids), model.time)
+        estimator._use(aids, model.samples, model.time, {}, [])
 
     benchmark(update)
     assert len(aids) == 4

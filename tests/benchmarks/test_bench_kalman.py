@@ -48,7 +48,6 @@ def test_epoch(benchmark, recording: Recording, row: str):
 def test_update_only(benchmark, recording: Recording, row: str, kind: str):
     """Covariance propagation with given increments, and one measurement."""
     from simnav.estimators.models.propagation import propagate_covariance
-    from simnav.estimators.solvers.filter_step import filter_step
 
     estimator = make(row)
     estimator.reset(recording.start, recording.instruments)
@@ -63,8 +62,7 @@ def test_update_only(benchmark, recording: Recording, row: str, kind: str):
         model.restore(state)
         covariance[:] = before
         propagate_covariance(covariance, model.transition, model.process_noise, model.calibration, none, none, 1.0)
-        readings = estimator._arrays.fill([measurement])
-        filter_step(estimator._filter, readings, model.samples, 1, model.time)
+        estimator._use([measurement], model.samples, model.time, {}, [])
 
     benchmark(update)
     assert np.trace(covariance[:3, :3]) <= np.trace(before[:3, :3]) * 1.5
