@@ -56,7 +56,6 @@ from simnav.estimators.composition import Solver
 from simnav.estimators.models.base import ErrorModel
 from simnav.estimators.models.chains import Chain, chain_of
 from simnav.estimators.models.channels import owners, summary
-from simnav.estimators.models.columns import Selection
 from simnav.estimators.models.coupling import by_source
 from simnav.estimators.models.stated_sigmas import with_stated_sigmas
 from simnav.estimators.models.suitable import ModelChoice
@@ -75,17 +74,6 @@ CHECKED_STEP = 1.0
 FIRST_DAMPING, DAMPING_FACTOR = 1e-2, 10.0
 #: A measurement with a weight up to this is reported as faulty.
 FAULTY_WEIGHT = 0.5
-#: The whole columns of the chain that `solve_chain` and `half_squares` take.
-SOLVED = Selection(
-    ("motions", ("jacobian", "noise", "residual", "weight")),
-    ("aids", ("node", "instrument", "components", "jacobian", "residual", "noise", "weight")),
-    ("nodes", ("predicted", "predicted_shift", "filtered", "filtered_shift")),
-    ("aids", ("cross", "white", "innovation", "used")),
-    ("nodes", ("step", "size")),
-)
-SQUARES = Selection(("motions", ("norm", "weight")), ("aids", ("norm", "weight")))
-#: Of new aiding factors, what becomes diagnostics and flags.
-REPORTED = Selection(("aids", ("instrument", "time", "norm", "weight")))
 
 
 class WindowEstimator(LooksBack, Solver):
@@ -110,7 +98,7 @@ class WindowEstimator(LooksBack, Solver):
     iterations : int
         Largest number of steps in an epoch.
     spacing : float
-        Measurements at times closer to the newest node than this [s] have no node of their own (`Chain`, folds), unless
+        Measurements at times closer to the newest node than this [s] have no node of their own (`Chain`), unless
         they are the last of their step. 0, and with ``every_sample``: every time of a measurement is a node.
     every_sample : bool
         True: a node for every IMU sample, instead of one preintegrated factor between measurements. This is the graph
@@ -301,7 +289,7 @@ class WindowEstimator(LooksBack, Solver):
         return True
 
     def _make_node(self, last: bool) -> None:
-        """Make the front a node for a measurement, unless that can be folded onto the newest one."""
+        """Make the front a node for a measurement, unless that can be predicted from the newest one."""
         chain = self.chain
         if chain.ahead > 0.0 and (last or self.every_sample or chain.ahead >= self.spacing):
             if self.adaptation is None:
@@ -343,9 +331,9 @@ class WindowEstimator(LooksBack, Solver):
         diagnostics["iterations"], diagnostics["cost"] = float(solved), cost
         diagnostics["variance_factor"] = self._cost_test.variance_factor
         if attached:
-            (columns,), last = chain.whole(REPORTED), chain.aids.last
-            newest = [column[last - attached : last].tolist() for column in columns]
-            for index, time, norm, weight in zip(*newest):
+            aids, new = chain.window.aids, slice(chain.aids.last - attached, chain.aids.last)
+            reported = (aids.instrument, aids.time, aids.norm, aids.weight)
+            for index, time, norm, weight in zip(*(column[new].tolist() for column in reported)):
                 of_residual, of_weight = self._labels[index]
                 diagnostics[of_residual], diagnostics[of_weight] = norm, weight
                 if weight <= FAULTY_WEIGHT:
@@ -473,34 +461,25 @@ class WindowEstimator(LooksBack, Solver):
         """Ask the weighting; whether it has settled, and the first node that has to do with a weight that is new."""
         assert self.weighting is not None
         motions, aids = self.chain.motions, self.chain.aids
-        before = motions["weight"].copy(), aids["weight"].copy()
+        motion_before, before = motions["weight"].copy(), aids["weight"].copy()
         factors = self._factors = self._factors or self._all_factors()
         factors.iteration = iteration
         settled = self.weighting.weigh(factors)
         if self.isolation is not None:
             settled = self.isolation.judge(factors) and settled
-        first = keep_weights.unchecked(
-            (before[0], motions["norm"], motions["weight"]), aids["node"], self.chain.base,
-            (before[1], aids["norm"], aids["weight"]), self.tolerance,
-        )  # fmt: skip
+        first = keep_weights.unchecked(self.chain.window, self.chain.rows, motion_before, before, self.tolerance)
         return settled, first
 
     def _cost(self) -> float:
         """Half the sum of squares of all factors, with the weights that they have."""
-        chain = self.chain
-        cost: float = half_squares.unchecked(
-            chain.rows, (chain.prior_whitener, chain.prior_shift), *chain.whole(SQUARES)
-        )  # fmt: skip
+        cost: float = half_squares.unchecked(self.chain.window, self.chain.rows)
         return cost
 
     def _solve(self, damping: float, first: int = 0) -> tuple[float, float]:
         """One step of all nodes; its largest component in sigmas, of all nodes and of those before ``first``."""
         chain = self.chain
-        motions, aids, left, left_aids, steps = chain.whole(SOLVED)
-        sizes: tuple[float, float] = solve_chain.unchecked(
-            (chain.prior if first else chain.turned(chain.prior, -chain.prior_shift), chain.prior_shift), chain.rows,
-            motions, aids, damping, first, left, left_aids, steps,
-        )  # fmt: skip
+        prior = chain.prior.covariance if first else chain.turned(chain.prior.covariance, -chain.prior.shift)
+        sizes: tuple[float, float] = solve_chain.unchecked(chain.window, chain.rows, prior, damping, first)
         return sizes
 
     def _all_factors(self) -> Factors:

@@ -230,7 +230,7 @@ def test_a_folded_measurement_is_seen_through_the_motion(recording: Recording):
     at_nodes, onto_first = folded(recording, True), folded(recording, False)
     n = onto_first.size
     assert len(onto_first.nodes) == 1
-    assert len(onto_first.folds) == len(set(onto_first.aids["time"])) >= 2
+    assert len(onto_first.between) == len(set(onto_first.aids["time"])) >= 2
     shift = np.zeros(n)
     shift[:15] = LARGE * np.random.default_rng(5).uniform(-0.5, 0.5, 15)
     onto_first.retract(shift[None].copy())
@@ -268,7 +268,7 @@ def test_folded_noise_is_the_measurements_and_the_motions(recording: Recording):
     linearised = front.measure(last)
     assert linearised is not None
     H, d = linearised.jacobian, len(last.value)
-    expected = 0.01 * np.eye(d) + H @ chain.folds["noise"][-1] @ H.T
+    expected = 0.01 * np.eye(d) + H @ chain.between["noise"][-1] @ H.T
     for _ in range(2):  # it is added once
         chain.linearise_aids()
         np.testing.assert_allclose(chain.aids["noise"][-1][:d, :d], expected, rtol=1e-9)
@@ -363,9 +363,9 @@ def test_a_step_taken_in_one_call_is_its_measurements_one_by_one(spacing: float)
         assert counts == one_by_one(single, aids, packet.time, spacing)
         assert taken.ahead == single.ahead
         assert taken.time == single.time
-        for name in ("nodes", "motions", "aids", "folds"):
+        for name in ("nodes", "motions", "aids", "between"):
             ours, theirs = getattr(taken, name), getattr(single, name)
-            assert len(ours) == len(theirs) > 0 or (name == "folds" and spacing == 0.0)
+            assert len(ours) == len(theirs) > 0 or (name == "between" and spacing == 0.0)
             written = {key for _, group in TAKEN.groups for key in group}
             for column in written & ours.names:
                 np.testing.assert_array_equal(ours[column], theirs[column], err_msg=f"{name}, {column}")
