@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from simnav.estimators.models.inertial_take import TAKEN
 
 from simnav.estimators.models.dvl_calibration import DvlCalibrationModel
 from simnav.estimators.models.inertial import InertialModel
 from simnav.estimators.models.inertial_chain import InertialChain
-from simnav.estimators.models.inertial_take import TAKEN
 from simnav.estimators.models.nine_state import NineStateModel
 from simnav.geometry.rotation import dcm_from_rotation_vector, dcm_from_rpy, left_jacobian, rotation_vector_from_dcm
 from simnav.recording import Recording
