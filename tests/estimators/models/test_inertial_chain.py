@@ -353,7 +353,7 @@ def one_by_one(chain: InertialChain, measurements: list[Measurement], until: flo
 
 @pytest.mark.parametrize("spacing", [0.0, 0.3, 1.0])
 def test_a_step_taken_in_one_call_is_its_measurements_one_by_one(spacing: float):
-    """Nodes, motions, factors and intermediate states to the last bit: a DVL at 23 Hz, a depth sensor and fixes (``rov.toml``)."""
+    """Nodes, motions, factors and states to the last bit: a DVL at 23 Hz, a depth sensor and fixes (``rov.toml``)."""
     rov = record(load(ROV).model_copy(update={"duration": 6.0}), 2)
     taken, single = (InertialChain(InertialModel()) for _ in range(2))
     for chain in (taken, single):
