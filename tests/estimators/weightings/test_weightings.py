@@ -368,7 +368,7 @@ def test_it_hardens_only_where_there_is_an_outlier(cost: str):
     f = factors(np.vstack([calm, along([25.0])]))
     assert epoch(f) > 3
     hard = truncated if cost == "tls" else geman_mcclure
-    np.testing.assert_allclose(f.weight, np.maximum(hard(f.norm / constants(hard)[2]), 1e-3), rtol=1e-9)
+    np.testing.assert_allclose(f.weight, np.maximum(of_array(hard, f.norm / constants(hard)[2]), 1e-3), rtol=1e-9)
     assert epoch(factors(np.vstack([calm, along([25.0, 1.0])]))) == 1  # the old outlier begins no new schedule
 
 
