@@ -21,7 +21,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from functools import singledispatch
+from functools import cached_property, singledispatch
 from typing import Any, ClassVar
 
 import numpy as np
@@ -180,9 +180,9 @@ class Chain(ABC):
         self.since_node = MotionSinceNode(transition=np.eye(n), noise=np.zeros((n, n)), elapsed=np.zeros(1))
         self.prior = Prior(covariance=ready(covariance.copy()), whitener=np.empty((n, n)), shift=np.zeros(n))
         whitening(self.prior.covariance, self.prior.whitener)
-        self._reference = self.reference()
         return covariance
 
+    @cached_property
     def reference(self) -> Reference:
         """How shifts and covariances are referred to another state; a model with rotations overrides it."""
         return Reference(turn=keep_covariance, relative_shift=subtract_step)
@@ -362,7 +362,7 @@ class Chain(ABC):
 
     def marginalise(self, count: int) -> None:
         """Let the oldest nodes leave; what they say about the first that stays, at the last step, is its prior."""
-        leaving = marginalise.unchecked(count, self.window, self._states_between, self.rows, self._reference)
+        leaving = marginalise.unchecked(count, self.window, self._states_between, self.rows, self.reference)
         self.base += count
         self.base_between += leaving.between
         self.nodes.drop(count)
@@ -545,13 +545,13 @@ class Chain(ABC):
     def turned(self, covariance: Array, shift: Array) -> Array:
         """A covariance at one state, transformed to another state at an (n,) shift."""
         turned = np.empty_like(covariance)
-        self._reference.in_python.turn(covariance, shift, turned)
+        self.reference.in_python.turn(covariance, shift, turned)
         return turned
 
     def relative_shift(self, shift: Array, step: Array) -> Array:
         """An (n,) shift, relative to the state after a step."""
         rest = np.empty_like(shift)
-        self._reference.in_python.relative_shift(shift, step, rest)
+        self.reference.in_python.relative_shift(shift, step, rest)
         return rest
 
 

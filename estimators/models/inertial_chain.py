@@ -7,6 +7,7 @@ that one call linearises all factors or moves all nodes.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -286,6 +287,7 @@ class InertialChain(Chain):
         self._readings = ReadingsOfSteps(dict.fromkeys(self.names, 0))
         return covariance
 
+    @cached_property
     def reference(self) -> Reference:
         """As `Chain.reference`: rotations compose, and turn a covariance."""
         return Reference(turn=turn_covariance, relative_shift=relative_shift)
