@@ -12,7 +12,7 @@ from typing import NamedTuple
 from simnav.kernel_types import IntegerVector, Matrix, Stack, Vector
 from simnav.records import Record
 
-__all__ = ["AidingFactors", "Motions", "Nodes", "Prior", "Rows", "Window"]
+__all__ = ["AidingFactors", "Motions", "NewRows", "Nodes", "Prior", "Rows", "Window"]
 
 
 class Rows(NamedTuple):
@@ -42,6 +42,14 @@ class Rows(NamedTuple):
     between: int
     base: int
     base_between: int
+
+
+class NewRows(NamedTuple):
+    """How many nodes, aiding factors and intermediate states a step has appended so far."""
+
+    nodes: int
+    aids: int
+    between: int
 
 
 class Nodes(Record):

@@ -20,9 +20,9 @@ but `observe` are in `simnav.estimators.models.moving_chain` for models whose mo
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import cached_property, singledispatch
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 from simnav.compiled import kernel, ready
 from simnav.estimator.needs import Needs
 from simnav.estimators.algebra.block_tridiagonal import after_step, whiten
-from simnav.estimators.algebra.factors import AidingFactors, Motions, Nodes, Prior, Rows, Window
+from simnav.estimators.algebra.factors import AidingFactors, Motions, NewRows, Nodes, Prior, Rows, Window
 from simnav.estimators.algebra.whitening import whitening
 from simnav.kernel_types import Matrix, Stack, Vector
 from simnav.records import Record
@@ -52,7 +52,7 @@ from .intermediate_states import IntermediateStates
 from .many_readings import ManyReadings
 from .marginalisation import Reference, keep_covariance, marginalise, subtract_step
 
-__all__ = ["Chain", "MotionSinceNode", "attach_one", "begin_motion", "chain_of"]
+__all__ = ["Chain", "FactorFunctions", "MotionSinceNode", "attach_one", "begin_motion", "chain_of"]
 
 
 class MotionSinceNode(Record):
@@ -102,6 +102,15 @@ def begin_motion(
     whitening(factor_noise, whitener)
 
 
+class FactorFunctions(NamedTuple):
+    """The functions of a step of a window, see `simnav.estimators.solvers.window_step.WindowStep`."""
+
+    advance: Callable[..., None]
+    choose: Callable[..., bool]
+    make_node: Callable[..., NewRows]
+    attach: Callable[..., NewRows]
+
+
 class Chain(ABC):
     """The nodes and factors of a window over a model.
 
@@ -140,6 +149,8 @@ class Chain(ABC):
         """Further arrays of the model that a node stores, in addition to those of its ``state``."""
         return ()
 
+    #: The functions of a step of a window as kernels, and what they work on; None where a window has to call methods.
+    functions: FactorFunctions | None = None
     #: Components of the model's error from this index on are independent and only decay.
     coupled: ClassVar[int] = 10**9
 
@@ -284,26 +295,6 @@ class Chain(ABC):
     def nominal_noises(self, measurements: Sequence[Measurement]) -> Array | None:
         """As `ErrorModel.nominal_noises`, at the front."""
         return self.front.nominal_noises(measurements)
-
-    def take(self, measurements: Sequence[Measurement], until: float, spacing: float) -> tuple[int, int] | None:
-        """Attach all measurements of a step with their nominal noise, each at its own time.
-
-        Parameters
-        ----------
-        measurements : sequence of Measurement
-            In order of their times; one that is later than ``until`` is used then.
-        until : float
-            End of the step [s].
-        spacing : float
-            A measurement closer to the newest node than this [s] has no node of its own, unless it has the latest time.
-
-        Returns
-        -------
-        (int, int) or None
-            Number of measurements that were attached, and of those that cannot be used. None if nothing was done,
-            because the measurements have to be taken one by one.
-        """
-        return None
 
     def attach(self, measurement: Measurement, noise: Array) -> None:
         """Add a measurement at the front, with the (m, m) noise, as a factor on the newest node.

@@ -6,7 +6,6 @@ that one call linearises all factors or moves all nodes.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from functools import cached_property
 
 import numpy as np
@@ -14,19 +13,19 @@ from numpy.typing import NDArray
 
 from simnav.compiled import helper, kernel
 from simnav.estimators.algebra.block_tridiagonal import after_step, error_after_step, whiten_one
-from simnav.estimators.algebra.factors import Rows, Window
+from simnav.estimators.algebra.factors import NewRows, Rows, Window
 from simnav.kernel_types import IntegerVector, Matrix, Stack
 from simnav.records import Record
-from simnav.types import Array, InitialState, Instruments, Measurement
+from simnav.types import Array, InitialState, Instruments
 
 from .chain import Chain, chain_of
 from .columns import Columns
-from .filtering import ReadingsOfSteps
+from .filtering import Dynamics
 from .inertial import InertialModel
 from .intermediate_states import IntermediateStates, add_noise, through_one
 from .marginalisation import Reference
 from .measurements import OWN, Aid, State, observe_inertial
-from .new_factors import Growing, InertialStates, take_readings
+from .new_factors import INERTIAL_FACTORS, Growing, InertialStates
 from .preintegrated import add_shift, move_shift, relative_shift, turn_covariance
 from .propagation import correct_inertial
 
@@ -265,6 +264,7 @@ class InertialChain(Chain):
 
     coupled = 15
     front: InertialModel
+    dynamics: Dynamics
 
     @property
     def node_arrays(self) -> tuple[str, ...]:
@@ -283,8 +283,9 @@ class InertialChain(Chain):
             bias_at=np.array([aid.bias_at for aid in known], dtype=np.int64),
             scale_at=np.array([aid.scale_at for aid in known], dtype=np.int64),
         )
-        self._dynamics = None if front.functions() is None else front.dynamics(covariance, self.names)
-        self._readings = ReadingsOfSteps(dict.fromkeys(self.names, 0))
+        self.functions = None if front.functions() is None else INERTIAL_FACTORS
+        if self.functions is not None:
+            self.dynamics = front.dynamics(covariance, self.names)
         return covariance
 
     @cached_property
@@ -304,9 +305,10 @@ class InertialChain(Chain):
             )  # fmt: skip
         return found
 
-    @property
-    def _growing(self) -> Growing:
-        """What new rows are appended to; it holds until a column is replaced."""
+    def growing(self, count: int) -> Growing:
+        """What so many measurements append rows to; it holds until a column is replaced."""
+        for columns in (self.nodes, self.motions, self.aids, self.between):
+            columns.reserve(count)
         found: Growing | None = self._made.get(Growing)
         if found is None:
             w = self._inertial
@@ -316,22 +318,12 @@ class InertialChain(Chain):
             )  # fmt: skip
         return found
 
-    def take(self, measurements: Sequence[Measurement], until: float, spacing: float) -> tuple[int, int] | None:
-        """As `Chain.take`, if no instrument has an equation or a clock of its own."""
-        count, dynamics = len(measurements), self._dynamics
-        if dynamics is None or count > self.aids.free:
-            return None
-        for columns in (self.nodes, self.motions, self.between):
-            columns.reserve(count)
-        new = take_readings.unchecked(
-            dynamics, self.front.samples, self._readings.fill(measurements), count, until, spacing, self._growing,
-            self.rows,
-        )  # fmt: skip
+    def grow(self, new: NewRows) -> None:
+        """Count the rows that a kernel has appended."""
         rows = ((self.nodes, new.nodes), (self.motions, new.nodes), (self.aids, new.aids), (self.between, new.between))
         for columns, appended in rows:
             if appended:
                 columns.grow(appended)
-        return new.aids, new.unused
 
     def linearise_from(self, node: int = 0) -> None:
         """As `Chain.linearise_from` (equations in the module)."""

@@ -1,27 +1,24 @@
-"""The measurements of a step become factors of a window over an inertial model, in compiled code.
+"""New nodes and factors of a window over an inertial model, in compiled code.
 
-Where nothing chooses between measurements, it does what `simnav.estimators.solvers.window.WindowEstimator` does in
-Python: the front is propagated to each measurement, becomes a node or an intermediate state, and the measurement
-becomes a factor with its nominal noise.
+These are the functions that `simnav.estimators.solvers.window_step` calls where nothing but the datasheet chooses the
+noise of a measurement.
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 from simnav.compiled import helper, kernel
-from simnav.estimators.algebra.factors import AidingFactors, Motions, Rows
+from simnav.estimators.algebra.factors import AidingFactors, Motions, NewRows, Rows
 from simnav.kernel_types import Matrix, Stack, Vector
 from simnav.records import Record
 from simnav.types import Array
 
-from .chain import MotionSinceNode, attach_one, begin_motion
+from .chain import FactorFunctions, MotionSinceNode, attach_one, begin_motion
 from .filtering import Dynamics, Readings
 from .intermediate_states import IntermediateStates
 from .measurements import HEADING, has_heading
 from .propagation import MOTION_NUMBERS, Motion, Samples, carry_errors, motion_of, propagate_inertial
 
-__all__ = ["Growing", "InertialStates", "NewRows", "take_readings"]
+__all__ = ["INERTIAL_FACTORS", "Growing", "InertialStates"]
 
 
 class InertialStates(Record):
@@ -61,15 +58,6 @@ class Growing(Record):
     since_node: MotionSinceNode
 
 
-class NewRows(NamedTuple):
-    """How many rows a step has appended, and how many of its measurements cannot be used."""
-
-    nodes: int
-    aids: int
-    between: int
-    unused: int
-
-
 @helper
 def _keep(state: Motion, calibration: Array, kept: InertialStates, row: int) -> None:
     """Write a state into a row."""
@@ -86,10 +74,10 @@ def _keep(state: Motion, calibration: Array, kept: InertialStates, row: int) -> 
         kept.calibration[row, i] = calibration[i]
 
 
-@helper
-def _advance(dynamics: Dynamics, samples: Samples, until: float, since: MotionSinceNode) -> None:
+@kernel(passed=True)
+def advance(dynamics: Dynamics, growing: Growing, samples: Samples, until: float) -> None:
     """Propagate the front, and the motion since the newest node."""
-    state = motion_of(dynamics.numbers)
+    state, since = motion_of(dynamics.numbers), growing.since_node
     elapsed = until - state.clock[0]
     if elapsed > 0.0:
         dynamics.next_sample[0] = propagate_inertial(
@@ -101,17 +89,28 @@ def _advance(dynamics: Dynamics, samples: Samples, until: float, since: MotionSi
         since.elapsed[0] += elapsed
 
 
-@helper
-def _append_motion(motions: Motions, row: int, since: MotionSinceNode, time: float) -> None:
-    """Make the motion since the newest node a factor; after it there is no motion."""
+@kernel(passed=True)
+def use_nominal(dynamics: Dynamics, readings: Readings, k: int) -> bool:
+    """The noise is that of the datasheet; False for a heading of a body that points up or down."""
+    code = dynamics.aids.codes[readings.instrument[k], 0]
+    return code != HEADING or has_heading(motion_of(dynamics.numbers).dcm)
+
+
+@kernel(passed=True)
+def make_node(dynamics: Dynamics, growing: Growing, rows: Rows, new: NewRows) -> NewRows:
+    """Make the front a node, with the motion since the newest one as its factor; after it there is no motion."""
+    motions, since, row = growing.motions, growing.since_node, rows.first_motion + rows.nodes - 1 + new.nodes
+    state = motion_of(dynamics.numbers)
     begin_motion(
         since.transition, since.noise, motions.transition[row], motions.jacobian[row], motions.noise[row],
         motions.whitener[row],
     )  # fmt: skip
     for i in range(motions.begin_shift.shape[1]):
         motions.begin_shift[row, i], motions.end_shift[row, i] = 0.0, 0.0
-    motions.time[row], motions.weight[row] = time, 1.0
+    motions.time[row], motions.weight[row] = state.clock[0], 1.0
     since.elapsed[0] = 0.0
+    _keep(state, dynamics.numbers[MOTION_NUMBERS:], growing.nodes, rows.first_node + rows.nodes + new.nodes)
+    return NewRows(new.nodes + 1, new.aids, new.between)
 
 
 @helper
@@ -125,60 +124,27 @@ def _append_between(between: IntermediateStates, row: int, since: MotionSinceNod
             between.noise[row, i, j] = since.noise[i, j]
 
 
-@kernel
-def take_readings(
-    dynamics: Dynamics,
-    samples: Samples,
-    readings: Readings,
-    count: int,
-    until: float,
-    spacing: float,
-    growing: Growing,
-    rows: Rows,
-) -> NewRows:
-    """Do `Chain.take` for the chain of an inertial model.
+@kernel(passed=True)
+def attach(dynamics: Dynamics, growing: Growing, rows: Rows, new: NewRows, readings: Readings, k: int) -> NewRows:
+    """Make a reading a factor of the newest node with its nominal noise; an intermediate state, if it is later."""
+    state, since, aids = motion_of(dynamics.numbers), growing.since_node, growing.aids
+    s, newest, here, added = readings.instrument[k], rows.base + rows.nodes - 1 + new.nodes, -1, new.between
+    d, noise = dynamics.aids.codes[s, 1], dynamics.aids.figures[s]
+    if since.elapsed[0] > 0.0:
+        row = rows.first_between + rows.between + added
+        known = rows.between + added > 0 and growing.between.node[row - 1] == newest
+        if not known or growing.between_states.time[row - 1] != state.clock[0]:
+            _append_between(growing.between, row, since, newest)
+            _keep(state, dynamics.numbers[MOTION_NUMBERS:], growing.between_states, row)
+            added += 1
+        here = rows.base_between + rows.between + added - 1
+    row = rows.first_aid + rows.aids + new.aids
+    aids.node[row], aids.between[row], aids.bare[row], aids.instrument[row] = newest, here, here >= 0, s
+    aids.components[row], aids.time[row], aids.weight[row] = d, readings.time[k], 1.0
+    attach_one(
+        noise[: d * d].reshape((d, d)), readings.value[k, :d], aids.noise[row], aids.whitener[row], aids.value[row]
+    )
+    return NewRows(new.nodes, new.aids + 1, added)
 
-    Parameters
-    ----------
-    dynamics, samples, readings, count, until
-        As of `simnav.estimators.solvers.filter_step.filter_step`.
-    spacing : float
-        As of `Chain.take` [s].
-    growing : Growing
-        What new rows are written to. There must be room for ``count`` of each.
-    rows : Rows
-        Where the window is in it.
-    """
-    state, calibration = motion_of(dynamics.numbers), dynamics.numbers[MOTION_NUMBERS:]
-    since, aids, between_nodes = growing.since_node, growing.aids, growing.between.node
-    codes, noises, last = dynamics.aids.codes, dynamics.aids.figures, readings.time[count - 1]
-    newest, nodes, attached, added, unused = rows.base + rows.nodes - 1, 0, 0, 0, 0
-    for k in range(count):
-        time, s = readings.time[k], readings.instrument[k]
-        d = codes[s, 1]
-        _advance(dynamics, samples, min(time, until), since)
-        if codes[s, 0] == HEADING and not has_heading(state.dcm):
-            unused += 1
-            continue
-        if since.elapsed[0] > 0.0 and (time == last or since.elapsed[0] >= spacing):
-            _append_motion(growing.motions, rows.first_motion + rows.nodes - 1 + nodes, since, state.clock[0])
-            _keep(state, calibration, growing.nodes, rows.first_node + rows.nodes + nodes)
-            nodes += 1
-            newest += 1
-        here, row = -1, rows.first_between + rows.between + added
-        if since.elapsed[0] > 0.0:
-            known = rows.between + added > 0 and between_nodes[row - 1] == newest
-            if not known or growing.between_states.time[row - 1] != state.clock[0]:
-                _append_between(growing.between, row, since, newest)
-                _keep(state, calibration, growing.between_states, row)
-                added += 1
-            here = rows.base_between + rows.between + added - 1
-        row = rows.first_aid + rows.aids + attached
-        aids.node[row], aids.between[row], aids.bare[row], aids.instrument[row] = newest, here, here >= 0, s
-        aids.components[row], aids.time[row], aids.weight[row] = d, time, 1.0
-        attach_one(
-            noises[s, : d * d].reshape((d, d)), readings.value[k, :d], aids.noise[row], aids.whitener[row],
-            aids.value[row],
-        )  # fmt: skip
-        attached += 1
-    return NewRows(nodes, attached, added, unused)
+
+INERTIAL_FACTORS = FactorFunctions(advance, use_nominal, make_node, attach)
