@@ -28,8 +28,8 @@ updated
 
 Measurements of one instrument on one node are replaced by their mean, weighted by their information: the mean of their
 readings and of their Jacobians, and its covariance. If their Jacobians are equal and their noise is proportional, this
-is exact. The Jacobians of measurements that are folded onto a node (`simnav.estimators.models.chain`) differ by the
-motion of a fraction of a second.
+is exact. The Jacobians of measurements at intermediate states of a node
+(`simnav.estimators.models.chain`) differ by the motion of a fraction of a second.
 
 Sources: B. M. Bell, "The iterated Kalman smoother as a Gauss-Newton method", SIAM J. Optimization 4(3), 1994; for the
 backward pass G. J. Bierman, "Fixed interval smoothing with discrete measurements", Int. J. Control 18(1), 1973.
@@ -38,48 +38,56 @@ backward pass G. J. Bierman, "Fixed interval smoothing with discrete measurement
 from __future__ import annotations
 
 from math import sqrt
-from typing import TypeAlias
+from typing import NamedTuple
 
 import numpy as np
 
 from simnav.compiled import helper, kernel
-from simnav.kernel_types import IntegerVector, Matrix, Stack, Vector
+from simnav.kernel_types import Matrix, Stack, Vector
 from simnav.types import Array, Integers
 
 from .cholesky import factorise
+from .factors import AidingFactors, Rows, Window
 from .products import Places, add_product, list_elements, padded, sparse_product
 
-__all__ = [
-    "ROWS", "STEPPED_TYPES", "Aids", "Elimination", "Rows", "Whitened", "after_step", "error_after_step",
-    "half_squares", "keep_weights", "solve_chain", "whiten", "whiten_one",
-]  # fmt: skip
+__all__ = ["after_step", "error_after_step", "half_squares", "keep_weights", "solve_chain", "whiten", "whiten_one"]
 
 #: A factor with a smaller weight than this is left out.
 LEAST_WEIGHT = 1e-9
 
-#: The elements of a sparse (n, n) matrix: values, columns, and their number in each row (`products`).
-Lists: TypeAlias = tuple[Array, Places, Places]
-#: Work space (n, w), where w is a multiple of eight.
-Room: TypeAlias = tuple[Array, Array, Array]
-#: Where the K nodes, the K - 1 motion factors and the M aiding factors are in arrays that may have more rows before and
-#: after them: index of the first node, and K; index of the first motion factor; index of the first aiding factor, and
-#: M; and the number of the first node, from which the aiding factors count theirs.
-Rows: TypeAlias = tuple[int, int, int, int, int, int]
-ROWS = "UniTuple(i8, 6)"
-#: The M aiding factors: their nodes (M,), in ascending order; which instrument each comes from (M,), measurements of
-#: one instrument on one node are taken as their mean; components (M,), 0 for a factor that says nothing; Jacobians with
-#: respect to the nodes (M, 3, n); residuals, measured less predicted (M, 3); covariances (M, 3, 3), and the weights
-#: that divide them (M,).
-Aids: TypeAlias = tuple[Integers, Integers, Integers, Array, Array, Array, Array]
-_AIDS = "Tuple((i8[::1], i8[::1], i8[::1], f8[:, :, ::1], f8[:, ::1], f8[:, :, ::1], f8[::1]))"
-#: The stored results of an elimination: covariance of each node without its own measurements, with all older ones
-#: (K, n, n), and its mean minus the node (K, n); the same two with its own measurements.
-Elimination: TypeAlias = tuple[Array, Array, Array, Array]
-_ELIMINATION = "Tuple((f8[:, :, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1]))"
-#: The same of measurements: ``L^-1 H P`` and ``L^-1 H`` (M, 3, n) with ``L L' = S``, and ``L^-1 (r - H d)`` (M, 3); 1
-#: if a measurement is used, by itself or as a mean, otherwise 0 (M,).
-Whitened: TypeAlias = tuple[Array, Array, Array, Integers]
-_WHITENED = "Tuple((f8[:, :, ::1], f8[:, :, ::1], f8[:, ::1], i8[::1]))"
+
+class Elements(NamedTuple):
+    """The elements of a sparse (n, n) matrix: values, their columns, and how many there are in each row."""
+
+    value: Array
+    column: Places
+    counts: Places
+
+
+class Room(NamedTuple):
+    """Work space (n, w), where w is a multiple of eight."""
+
+    full: Array
+    work: Array
+    turned: Array
+
+
+class Measured(NamedTuple):
+    """A measurement of m components: its (3, n) Jacobian, (3,) residual, (3, 3) noise, and weight."""
+
+    jacobian: Array
+    residual: Array
+    noise: Array
+    weight: float
+    components: int
+
+
+class Whitened(NamedTuple):
+    """What the elimination leaves of a measurement: ``L^-1 H P``, ``L^-1 H`` and ``L^-1 (r - H d)``."""
+
+    cross: Array
+    white: Array
+    innovation: Array
 
 
 @helper
@@ -92,10 +100,10 @@ def _copy_node(P: Array, d: Array, to_P: Array, to_d: Array) -> None:
 
 
 @helper
-def _predict(P: Array, F: Array, Q: Array, weight: float, lists: Lists, room: Room, out: Array) -> None:
+def _predict(P: Array, F: Array, Q: Array, weight: float, elements: Elements, room: Room, out: Array) -> None:
     """Compute ``out = F P F' + Q / weight``, for a sparse F."""
     n = P.shape[0]
-    value, column, count = lists
+    value, column, count = elements
     full, work, turned = room
     list_elements(F, value, column, count)
     for i in range(n):
@@ -118,20 +126,20 @@ def _predict(P: Array, F: Array, Q: Array, weight: float, lists: Lists, room: Ro
 def _absorb(
     P: Array,
     d: Array,
-    measured: tuple[Array, Array, Array, float, int],
+    measured: Measured,
     L: Array,
-    white: tuple[Array, Array, Array],
+    whitened: Whitened,
     columns: Integers,
 ) -> bool:
-    """Update P and d with a measurement (H, r, R, weight, m) with the noise covariance ``R / weight``.
+    """Update P and d with a measurement with the noise covariance ``R / weight``.
 
-    With ``L L' = S = H P H' + R / weight`` the whitened quantities ``white`` = (U, G, y) are stored: ``U = L^-1 H P``,
-    ``G = L^-1 H`` and ``y = L^-1 (r - H d)``; the update is ``d + U' y`` and ``P - U' U``. The last row of L holds the
-    pivots. If S is singular, nothing is changed and the result is False. ``columns`` (3, n + 1) is work space: the
-    columns of H that are not zero, and their number.
+    With ``L L' = S = H P H' + R / weight`` the whitened quantities U = ``L^-1 H P``, G = ``L^-1 H`` and y =
+    ``L^-1 (r - H d)`` are stored; the update is ``d + U' y`` and ``P - U' U``. The last row of L holds the pivots. If S
+    is singular, nothing is changed and the result is False. ``columns`` (3, n + 1) is work space: the columns of H that
+    are not zero, and their number.
     """
     H, r, R, weight, m = measured
-    U, G, y = white
+    U, G, y = whitened
     n = P.shape[0]
     for a in range(m):
         y[a] = r[a]
@@ -190,8 +198,8 @@ def _absorb(
 
 
 @helper
-def _mean_of(i: int, end: int, aids: Aids, used: Integers, mean_H: Array, mean_r: Array, mean_R: Array) -> int:
-    """Compute the mean of measurement i and of the later used measurements of its instrument before ``end``.
+def _mean_of(i: int, end: int, aids: AidingFactors, mean_H: Array, mean_r: Array, mean_R: Array) -> int:
+    """Compute the mean of the measurement in row i and of the later used ones of its instrument before ``end``.
 
     The weight of each measurement in the mean is ``w / trace(R)``. ``used`` becomes 0 for those that i replaces.
 
@@ -200,7 +208,8 @@ def _mean_of(i: int, end: int, aids: Aids, used: Integers, mean_H: Array, mean_r
     int
         Number of measurements in the mean. If it is 1, nothing is written.
     """
-    _, instrument, components, H, r, R, weight = aids
+    instrument, components, used = aids.instrument, aids.components, aids.used
+    H, r, R, weight = aids.jacobian, aids.residual, aids.noise, aids.weight
     count = 1
     for k in range(i + 1, end):
         if used[k] == 1 and instrument[k] == instrument[i] and components[k] == components[i]:
@@ -267,59 +276,42 @@ def _return(adjoint: Array, U: Array, G: Array, y: Array, m: int, z: Array) -> N
 
 
 @kernel
-def solve_chain(
-    prior: tuple[Matrix, Vector],
-    rows: tuple[int, int, int, int, int, int],
-    motion: tuple[Stack, Stack, Matrix, Vector],
-    aids: tuple[IntegerVector, IntegerVector, IntegerVector, Stack, Matrix, Stack, Vector],
-    damping: float,
-    first: int,
-    left: tuple[Stack, Matrix, Stack, Matrix],
-    left_aids: tuple[Stack, Stack, Matrix, IntegerVector],
-    steps: tuple[Matrix, Vector],
-) -> tuple[float, float]:
+def solve_chain(window: Window, rows: Rows, prior: Matrix, damping: float, first: int) -> tuple[float, float]:
     """Compute one step of K nodes of n states with K - 1 motion factors and M aiding factors (equations in the module).
 
     Parameters
     ----------
-    prior : (n, n) and (n,) arrays
-        Covariance of the first node before its measurements; d, the mean of the prior minus the first node.
-    rows : tuple of int
-        Which rows of the arrays below are meant, see `Rows`.
-    motion : (K - 1, n, n), (K - 1, n, n), (K - 1, n) and (K - 1,) arrays
-        F and Q; e, the newer node minus the prediction from the older one; the weights that divide Q.
-    aids : tuple
-        The aiding factors, see `Aids`.
+    window : Window
+        The nodes and factors. Of the nodes all is overwritten from node ``first`` on, and the steps of all nodes. Of
+        the aiding factors ``cross``, ``white``, ``innovation`` and ``used``.
+    rows : Rows
+        Where they are.
+    prior : (n, n) array
+        Covariance of the first node before its measurements.
     damping : float
         The damping lambda, 0 for a Gauss-Newton step.
     first : int
-        Nodes before this one have been eliminated already, without damping; ``left`` holds their results.
-    left, left_aids : tuples of arrays
-        Results of the elimination, see `Elimination` and `Whitened`; overwritten from node ``first`` on.
-    steps : (K, n) and (K,) arrays
-        Overwritten with the corrections dx; with the largest component of each node's step, in units of its filtered
-        sigmas, NaN or infinite if the step cannot be used.
+        Nodes before this one have been eliminated already, without damping.
 
     Returns
     -------
     float, float
         Largest ``size`` of all nodes, and of the nodes before ``first``.
     """
-    k0, count, m0, i0, total, base = rows
-    k1, m1, i1 = k0 + count, m0 + count - 1, i0 + total
-    prior_covariance, prior_shift = prior
-    transition, noise, error, motion_weight = motion[0][m0:m1], motion[1][m0:m1], motion[2][m0:m1], motion[3][m0:m1]
-    node, instrument, components, jacobian = aids[0][i0:i1], aids[1][i0:i1], aids[2][i0:i1], aids[3][i0:i1]
-    residual, aid_noise, aid_weight = aids[4][i0:i1], aids[5][i0:i1], aids[6][i0:i1]
-    aids = node, instrument, components, jacobian, residual, aid_noise, aid_weight
-    predicted, predicted_shift = left[0][k0:k1], left[1][k0:k1]
-    filtered, filtered_shift = left[2][k0:k1], left[3][k0:k1]
-    cross, white = left_aids[0][i0:i1], left_aids[1][i0:i1]
-    innovation, used = left_aids[2][i0:i1], left_aids[3][i0:i1]
-    step, size = steps[0][k0:k1], steps[1][k0:k1]
+    nodes, motions, aids = window.nodes, window.motions, window.aids
+    count, base, k0, m0 = rows.nodes, rows.base, rows.first_node, rows.first_motion
+    k1, m1, i0, i1 = k0 + count, m0 + count - 1, rows.first_aid, rows.first_aid + rows.aids
+    transition, noise = motions.jacobian[m0:m1], motions.noise[m0:m1]
+    error, motion_weight = motions.residual[m0:m1], motions.weight[m0:m1]
+    predicted, predicted_shift = nodes.predicted[k0:k1], nodes.predicted_shift[k0:k1]
+    filtered, filtered_shift = nodes.filtered[k0:k1], nodes.filtered_shift[k0:k1]
+    step, size = nodes.step[k0:k1], nodes.size[k0:k1]
+    node, instrument, components, used = aids.node, aids.instrument, aids.components, aids.used
+    jacobian, residual, aid_noise, aid_weight = aids.jacobian, aids.residual, aids.noise, aids.weight
+    cross, white, innovation = aids.cross, aids.white, aids.innovation
     n = step.shape[1]
-    L, lists = np.empty((4, 3)), (np.empty((n, n)), np.empty((n, n), np.uint64), np.empty(n, np.uint64))
-    room = np.zeros((n, padded(n))), np.zeros((n, padded(n))), np.zeros((n, padded(n)))
+    L, elements = np.empty((4, 3)), Elements(np.empty((n, n)), np.empty((n, n), np.uint64), np.empty(n, np.uint64))
+    room = Room(np.zeros((n, padded(n))), np.zeros((n, padded(n))), np.zeros((n, padded(n))))
     damps = count if damping > 0.0 else 0
     damp_crosses, damp_whites = np.empty((damps, n, 1, n)), np.empty((damps, n, 1, n))
     damp_innovations = np.empty((damps, n, 1))
@@ -328,19 +320,19 @@ def solve_chain(
     mean_jacobian, mean_residual, mean_noise = np.empty((3, n)), np.empty(3), np.empty((3, 3))
 
     columns, most = np.empty((3, n + 1), dtype=np.int64), 0
-    for i in range(total):
+    for i in range(i0, i1):
         most = max(most, instrument[i])
     latest = np.full(most + 1, -1)
 
-    i = 0
-    while i < total and node[i] - base < first:
+    i = i0
+    while i < i1 and node[i] - base < first:
         i += 1
     for k in range(first, count):
         P, d = predicted[k], predicted_shift[k]
         if k == 0:
-            _copy_node(prior_covariance, prior_shift, P, d)
+            _copy_node(prior, window.prior.shift, P, d)
         else:
-            _predict(filtered[k - 1], transition[k - 1], noise[k - 1], motion_weight[k - 1], lists, room, P)
+            _predict(filtered[k - 1], transition[k - 1], noise[k - 1], motion_weight[k - 1], elements, room, P)
             for r in range(n):
                 x = -error[k - 1, r]
                 for c in range(n):
@@ -354,30 +346,30 @@ def solve_chain(
             for r in range(n):
                 unit[0, r] = 1.0
                 damp_used[k, r] = _absorb(
-                    P, d, (unit, zero, damped[r], damping, 1), L,
-                    (damp_crosses[k, r], damp_whites[k, r], damp_innovations[k, r]), columns,
+                    P, d, Measured(unit, zero, damped[r], damping, 1), L,
+                    Whitened(damp_crosses[k, r], damp_whites[k, r], damp_innovations[k, r]), columns,
                 )  # fmt: skip
                 unit[0, r] = 0.0
         end = i
         several = False  # whether an instrument has several measurements here
-        while end < total and node[end] - base == k:
+        while end < i1 and node[end] - base == k:
             used[end] = 1 if components[end] > 0 and aid_weight[end] > LEAST_WEIGHT else 0
             several |= latest[instrument[end]] == k
             latest[instrument[end]] = k
             end += 1
         while i < end:
             if used[i] == 1:
-                m, whitened = components[i], (cross[i], white[i], innovation[i])
-                if not several or _mean_of(i, end, aids, used, mean_jacobian, mean_residual, mean_noise) == 1:
-                    measured = jacobian[i], residual[i], aid_noise[i], aid_weight[i], m
+                m, whitened = components[i], Whitened(cross[i], white[i], innovation[i])
+                if not several or _mean_of(i, end, aids, mean_jacobian, mean_residual, mean_noise) == 1:
+                    measured = Measured(jacobian[i], residual[i], aid_noise[i], aid_weight[i], m)
                 else:
-                    measured = mean_jacobian, mean_residual, mean_noise, 1.0, m
+                    measured = Measured(mean_jacobian, mean_residual, mean_noise, 1.0, m)
                 used[i] = _absorb(P, d, measured, L, whitened, columns)
             i += 1
 
     adjoint, after, z, variance, ratio = np.zeros(n), np.empty(n), np.empty(3), np.empty(n), np.empty(n)
     largest = older = 0.0
-    i = total - 1
+    i = i1 - 1
     for k in range(count - 1, -1, -1):
         if k < count - 1:
             for r in range(n):
@@ -400,7 +392,7 @@ def solve_chain(
             largest = size[k]
         if k < first and (size[k] > older or size[k] != size[k]):
             older = size[k]
-        while i >= 0 and node[i] - base == k:
+        while i >= i0 and node[i] - base == k:
             if used[i] == 1:
                 _return(adjoint, cross[i], white[i], innovation[i], components[i], z)
             i -= 1
@@ -422,47 +414,29 @@ def error_after_step(error: Array, F: Array, older: Array, newer: Array, after: 
         after[r] = x
 
 
-#: Types of the last three arguments of `after_step`.
-STEPPED_TYPES = (
-    "UniTuple(f8[:, ::1], 3), Tuple((f8[:, :, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[::1], f8[::1])), "
-    "Tuple((i8[::1], f8[:, :, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[::1], f8[::1]))"
-)
-
-
 @kernel
-def after_step(
-    rows: tuple[int, int, int, int, int, int],
-    prior: tuple[Matrix, Vector],
-    nodes: tuple[Matrix, Matrix, Matrix],
-    motion: tuple[Stack, Matrix, Stack, Matrix, Vector, Vector],
-    aids: tuple[IntegerVector, Stack, Matrix, Stack, Matrix, Vector, Vector],
-) -> float:
-    """Update shifts and residuals after a step, by the linearised factors.
+def after_step(window: Window, rows: Rows) -> float:
+    """Update shifts and residuals after the nodes have moved by their steps, by the linearised factors.
 
     Parameters
     ----------
-    rows : tuple of int
-        Which rows of the arrays below are meant, see `Rows`.
-    prior : (n, n) and (n,) arrays
-        Of the prior, as for `half_squares`.
-    nodes : three (K, n) arrays
-        Corrections of the nodes; means of the nodes without and with their own measurements, minus the nodes: the
-        correction is subtracted from both.
-    motion : tuple of arrays
-        F and e, which is updated, as for `solve_chain`; whiteners, whitened errors and norms, as for `whiten`; weights.
-    aids : tuple
-        Nodes, Jacobians and residuals, which are updated, as for `solve_chain`; whiteners, whitened residuals and
-        norms, as for `whiten`; weights.
+    window : Window
+        The nodes and factors; shifts of the nodes and residuals are updated, and whitened.
+    rows : Rows
+        Where they are.
 
     Returns
     -------
     float
         The cost after the step (`half_squares`).
     """
-    k0, count, m0, i0, total, base = rows
-    step, predicted_shift, filtered_shift = nodes
-    transition, error, whitener, whitened, norm, weight = motion
-    node, jacobian, residual, aid_whitener, aid_whitened, aid_norm, aid_weight = aids
+    nodes, motions, aids = window.nodes, window.motions, window.aids
+    step, predicted_shift, filtered_shift = nodes.step, nodes.predicted_shift, nodes.filtered_shift
+    k0, m0, count, base = rows.first_node, rows.first_motion, rows.nodes, rows.base
+    transition, error, whitener = motions.jacobian, motions.residual, motions.whitener
+    whitened, norm = motions.whitened, motions.norm
+    node, jacobian, residual = aids.node, aids.jacobian, aids.residual
+    aid_whitener, aid_whitened, aid_norm = aids.whitener, aids.whitened, aids.norm
     n = step.shape[1]
     for k in range(k0, k0 + count):
         for r in range(n):
@@ -472,7 +446,7 @@ def after_step(
         m = m0 + k
         error_after_step(error[m], transition[m], step[k0 + k], step[k0 + k + 1], error[m])
         norm[m] = whiten_one(error[m], whitener[m], whitened[m])
-    for i in range(i0, i0 + total):
+    for i in range(rows.first_aid, rows.first_aid + rows.aids):
         k = k0 + node[i] - base
         x, y, z = residual[i, 0], residual[i, 1], residual[i, 2]
         for c in range(n):
@@ -482,7 +456,7 @@ def after_step(
             z -= jacobian[i, 2, c] * s
         residual[i, 0], residual[i, 1], residual[i, 2] = x, y, z
         aid_norm[i] = whiten_one(residual[i], aid_whitener[i], aid_whitened[i])
-    return half_squares(rows, prior, (norm, weight), (aid_norm, aid_weight))
+    return half_squares(window, rows)
 
 
 @kernel
@@ -507,23 +481,18 @@ def whiten(first: int, error: Matrix, whitener: Stack, whitened: Matrix, norm: V
 
 
 @kernel
-def keep_weights(
-    motion: tuple[Vector, Vector, Vector],
-    node: IntegerVector,
-    base: int,
-    aids: tuple[Vector, Vector, Vector],
-    tolerance: float,
-) -> int:
+def keep_weights(window: Window, rows: Rows, motion_before: Vector, before: Vector, tolerance: float) -> int:
     """Keep the old values of weights that have hardly changed.
 
     Parameters
     ----------
-    motion, aids : three (K - 1,), three (M,) arrays
-        The weights with which the factors were eliminated; norms of the whitened residuals; the new weights. A new
-        weight is replaced by the old one if neither the weight nor the influence of the factor (weight times norm)
-        changes by more than the tolerance.
-    node, base
-        Nodes of the aiding factors, and number of the first node, see `Aids`.
+    window : Window
+        The factors. A new weight is replaced by the old one if neither the weight nor the influence of the factor
+        (weight times norm) changes by more than the tolerance.
+    rows : Rows
+        Where they are.
+    motion_before, before : (K - 1,), (M,) arrays
+        The weights with which the motion and aiding factors were eliminated.
     tolerance : float
         Largest change that is ignored.
 
@@ -532,50 +501,37 @@ def keep_weights(
     int
         The first node with a changed weight; K if there is none.
     """
-    before, norm, weight = motion
-    aid_before, aid_norm, aid_weight = aids
-    first = norm.size + 1
-    for k in range(norm.size - 1, -1, -1):
-        if abs(weight[k] - before[k]) * max(norm[k], 1.0) > tolerance:
+    motions, aids, m0, i0 = window.motions, window.aids, rows.first_motion, rows.first_aid
+    norm, weight = motions.norm, motions.weight
+    node, aid_norm, aid_weight = aids.node, aids.norm, aids.weight
+    first = rows.nodes
+    for k in range(rows.nodes - 2, -1, -1):
+        if abs(weight[m0 + k] - motion_before[k]) * max(norm[m0 + k], 1.0) > tolerance:
             first = k + 1
         else:
-            weight[k] = before[k]
-    for i in range(node.size - 1, -1, -1):
-        if abs(aid_weight[i] - aid_before[i]) * max(aid_norm[i], 1.0) > tolerance:
-            first = min(first, node[i] - base)
+            weight[m0 + k] = motion_before[k]
+    for i in range(rows.aids - 1, -1, -1):
+        if abs(aid_weight[i0 + i] - before[i]) * max(aid_norm[i0 + i], 1.0) > tolerance:
+            first = min(first, node[i0 + i] - rows.base)
         else:
-            aid_weight[i] = aid_before[i]
+            aid_weight[i0 + i] = before[i]
     return first
 
 
 @kernel
-def half_squares(
-    rows: tuple[int, int, int, int, int, int],
-    prior: tuple[Matrix, Vector],
-    motion: tuple[Vector, Vector],
-    aids: tuple[Vector, Vector],
-) -> float:
-    """The cost: half the sum of squares of all factors.
-
-    Parameters
-    ----------
-    rows : tuple of int
-        Which rows of the arrays below are meant, see `Rows`.
-    prior : (n, n) and (n,) arrays
-        Inverse Cholesky factor of the covariance of the prior, lower triangular; its mean minus the first node.
-    motion, aids : two (K - 1,), two (M,) arrays
-        Norms of the whitened residuals, and weights, of the motion and aiding factors.
-    """
-    _, count, m0, i0, many, _ = rows
-    (whitener, shift), (norm, weight), (aid_norm, aid_weight) = prior, motion, aids
+def half_squares(window: Window, rows: Rows) -> float:
+    """The cost: half the weighted sum of squares of all factors."""
+    whitener, shift = window.prior.whitener, window.prior.shift
+    norm, weight = window.motions.norm, window.motions.weight
+    aid_norm, aid_weight = window.aids.norm, window.aids.weight
     total = 0.0
     for i in range(shift.size):
         x = 0.0
         for j in range(i + 1):
             x += whitener[i, j] * shift[j]
         total += x * x
-    for k in range(m0, m0 + count - 1):
+    for k in range(rows.first_motion, rows.first_motion + rows.nodes - 1):
         total += weight[k] * norm[k] * norm[k]
-    for i in range(i0, i0 + many):
+    for i in range(rows.first_aid, rows.first_aid + rows.aids):
         total += aid_weight[i] * aid_norm[i] * aid_norm[i]
     return 0.5 * total

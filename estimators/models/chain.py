@@ -8,10 +8,10 @@ the present nodes x, the error is ``e = x_k+1 - f(x_k)`` for the exact motion f.
 (preintegration: C. Forster et al., "On-manifold preintegration for real-time visual-inertial odometry", IEEE Trans.
 Robotics 33(1), 2017; here about the predicted trajectory and on the rotating Earth).
 
-A measurement need not have a node of its own. It can be *folded* onto the newest node, some time before it. Its
-prediction is then a function of that node through the motion between them, and the noise of this motion is added to the
-noise of the measurement. Two measurements that are folded onto one node share a part of this noise; this correlation is
-neglected.
+A measurement need not have a node of its own. It can be predicted at an *intermediate state*, some time after the
+newest node. Its prediction is then a function of that node through the motion between them, and the noise of this
+motion is added to the noise of the measurement. Two such measurements of one node share a part of this noise; this
+correlation is neglected.
 
 A subclass has the loops over a window: `linearise_motion`, `linearise_aids`, `observe`, `retract`, `along_motion`. All
 but `observe` are in `simnav.estimators.models.moving_chain` for models whose motion depends on state and time only.
@@ -20,18 +20,20 @@ but `observe` are in `simnav.estimators.models.moving_chain` for models whose mo
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
-from functools import singledispatch
-from typing import Any, ClassVar
+from collections.abc import Callable, Sequence
+from functools import cached_property, singledispatch
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from simnav.compiled import kernel, ready
 from simnav.estimator.needs import Needs
-from simnav.estimators.algebra.block_tridiagonal import Rows, after_step, whiten
+from simnav.estimators.algebra.block_tridiagonal import after_step, whiten
+from simnav.estimators.algebra.factors import AidingFactors, Motions, NewRows, Nodes, Prior, Rows, Window
 from simnav.estimators.algebra.whitening import whitening
 from simnav.kernel_types import Matrix, Stack, Vector
+from simnav.records import Record
 from simnav.types import (
     NO_SIDE,
     Array,
@@ -45,18 +47,28 @@ from simnav.types import (
 )
 
 from .base import ErrorModel, Linearised
-from .columns import Columns, Made, Selection
+from .columns import Columns, Made
+from .intermediate_states import IntermediateStates
 from .many_readings import ManyReadings
+from .marginalisation import Reference, keep_covariance, marginalise, subtract_step
 
-__all__ = ["STEPPED", "Chain", "attach_one", "begin_motion", "chain_of"]
+__all__ = ["Chain", "FactorFunctions", "MotionSinceNode", "attach_one", "begin_motion", "chain_of"]
 
 
-#: The whole columns that `after_step` takes.
-STEPPED = Selection(
-    ("nodes", ("step", "predicted_shift", "filtered_shift")),
-    ("motions", ("jacobian", "residual", "whitener", "whitened", "norm", "weight")),
-    ("aids", ("node", "jacobian", "residual", "whitener", "whitened", "norm", "weight")),
-)
+class MotionSinceNode(Record):
+    """The motion from the newest node to the front.
+
+    Attributes
+    ----------
+    transition, noise : (n, n) arrays
+        Transition matrix and process noise.
+    elapsed : (1,) array
+        Its time [s].
+    """
+
+    transition: Matrix
+    noise: Matrix
+    elapsed: Vector
 
 
 @kernel
@@ -90,6 +102,15 @@ def begin_motion(
     whitening(factor_noise, whitener)
 
 
+class FactorFunctions(NamedTuple):
+    """The functions of a step of a window, see `simnav.estimators.solvers.window_step.WindowStep`."""
+
+    advance: Callable[..., None]
+    choose: Callable[..., bool]
+    make_node: Callable[..., NewRows]
+    attach: Callable[..., NewRows]
+
+
 class Chain(ABC):
     """The nodes and factors of a window over a model.
 
@@ -102,38 +123,22 @@ class Chain(ABC):
     ----------
     size : int
         Number n of components of the model's error.
-    nodes : Columns
-        The nodes: ``time`` and the arrays of the model that `node_arrays` names; of the last solution ``predicted``,
-        ``filtered`` (n, n), ``predicted_shift``, ``filtered_shift`` (n,)
-        (`simnav.estimators.algebra.block_tridiagonal.Elimination`), ``step`` (n,), and its ``size``.
-    motions : Columns
-        The motion factors, each from the previous node to a node: ``transition``, ``noise``, ``whitener`` (n, n);
-        ``begin_shift``, ``end_shift`` (n,); of the last linearisation, ``jacobian`` (n, n) and ``residual`` (n,);
-        ``weight``.
-    aids : Columns
-        The aiding factors in ascending order of their nodes: ``node`` (number since the start of the run), ``fold``
-        (number since the start of the run, or -1), ``instrument`` (index into ``names``), ``components``, ``time``,
-        ``value`` (3,), ``noise`` and ``whitener`` (3, 3), ``bare`` (1 if the noise of the motion has not been added to
-        the noise yet); ``side`` if readings have side information; of the last linearisation ``residual`` (3,),
-        ``jacobian`` (3, n); ``weight``; of the last solution ``cross``, ``white`` (3, n), ``innovation`` (3,), ``used``
-        (`simnav.estimators.algebra.block_tridiagonal.Whitened`).
-    folds : Columns
-        Times between nodes with measurements: ``node`` (number of the previous node), ``time``, ``transition`` and
-        ``noise`` (n, n) from the node, ``shift`` (n,) by which the node has moved since the prediction, the predicted
-        arrays of the model, and, with the prefix ``now_``, those from the shifted node; ``jacobian`` (n, n).
-    fold_base : int
-        Number of the first fold of the window since the start of the run.
+    nodes, motions, aids : Columns
+        The nodes, with ``time`` and the arrays of the model that `node_arrays` names; motion factors; aiding factors,
+        with ``side`` if readings have side information. What else they hold is in
+        `simnav.estimators.algebra.factors`.
+    between : Columns
+        The intermediate states (`simnav.estimators.models.intermediate_states`), with the predicted arrays of the
+        model, and, with the prefix ``now_``, those from the shifted node.
+    base, base_between : int
+        Number of the first node, and of the first intermediate state, of the window since the start of the run.
+    prior : Prior
+        The prior of the first node.
+    since_node : MotionSinceNode
+        The motion from the newest node to the front.
     names : tuple of str
         Names of the instruments; for one with channels, the source of each
         (`simnav.estimators.models.channels.by_channel`).
-    base : int
-        Number of the first node of the window since the start of the run.
-    ahead : float
-        Time from the newest node to the front [s].
-    prior : (n, n) array
-        Covariance of the first node without its own measurements.
-    prior_shift : (n,) array
-        Mean of the first node without its own measurements, minus the node.
     """
 
     def __init__(self, front: ErrorModel):
@@ -144,6 +149,8 @@ class Chain(ABC):
         """Further arrays of the model that a node stores, in addition to those of its ``state``."""
         return ()
 
+    #: The functions of a step of a window as kernels, and what they work on; None where a window has to call methods.
+    functions: FactorFunctions | None = None
     #: Components of the model's error from this index on are independent and only decay.
     coupled: ClassVar[int] = 10**9
 
@@ -156,7 +163,6 @@ class Chain(ABC):
         self._index = {name: i for i, name in enumerate(self.names)}
         self._kept = (*front.state, *self.node_arrays)
         self._made = Made()
-        self._states = Selection(("nodes", front.state))
         self.nodes = Columns(self._made, time=(), **{name: getattr(front, name).shape for name in self._kept})
         self.nodes.add(predicted=(n, n), predicted_shift=(n,), filtered=(n, n), filtered_shift=(n,), step=(n,), size=())
         self.motions = Columns(
@@ -164,7 +170,7 @@ class Chain(ABC):
             residual=(n,), jacobian=(n, n), whitened=(n,), norm=(), weight=(),
         )  # fmt: skip
         self.aids = Columns(
-            self._made, node=np.int64, fold=np.int64, instrument=np.int64, components=np.int64, time=(), value=(3,),
+            self._made, node=np.int64, between=np.int64, instrument=np.int64, components=np.int64, time=(), value=(3,),
             noise=(3, 3), bare=np.int64, whitener=(3, 3), residual=(3,), jacobian=(3, n), whitened=(3,), norm=(),
             weight=(), cross=(3, n), white=(3, n), innovation=(3,), used=np.int64,
         )  # fmt: skip
@@ -175,40 +181,50 @@ class Chain(ABC):
         together = {name for many in front.many for name in many.sources}
         #: Of each instrument: whether it has an equation of its own, and one reading is predicted at a time.
         self._one_by_one = np.array([name in front.own and name not in together for name in self.names], dtype=bool)
-        self.folds = Columns(
+        self.between = Columns(
             self._made, node=np.int64, time=(), transition=(n, n), noise=(n, n), shift=(n,), jacobian=(n, n)
         )
-        self.folds.add(**{name: getattr(front, name).shape for name in self._kept})
-        self.folds.add(**{f"now_{name}": getattr(front, name).shape for name in front.state})
-        self.base = self.fold_base = 0
+        self.between.add(**{name: getattr(front, name).shape for name in self._kept})
+        self.between.add(**{f"now_{name}": getattr(front, name).shape for name in front.state})
+        self.base = self.base_between = 0
         self._append_node()
-        self._transition, self._noise, self.ahead = np.eye(n), np.zeros((n, n)), 0.0
-        self.set_prior(covariance, np.zeros(n))
+        self.since_node = MotionSinceNode(transition=np.eye(n), noise=np.zeros((n, n)), elapsed=np.zeros(1))
+        self.prior = Prior(covariance=ready(covariance.copy()), whitener=np.empty((n, n)), shift=np.zeros(n))
+        whitening(self.prior.covariance, self.prior.whitener)
         return covariance
+
+    @cached_property
+    def reference(self) -> Reference:
+        """How shifts and covariances are referred to another state; a model with rotations overrides it."""
+        return Reference(turn=keep_covariance, relative_shift=subtract_step)
 
     def _append_node(self) -> None:
         front = self.front
         self.nodes.append(time=front.time, **{name: getattr(front, name) for name in self._kept})
 
-    def set_prior(self, covariance: Array, shift: Array) -> None:
-        """Set the prior of the first node: its covariance, and its mean minus the node."""
-        self.prior, self.prior_shift = ready(covariance.copy()), ready(shift.copy())
-        self.prior_whitener = np.empty_like(self.prior)
-        whitening(self.prior, self.prior_whitener)
+    @property
+    def ahead(self) -> float:
+        """Time from the newest node to the front [s]."""
+        return float(self.since_node.elapsed[0])
 
     @property
     def rows(self) -> Rows:
-        """Where nodes, motion factors and aiding factors are in whole columns."""
-        nodes, aids = self.nodes, self.aids
-        return nodes.first, nodes.last - nodes.first, self.motions.first, aids.first, aids.last - aids.first, self.base
+        """Where the window is in whole columns."""
+        nodes, aids, between = self.nodes, self.aids, self.between
+        return Rows(
+            nodes.first, nodes.last - nodes.first, self.motions.first, aids.first, aids.last - aids.first,
+            between.first, between.last - between.first, self.base, self.base_between,
+        )  # fmt: skip
 
-    def whole(self, selection: Selection) -> Any:
-        """The groups of whole columns that a kernel takes, a tuple of tuples of (capacity, ...) arrays."""
-        found = self._made.get(selection)
+    @property
+    def window(self) -> Window:
+        """The nodes and factors as kernels take them; it holds until a column is replaced."""
+        found: Window | None = self._made.get(Window)
         if found is None:
-            found = self._made[selection] = tuple(
-                [getattr(self, table).whole(names) for table, names in selection.groups]
-            )
+            found = self._made[Window] = Window(
+                nodes=self.nodes.record(Nodes), motions=self.motions.record(Motions),
+                aids=self.aids.record(AidingFactors), prior=self.prior,
+            )  # fmt: skip
         return found
 
     @property
@@ -243,27 +259,29 @@ class Chain(ABC):
         begin = self.front.time
         if until <= begin:
             return
-        self.front.propagate(self._noise, until)
-        self.front.carry(self._transition, until - begin)
-        self.ahead += until - begin
+        since = self.since_node
+        self.front.propagate(since.noise, until)
+        self.front.carry(since.transition, until - begin)
+        since.elapsed[0] += until - begin
 
     def extend(self) -> None:
         """Make the front a node, with the motion since the newest one as its factor."""
-        motions = self.motions
+        motions, since = self.motions, self.since_node
         motions.append(begin_shift=0.0, end_shift=0.0, time=self.front.time, weight=1.0)
         begin_motion.unchecked(
-            self._transition, self._noise, motions.newest("transition"), motions.newest("jacobian"),
+            since.transition, since.noise, motions.newest("transition"), motions.newest("jacobian"),
             motions.newest("noise"), motions.newest("whitener"),
         )  # fmt: skip
-        self.ahead = 0.0
+        since.elapsed[0] = 0.0
         self._append_node()
 
     def predicted_covariance(self, newest: Array) -> Array:
         """Covariance of the front from that of the newest node."""
         if self.ahead == 0.0:
             return newest
-        covariance: Array = self._transition @ newest @ self._transition.T
-        covariance += self._noise
+        since = self.since_node
+        covariance: Array = since.transition @ newest @ since.transition.T
+        covariance += since.noise
         return covariance
 
     def linearise(self, measurement: Measurement) -> Linearised | None:
@@ -278,26 +296,6 @@ class Chain(ABC):
         """As `ErrorModel.nominal_noises`, at the front."""
         return self.front.nominal_noises(measurements)
 
-    def take(self, measurements: Sequence[Measurement], until: float, spacing: float) -> tuple[int, int] | None:
-        """Attach all measurements of a step with their nominal noise, each at its own time.
-
-        Parameters
-        ----------
-        measurements : sequence of Measurement
-            In order of their times; one that is later than ``until`` is used then.
-        until : float
-            End of the step [s].
-        spacing : float
-            A measurement closer to the newest node than this [s] is folded onto it, unless it has the latest time.
-
-        Returns
-        -------
-        (int, int) or None
-            Number of measurements that were attached, and of those that cannot be used. None if nothing was done,
-            because the measurements have to be taken one by one.
-        """
-        return None
-
     def attach(self, measurement: Measurement, noise: Array) -> None:
         """Add a measurement at the front, with the (m, m) noise, as a factor on the newest node.
 
@@ -305,7 +303,7 @@ class Chain(ABC):
         """
         aids, ahead = self.aids, self.ahead > 0.0
         aids.append(
-            node=self.base + len(self.nodes) - 1, fold=self._fold() if ahead else -1, bare=ahead, weight=1.0,
+            node=self.base + len(self.nodes) - 1, between=self._intermediate() if ahead else -1, bare=ahead, weight=1.0,
             instrument=self._index[measurement.instrument], components=len(noise), time=measurement.time,
         )  # fmt: skip
         attach_one.unchecked(
@@ -319,7 +317,8 @@ class Chain(ABC):
         """`attach` for k measurements of one time and m components, with their (k, m, m) noise."""
         aids, ahead, k = self.aids, self.ahead > 0.0, len(measurements)
         aids.append_rows(
-            k, node=self.base + len(self.nodes) - 1, fold=self._fold() if ahead else -1, bare=ahead, weight=1.0,
+            k, node=self.base + len(self.nodes) - 1, between=self._intermediate() if ahead else -1, bare=ahead,
+            weight=1.0,
             instrument=[self._index[m.instrument] for m in measurements], components=noise.shape[1],
             time=[m.time for m in measurements],
         )  # fmt: skip
@@ -330,24 +329,23 @@ class Chain(ABC):
         if self._sides and len(measurements[0].side):
             aids["side"][-k:, : len(measurements[0].side)] = [m.side for m in measurements]
 
-    def _fold(self) -> int:
-        """The number of the fold at the front's time; a new one, if there is none yet."""
-        front, folds = self.front, self.folds
+    def _intermediate(self) -> int:
+        """The number of the intermediate state at the front's time; a new one, if there is none yet."""
+        front, between, since = self.front, self.between, self.since_node
         newest = self.base + len(self.nodes) - 1
-        if not len(folds) or folds["node"][-1] != newest or folds["time"][-1] != front.time:
-            folds.append(
-                node=newest, time=front.time, transition=self._transition, noise=self._noise, shift=0.0,
-                jacobian=self._transition, **{name: getattr(front, name) for name in self._kept},
+        if not len(between) or between["node"][-1] != newest or between["time"][-1] != front.time:
+            between.append(
+                node=newest, time=front.time, transition=since.transition, noise=since.noise, shift=0.0,
+                jacobian=since.transition, **{name: getattr(front, name) for name in self._kept},
             )  # fmt: skip
-        return self.fold_base + len(folds) - 1
+        return self.base_between + len(between) - 1
 
     def settle(self, moved: Array) -> None:
         """Set the front to the newest node. If it is later than the node, correct it by ``moved``, the node's shift."""
         if self.ahead == 0.0:
-            (states,), newest = self.whole(self._states), self.nodes.last - 1
-            self.front.restore([column[newest] for column in states])
+            self.front.restore([self.nodes.newest(name) for name in self.front.state])
         else:
-            self.front.correct(self._transition @ moved)
+            self.front.correct(self.since_node.transition @ moved)
 
     def detach(self, count: int) -> None:
         """Remove the newest aiding factors."""
@@ -355,27 +353,26 @@ class Chain(ABC):
 
     def marginalise(self, count: int) -> None:
         """Let the oldest nodes leave; what they say about the first that stays, at the last step, is its prior."""
-        step, covariance, shift = (self.nodes[name][count] for name in ("step", "predicted", "predicted_shift"))
-        mean = shift + step
-        self.set_prior(self.turned(covariance, mean), self.relative_shift(mean, step))
-        self.drop(count)
+        leaving = marginalise.unchecked(count, self.window, self._states_between, self.rows, self.reference)
+        self.base += count
+        self.base_between += leaving.between
+        self.nodes.drop(count)
+        self.motions.drop(count)
+        self.aids.drop(leaving.aids)
+        self.between.drop(leaving.between)
 
-    def drop(self, count: int) -> None:
-        """Remove the oldest nodes and their factors from the window."""
-        first = self.base + count
-        self._leave(count, *(int(table["node"].searchsorted(first)) for table in (self.aids, self.folds)))
-
-    def _leave(self, nodes: int, aids: int, folds: int) -> None:
-        """Remove the oldest rows."""
-        self.base += nodes
-        self.fold_base += folds
-        for table, count in ((self.nodes, nodes), (self.motions, nodes), (self.aids, aids), (self.folds, folds)):
-            table.drop(count)
+    @property
+    def _states_between(self) -> IntermediateStates:
+        """The intermediate states as kernels take them."""
+        found: IntermediateStates | None = self._made.get(IntermediateStates)
+        if found is None:
+            found = self._made[IntermediateStates] = self.between.record(IntermediateStates)
+        return found
 
     def copy_states(self) -> list[Array]:
         """Copies of the arrays that `retract` changes, for `restore_states`."""
         changed = [self.nodes[name].copy() for name in self.front.state]
-        shifts = self.motions["begin_shift"], self.motions["end_shift"], self.folds["shift"], self.prior_shift
+        shifts = self.motions["begin_shift"], self.motions["end_shift"], self.between["shift"], self.prior.shift
         return [*changed, *(shift.copy() for shift in shifts)]
 
     def restore_states(self, states: list[Array]) -> None:
@@ -383,7 +380,7 @@ class Chain(ABC):
         for name, value in zip(self.front.state, states[:-4], strict=True):
             self.nodes[name][...] = value
         self.motions["begin_shift"][...], self.motions["end_shift"][...] = states[-4:-2]
-        self.folds["shift"][...], self.prior_shift[...] = states[-2:]
+        self.between["shift"][...], self.prior.shift[...] = states[-2:]
 
     def estimate(self, covariance: Array) -> Estimate:
         """The front as an estimate."""
@@ -416,20 +413,20 @@ class Chain(ABC):
         """Compute ``residual`` (measured minus predicted) and ``jacobian`` (of the prediction) from a node on."""
 
     def places(self, first: int) -> list[tuple[NDArray[np.int64], Columns, str]]:
-        """The states at which the aids from an index on are predicted: at nodes, and at folds if there are any.
+        """Where the aids from an index on are predicted: at nodes, and at intermediate states if there are any.
 
         Returns
         -------
         list of (row, states, prefix)
             The arguments of `observe`.
         """
-        aids, folds = self.aids, self.folds
+        aids, between = self.aids, self.between
         row = aids["node"] - self.base
-        if not len(folds) or first == len(aids):
+        if not len(between) or first == len(aids):
             return [(row, self.nodes, "")]
-        at_node = aids["fold"] < 0
-        at_fold = np.where(at_node, -1, aids["fold"] - self.fold_base)
-        return [(np.where(at_node, row, -1), self.nodes, ""), (at_fold, folds, "now_")]
+        at_node = aids["between"] < 0
+        later = np.where(at_node, -1, aids["between"] - self.base_between)
+        return [(np.where(at_node, row, -1), self.nodes, ""), (later, between, "now_")]
 
     @abstractmethod
     def observe(self, first: int, row: NDArray[np.int64], states: Columns, prefix: str, jacobian: Array) -> None:
@@ -442,7 +439,7 @@ class Chain(ABC):
         row : (M,) int array
             Index of the state of each aiding factor in ``states``; -1: the factor is not computed.
         states : Columns
-            The states at which the measurements are predicted: nodes or folds.
+            The states at which the measurements are predicted: nodes or intermediate states.
         prefix : str
             Prefix of the names of the model's arrays in ``states``.
         jacobian : (M, 3, n) array
@@ -524,7 +521,7 @@ class Chain(ABC):
 
     def keep(self) -> float:
         """Refer what the elimination left, and the residuals, to the nodes as they are after the step; the cost."""
-        cost: float = after_step.unchecked(self.rows, (self.prior_whitener, self.prior_shift), *self.whole(STEPPED))
+        cost: float = after_step.unchecked(self.window, self.rows)
         return cost
 
     @abstractmethod
@@ -537,12 +534,16 @@ class Chain(ABC):
         """
 
     def turned(self, covariance: Array, shift: Array) -> Array:
-        """A covariance at one state, transformed to another state at an (n,) shift; subclasses may override it."""
-        return covariance
+        """A covariance at one state, transformed to another state at an (n,) shift."""
+        turned = np.empty_like(covariance)
+        self.reference.in_python.turn(covariance, shift, turned)
+        return turned
 
     def relative_shift(self, shift: Array, step: Array) -> Array:
-        """An (n,) shift, relative to the state after a step; models with rotations override it."""
-        return shift - step
+        """An (n,) shift, relative to the state after a step."""
+        rest = np.empty_like(shift)
+        self.reference.in_python.relative_shift(shift, step, rest)
+        return rest
 
 
 @singledispatch

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
-__all__ = ["Columns", "Made", "Selection"]
+from simnav.records import Record
 
+__all__ = ["Columns", "Made"]
 
-class Selection:
-    """Which whole columns a kernel takes: groups, each with the name of a table and the names of its columns."""
-
-    def __init__(self, *groups: tuple[str, tuple[str, ...]]):
-        self.groups = groups
+Kind = TypeVar("Kind", bound=Record)
 
 
 class Made(dict[Any, Any]):
@@ -27,7 +24,7 @@ class Columns(dict[str, Any]):
     """Named columns of equal length; rows are appended at the end and dropped at the front.
 
     An item is a view of a column, (rows, ...). Views are kept until the number of rows changes. A kernel takes whole
-    columns (`whole`) with the indices of their rows, and may append rows itself (`grow`).
+    columns as a record (`record`) with the indices of their rows, and may append rows itself (`grow`).
 
     Parameters
     ----------
@@ -79,9 +76,9 @@ class Columns(dict[str, Any]):
         """A view of the last row's entry in a column."""
         return self._columns[name][self.last - 1]
 
-    def whole(self, names: tuple[str, ...]) -> tuple[Any, ...]:
-        """Columns with the rows that are free: (capacity, ...) arrays."""
-        return tuple([self._columns[name] for name in names])
+    def record(self, kind: type[Kind], prefix: str = "") -> Kind:
+        """The columns that have the names of the fields of a record, after a prefix: (capacity, ...) arrays."""
+        return kind(**{name: self._columns[prefix + name] for name in kind.numba_fields})
 
     @property
     def names(self) -> set[str]:

@@ -131,7 +131,7 @@ class DvlCalibrationModel(InertialModel):
         eta, dl = self.calibration[0:3], self.calibration[3:6]
         k, tau = float(self.calibration[6]), float(self.calibration[7])
         u, raw, to_body = np.empty(3), np.empty((3, 12)), self.dcm.T
-        observe(Aid(DVL, sheet.lever_arm + dl, -1, -1), np.zeros(3), self._state(), u, raw)
+        observe.unchecked(Aid(DVL, sheet.lever_arm + dl, -1, -1), np.zeros(3), self._state(), u, raw)
         u *= -1.0  # measured minus predicted
         latitude = float(self.position[0])
         earth = np.array([ROTATION_RATE * cos(latitude), 0.0, -ROTATION_RATE * sin(latitude)])

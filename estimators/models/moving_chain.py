@@ -19,7 +19,7 @@ from simnav.types import Array
 
 from .base import ErrorModel
 from .chain import Chain
-from .folds import add_motion_noise, through_motion
+from .intermediate_states import add_motion_noise, through_motion
 
 __all__ = ["MovingChain", "MovingModel"]
 
@@ -86,33 +86,34 @@ class MovingChain(Chain):
 
     def linearise_aids(self, node: int = 0) -> None:
         """As `Chain.linearise_aids`."""
-        aids, folds, first = self.aids, self.folds, self.first_aid(node)
-        jacobian, folded = aids["jacobian"], len(folds) > 0 and first < len(aids)
-        if folded:
-            self.move_folds(int(folds["node"].searchsorted(aids["node"][first])))
+        aids, between, first = self.aids, self.between, self.first_aid(node)
+        jacobian, later = aids["jacobian"], len(between) > 0 and first < len(aids)
+        if later:
+            self.move_intermediate(int(between["node"].searchsorted(aids["node"][first])))
         places = self.places(first)
         for row, states, prefix in places:
             self.observe(first, row, states, prefix, jacobian)
-        if folded:
+        if later:
             row, _, _ = places[-1]
             add_motion_noise.unchecked(
-                first, row, aids["components"], jacobian, folds["noise"], aids["noise"], aids["whitener"], aids["bare"]
-            )
-            through_motion.unchecked(first, row, min(self.coupled, self.size), folds["jacobian"], jacobian)
+                first, row, aids["components"], jacobian, between["noise"], aids["noise"], aids["whitener"],
+                aids["bare"],
+            )  # fmt: skip
+            through_motion.unchecked(first, row, min(self.coupled, self.size), between["jacobian"], jacobian)
 
-    def move_folds(self, first: int) -> None:
-        """Compute ``now_...`` and ``jacobian`` of the folds from an index on, at the present nodes."""
-        nodes, folds = self.nodes, self.folds
-        row = folds["node"][first:] - self.base
-        now = tuple([folds[f"now_{name}"][first:] for name in self.front.state])
+    def move_intermediate(self, first: int) -> None:
+        """Compute ``now_...`` and ``jacobian`` of the intermediate states from an index on, at the present nodes."""
+        nodes, between = self.nodes, self.between
+        row = between["node"][first:] - self.base
+        now = tuple([between[f"now_{name}"][first:] for name in self.front.state])
         for states, name in zip(now, self.front.state, strict=True):
             states[...] = nodes[name][row]
-        self.front.move_all(now, folds["time"][first:] - nodes["time"][row], folds["jacobian"][first:])
+        self.front.move_all(now, between["time"][first:] - nodes["time"][row], between["jacobian"][first:])
 
     def retract(self, step: Array) -> None:
         """As `Chain.retract`; the motion factors need no shifts."""
         self.front.retract_all(self._nodes(), step)
-        self.prior_shift = self.relative_shift(self.prior_shift, step[0])
+        self.prior.shift[:] = self.relative_shift(self.prior.shift, step[0])
 
     def along_motion(self, step: Array) -> Array:
         """As `Chain.along_motion`."""

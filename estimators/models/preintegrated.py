@@ -132,7 +132,7 @@ def move_shift(F: Matrix, s: Vector, moved: Vector, J: Matrix) -> None:
     moved[6], moved[7], moved[8] = _compose(a0, a1, a2, b0, b1, b2)
 
 
-@kernel
+@kernel(passed=True)
 def relative_shift(shift: Vector, step: Vector, out: Vector) -> None:
     """A shift as seen from where a step leads: rotations compose."""
     for j in range(shift.size):
@@ -149,7 +149,7 @@ def add_shift(step: Array, shift: Array, out: Array) -> None:
     out[6], out[7], out[8] = r0, r1, r2
 
 
-@kernel
+@kernel(passed=True)
 def turn_covariance(P: Matrix, shift: Vector, out: Matrix) -> None:
     """``J P J'`` with the left Jacobian J of the rotation of a shift (`simnav.geometry.rotation.left_jacobian`)."""
     p0, p1, p2 = shift[6], shift[7], shift[8]

@@ -27,7 +27,9 @@ __all__ = ["ShipChain"]
 @kernel
 def _linearise_aids(
     first: int,
-    measured: tuple[IntegerVector, IntegerVector, Matrix],
+    row: IntegerVector,
+    instrument: IntegerVector,
+    value: Matrix,
     codes: IntegerMatrix,
     aids: Matrix,
     position: Matrix,
@@ -41,8 +43,10 @@ def _linearise_aids(
     ----------
     first : int
         Index of the first measurement that is computed.
-    measured : (M,) int, (M,) int and (M, 3) arrays
-        Number of the state of each measurement (-1: none of these states); number of its instrument; its value.
+    row, instrument : (M,) int arrays
+        Number of the state of each measurement (-1: none of these states); number of its instrument.
+    value : (M, 3) array
+        What was measured.
     codes, aids : (i,), (i, ...) arrays
         Parameters of each instrument for `simnav.estimators.models.ship_kernels.residual_of`.
     position, x : (K, 3), (K, n) arrays
@@ -52,7 +56,6 @@ def _linearise_aids(
     jacobian : (M, 3, n) array
         Overwritten: derivative of the prediction with respect to the state's error.
     """
-    row, instrument, value = measured
     for i in range(first, row.size):
         k, s = row[i], instrument[i]
         if k < 0:
@@ -93,7 +96,7 @@ class ShipChain(MovingChain):
         """As `Chain.observe`."""
         aids = self.aids
         _linearise_aids(
-            first, (row, aids["instrument"], aids["value"]), self._codes, self._aids,
+            first, row, aids["instrument"], aids["value"], self._codes, self._aids,
             states[f"{prefix}position"], states[f"{prefix}x"], aids["residual"], jacobian,
         )  # fmt: skip
         if self.front.own:

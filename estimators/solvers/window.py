@@ -46,18 +46,21 @@ from collections import deque
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import hypot, inf, isfinite
-from typing import ClassVar
+from types import SimpleNamespace
+from typing import Any, ClassVar
 
 import numpy as np
 
 from simnav.estimators.adaptations.base import Adaptation, Innovation
 from simnav.estimators.algebra.block_tridiagonal import half_squares, keep_weights, solve_chain
+from simnav.estimators.algebra.factors import NewRows, Rows
 from simnav.estimators.composition import Solver
 from simnav.estimators.models.base import ErrorModel
-from simnav.estimators.models.chains import Chain, chain_of
+from simnav.estimators.models.chains import Chain, InertialChain, chain_of
 from simnav.estimators.models.channels import owners, summary
-from simnav.estimators.models.columns import Selection
 from simnav.estimators.models.coupling import by_source
+from simnav.estimators.models.filtering import Readings, ReadingsOfSteps
+from simnav.estimators.models.propagation import Samples
 from simnav.estimators.models.stated_sigmas import with_stated_sigmas
 from simnav.estimators.models.suitable import ModelChoice
 from simnav.estimators.weightings.base import Factors, Isolation, Weighting
@@ -66,6 +69,7 @@ from simnav.types import Array, Estimate, InitialState, Instruments, Measurement
 from .admission import Admission, together
 from .cost_consistency import CostTest
 from .looking_back import LooksBack
+from .window_step import WindowStep, attach_readings
 
 __all__ = ["WindowEstimator"]
 
@@ -75,17 +79,7 @@ CHECKED_STEP = 1.0
 FIRST_DAMPING, DAMPING_FACTOR = 1e-2, 10.0
 #: A measurement with a weight up to this is reported as faulty.
 FAULTY_WEIGHT = 0.5
-#: The whole columns of the chain that `solve_chain` and `half_squares` take.
-SOLVED = Selection(
-    ("motions", ("jacobian", "noise", "residual", "weight")),
-    ("aids", ("node", "instrument", "components", "jacobian", "residual", "noise", "weight")),
-    ("nodes", ("predicted", "predicted_shift", "filtered", "filtered_shift")),
-    ("aids", ("cross", "white", "innovation", "used")),
-    ("nodes", ("step", "size")),
-)
-SQUARES = Selection(("motions", ("norm", "weight")), ("aids", ("norm", "weight")))
-#: Of new aiding factors, what becomes diagnostics and flags.
-REPORTED = Selection(("aids", ("instrument", "time", "norm", "weight")))
+_NO_TIMES: Array = np.empty(0)
 
 
 class WindowEstimator(LooksBack, Solver):
@@ -110,7 +104,7 @@ class WindowEstimator(LooksBack, Solver):
     iterations : int
         Largest number of steps in an epoch.
     spacing : float
-        Measurements at times closer to the newest node than this [s] have no node of their own (`Chain`, folds), unless
+        Measurements at times closer to the newest node than this [s] have no node of their own (`Chain`), unless
         they are the last of their step. 0, and with ``every_sample``: every time of a measurement is a node.
     every_sample : bool
         True: a node for every IMU sample, instead of one preintegrated factor between measurements. This is the graph
@@ -200,7 +194,14 @@ class WindowEstimator(LooksBack, Solver):
         self._counted = self._eliminated = 0
         self._contraction = 1.0
         self._factors: Factors | None = None
-        self._plain = self.adaptation is None and not self._owners and not self.every_sample
+        nominal = self.adaptation is None and not self._owners and not self.every_sample
+        self._compiled = nominal and self.chain.functions is not None
+        self._arrays = ReadingsOfSteps(dict.fromkeys(self.chain.names, 0))
+        self._step_record: WindowStep | None = None
+        self._by_methods = SimpleNamespace(
+            dynamics=None, growing=SimpleNamespace(since_node=self.chain.since_node), advance=self.advance,
+            choose=self.choose, make_node=self.make_node, attach=self.attach,
+        )  # fmt: skip
         self._cost_test = CostTest()
         quantities = ["residual", "weight", *(["innovation", "nis"] if self.adaptation else [])]
         names = [*observed, "motion"]
@@ -214,18 +215,15 @@ class WindowEstimator(LooksBack, Solver):
         chain.load(measurements.imu)
         diagnostics: dict[str, float | Array] = dict(self._blank)
         flagged: list[tuple[str, float]] = []
-        samples = measurements.imu.time if self.every_sample and measurements.imu is not None else np.empty(0)
+        self._sample_times = _NO_TIMES
+        if self.every_sample and measurements.imu is not None:
+            self._sample_times = measurements.imu.time
         admitted = self._admission.admit(measurements, chain.time)
-        taken = chain.take(admitted, measurements.time, self.spacing) if self._plain and admitted else None
-        if taken is None:
-            attached = self._take_each(admitted, measurements.time, samples, diagnostics, flagged)
-        else:
-            attached, unused = taken
-            self._admission.skipped += unused
+        attached = self._attach_all(admitted, measurements.time, diagnostics, flagged) if admitted else 0
         if attached:
             self._optimise(attached, diagnostics, flagged)
             self._marginalise()
-        self._advance(measurements.time, samples)
+        self._advance(measurements.time)
         diagnostics["skipped"] = float(self._admission.skipped)
         for what in (self.adaptation, self.weighting):
             if what is not None:
@@ -241,29 +239,84 @@ class WindowEstimator(LooksBack, Solver):
         estimate.diagnostics, estimate.flagged = diagnostics, flagged
         return estimate
 
-    def _take_each(
+    def _attach_all(
         self,
         admitted: Sequence[Measurement],
         until: float,
-        samples: Array,
         diagnostics: dict[str, float | Array],
         flagged: list[tuple[str, float]],
     ) -> int:
-        """Make the measurements of a step factors, one by one; their number."""
-        attached, by_group = 0, self.adaptation is None and bool(self._owners)
-        for group in together(admitted, self._owners) if by_group else [[m] for m in admitted]:
-            self._advance(min(group[0].time, until), samples)
-            last = group[0].time == admitted[-1].time
-            if len(group) > 1 and self._take_together(group, last):
-                attached += len(group)
-                continue
-            for m in group:
-                attached += self._take(m, last, diagnostics, flagged)
-        return attached
+        """Make the measurements of a step factors; their number."""
+        chain, count, spacing = self.chain, len(admitted), 0.0 if self.every_sample else self.spacing
+        new: NewRows
+        if isinstance(chain, InertialChain) and self._compiled:
+            step, readings = self._compiled_step(chain, count), self._arrays.fill(admitted)
+            new = attach_readings.unchecked(step, chain.rows, readings, chain.front.samples, count, until, spacing)
+            chain.grow(new)
+            self._admission.skipped += count - new.aids
+            return new.aids
+        self._groups, self._diagnostics, self._flagged = self._grouped(admitted), diagnostics, flagged
+        readings = self._arrays.fill([group.measurements[0] for group in self._groups])
+        count = len(self._groups)
+        new = attach_readings.function(
+            self._by_methods, chain.rows, readings, chain.front.samples, count, until, spacing
+        )  # fmt: skip
+        return new.aids
 
-    def _advance(self, until: float, samples: Array) -> None:
-        """Advance the front, leaving a node at each of the samples on the way."""
-        chain = self.chain
+    def _compiled_step(self, chain: InertialChain, count: int) -> WindowStep:
+        """The functions of a step as kernels, with room for so many measurements."""
+        growing, functions = chain.growing(count), chain.functions
+        if self._step_record is None or self._step_record.growing is not growing:
+            assert functions is not None
+            self._step_record = WindowStep(dynamics=chain.dynamics, growing=growing, **functions._asdict())
+        return self._step_record
+
+    def _grouped(self, admitted: Sequence[Measurement]) -> list[_Group]:
+        """The measurements in groups that are attached together, each with its noise, or one by one."""
+        if self.adaptation is not None or not self._owners:
+            return [_Group([m]) for m in admitted]
+        groups: list[_Group] = []
+        for group in together(admitted, self._owners):
+            noise = self.chain.nominal_noises(group) if len(group) > 1 else None
+            groups += [_Group([m]) for m in group] if noise is None else [_Group(group, noise)]
+        return groups
+
+    def advance(self, dynamics: None, growing: Any, samples: Samples, until: float) -> None:
+        """Advance the front, leaving a node at each sample on the way if there is to be one."""
+        self._advance(until)
+
+    def choose(self, dynamics: None, readings: Readings, k: int) -> bool:
+        """Choose the noise of a measurement, that of the datasheet without an adaptation; False if it is not used."""
+        group = self._groups[k]
+        (m, *_), chain = group.measurements, self.chain
+        if group.noise is None and self.adaptation is not None:
+            group.noise = self._adapted_noise(m, self.adaptation, self._diagnostics, self._flagged)
+        elif group.noise is None and (noise := chain.nominal_noise(m)) is not None:
+            group.noise = noise
+        elif group.noise is None:
+            self._admission.skipped += 1
+        return group.noise is not None
+
+    def make_node(self, dynamics: None, growing: Any, rows: Rows, new: NewRows) -> NewRows:
+        """Make the front a node for a measurement."""
+        if self.adaptation is None:
+            self.chain.extend()  # the measurement is going to change the covariance, and nothing asks for it before
+        else:
+            self._extend()
+        return new
+
+    def attach(self, dynamics: None, growing: Any, rows: Rows, new: NewRows, readings: Readings, k: int) -> NewRows:
+        """Make a measurement, or the readings of channels at one time, factors of the newest node."""
+        measurements, noise = self._groups[k].measurements, self._groups[k].noise
+        assert noise is not None
+        if len(measurements) > 1:
+            self.chain.attach_together(measurements, noise)
+        else:
+            self.chain.attach(measurements[0], noise)
+        return new._replace(aids=new.aids + len(measurements))
+
+    def _advance(self, until: float) -> None:
+        chain, samples = self.chain, self._sample_times
         if len(samples):
             first, last = np.searchsorted(samples, (chain.time + 1e-6, until - 1e-6))
             for time in samples[first:last].tolist():
@@ -275,39 +328,6 @@ class WindowEstimator(LooksBack, Solver):
         """Make the front the newest node."""
         self.covariance = self.chain.predicted_covariance(self.covariance)
         self.chain.extend()
-
-    def _take(
-        self, m: Measurement, last: bool, diagnostics: dict[str, float | Array], flagged: list[tuple[str, float]]
-    ) -> bool:
-        """Make a measurement a factor, one of the step's ``last`` at a node of its own; False if it is not used."""
-        chain = self.chain
-        if self.adaptation is not None:
-            noise = self._adapted_noise(m, self.adaptation, diagnostics, flagged)
-        elif (noise := chain.nominal_noise(m)) is None:
-            self._admission.skipped += 1
-        if noise is None:
-            return False
-        self._make_node(last)
-        chain.attach(m, noise)
-        return True
-
-    def _take_together(self, group: Sequence[Measurement], last: bool) -> bool:
-        """`_take` for readings of one instrument at one time; False if they have to be taken one by one."""
-        noise = self.chain.nominal_noises(group)
-        if noise is None:
-            return False
-        self._make_node(last)
-        self.chain.attach_together(group, noise)
-        return True
-
-    def _make_node(self, last: bool) -> None:
-        """Make the front a node for a measurement, unless that can be folded onto the newest one."""
-        chain = self.chain
-        if chain.ahead > 0.0 and (last or self.every_sample or chain.ahead >= self.spacing):
-            if self.adaptation is None:
-                chain.extend()  # the measurement is going to change the covariance, and nothing asks for it before
-            else:
-                self._extend()
 
     def _adapted_noise(
         self,
@@ -343,9 +363,9 @@ class WindowEstimator(LooksBack, Solver):
         diagnostics["iterations"], diagnostics["cost"] = float(solved), cost
         diagnostics["variance_factor"] = self._cost_test.variance_factor
         if attached:
-            (columns,), last = chain.whole(REPORTED), chain.aids.last
-            newest = [column[last - attached : last].tolist() for column in columns]
-            for index, time, norm, weight in zip(*newest):
+            aids, new = chain.window.aids, slice(chain.aids.last - attached, chain.aids.last)
+            reported = (aids.instrument, aids.time, aids.norm, aids.weight)
+            for index, time, norm, weight in zip(*(column[new].tolist() for column in reported)):
                 of_residual, of_weight = self._labels[index]
                 diagnostics[of_residual], diagnostics[of_weight] = norm, weight
                 if weight <= FAULTY_WEIGHT:
@@ -473,34 +493,25 @@ class WindowEstimator(LooksBack, Solver):
         """Ask the weighting; whether it has settled, and the first node that has to do with a weight that is new."""
         assert self.weighting is not None
         motions, aids = self.chain.motions, self.chain.aids
-        before = motions["weight"].copy(), aids["weight"].copy()
+        motion_before, before = motions["weight"].copy(), aids["weight"].copy()
         factors = self._factors = self._factors or self._all_factors()
         factors.iteration = iteration
         settled = self.weighting.weigh(factors)
         if self.isolation is not None:
             settled = self.isolation.judge(factors) and settled
-        first = keep_weights.unchecked(
-            (before[0], motions["norm"], motions["weight"]), aids["node"], self.chain.base,
-            (before[1], aids["norm"], aids["weight"]), self.tolerance,
-        )  # fmt: skip
+        first = keep_weights.unchecked(self.chain.window, self.chain.rows, motion_before, before, self.tolerance)
         return settled, first
 
     def _cost(self) -> float:
         """Half the sum of squares of all factors, with the weights that they have."""
-        chain = self.chain
-        cost: float = half_squares.unchecked(
-            chain.rows, (chain.prior_whitener, chain.prior_shift), *chain.whole(SQUARES)
-        )  # fmt: skip
+        cost: float = half_squares.unchecked(self.chain.window, self.chain.rows)
         return cost
 
     def _solve(self, damping: float, first: int = 0) -> tuple[float, float]:
         """One step of all nodes; its largest component in sigmas, of all nodes and of those before ``first``."""
         chain = self.chain
-        motions, aids, left, left_aids, steps = chain.whole(SOLVED)
-        sizes: tuple[float, float] = solve_chain.unchecked(
-            (chain.prior if first else chain.turned(chain.prior, -chain.prior_shift), chain.prior_shift), chain.rows,
-            motions, aids, damping, first, left, left_aids, steps,
-        )  # fmt: skip
+        prior = chain.prior.covariance if first else chain.turned(chain.prior.covariance, -chain.prior.shift)
+        sizes: tuple[float, float] = solve_chain.unchecked(chain.window, chain.rows, prior, damping, first)
         return sizes
 
     def _all_factors(self) -> Factors:
@@ -524,6 +535,14 @@ class WindowEstimator(LooksBack, Solver):
         if leaving:
             chain.marginalise(leaving)
             self._eliminated -= leaving
+
+
+@dataclass(slots=True)
+class _Group:
+    """Measurements that become factors together, and their noise: (m, m) of one, (k, m, m) of several."""
+
+    measurements: Sequence[Measurement]
+    noise: Array | None = None
 
 
 @dataclass(slots=True)

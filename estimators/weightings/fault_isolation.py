@@ -102,7 +102,7 @@ class FaultIsolation:
                 factors.weight[:count] = self._weight[:count]
                 factors.motion_weight[:] = self._motion_weight
                 if self._alone(asked[1]):
-                    self._failures.clear()  # what is folded onto a node by a wrong motion contradicts itself for good
+                    self._failures.clear()  # what a wrong motion refers to a node contradicts itself for good
                 return False
             if self._blamed and asked[0] <= self._blamed[-1][1]:
                 self._blamed.pop()
@@ -116,7 +116,7 @@ class FaultIsolation:
         start, end = self._asking = suspected
         self._weight, self._motion_weight = factors.weight.copy(), factors.motion_weight.copy()
         factors.weight[(factors.time >= start) & (factors.time <= end)] = 1.0
-        # The first reading may be folded onto an older node, so the motion that leads there is loosened, too.
+        # The first reading may belong to an older node, so the motion that leads there is loosened, too.
         first = max(int(np.searchsorted(factors.motion_time, start, side="right")) - 1, 0)
         factors.motion_weight[first:][factors.motion_time[first:] <= end] = LOOSE
         return False

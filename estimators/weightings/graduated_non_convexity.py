@@ -22,12 +22,14 @@ schedules left out healthy ones twice as often as the window does without that s
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from collections.abc import Callable
+from typing import Literal
 
 import numpy as np
 
-from simnav.compiled import helper, kernel
+from simnav.compiled import kernel
 from simnav.kernel_types import IntegerVector, Vector
+from simnav.records import Record
 from simnav.types import Array, Instruments
 
 from .base import Factors
@@ -41,15 +43,16 @@ __all__ = ["GraduatedNonConvexity", "softened_geman_mcclure", "softened_truncate
 HARD = 10.0
 
 
-@helper
-def softened_truncated(square: Any, mu: float) -> Any:
+@kernel(passed=True)
+def softened_truncated(square: float, mu: float) -> float:
     """Weights of truncated least squares of u^2, softened by mu (Yang et al. 2020, eq. 14)."""
-    root = np.sqrt(mu * (mu + 1.0) / np.maximum(square, 1e-12)) - mu
-    return np.minimum(np.maximum(root, 0.0), 1.0)
+    root: float = np.sqrt(mu * (mu + 1.0) / np.maximum(square, 1e-12)) - mu
+    weight: float = np.minimum(np.maximum(root, 0.0), 1.0)
+    return weight
 
 
-@helper
-def softened_geman_mcclure(square: Any, mu: float) -> Any:
+@kernel(passed=True)
+def softened_geman_mcclure(square: float, mu: float) -> float:
     """Geman-McClure weights of u^2, softened by mu (Yang et al. 2020, eq. 12)."""
     return (mu / (square + mu)) ** 2
 
@@ -77,11 +80,18 @@ def _squares(
     return first, newest, largest
 
 
+class _Softened(Record):
+    """The weight of a cost, softened by mu, as a function of u^2 and mu."""
+
+    weight: Callable[[float, float], float]
+
+
 @kernel
-def _soften(truncated: bool, square: Vector, mu: float, weight: Vector) -> None:
+def _soften(softened: _Softened, square: Vector, mu: float, weight: Vector) -> None:
     """Overwrite the weights of measurements with those of a cost that is softened by mu."""
+    function = softened.weight
     for i in range(square.size):
-        weight[i] = softened_truncated(square[i], mu) if truncated else softened_geman_mcclure(square[i], mu)
+        weight[i] = function(square[i], mu)
 
 
 class GraduatedNonConvexity(RobustWeighting):
@@ -113,6 +123,7 @@ class GraduatedNonConvexity(RobustWeighting):
         self.cost, self.growth = cost, growth
         tuned = constants(truncated if cost == "tls" else geman_mcclure, efficiency)
         self._scale = np.array([1.0, *tuned]) ** -2.0
+        self._softened = _Softened(weight=softened_truncated if cost == "tls" else softened_geman_mcclure)
         self._vote = SiblingVote()
 
     def reset(self, instruments: Instruments) -> None:
@@ -149,7 +160,7 @@ class GraduatedNonConvexity(RobustWeighting):
                 self._mu = self._hard
         elif self._mu != self._hard:
             self._harden()
-        _soften.unchecked(self.cost == "tls", square, self._mu, factors.weight)
+        _soften.unchecked(self._softened, square, self._mu, factors.weight)
         return self._mu == self._hard
 
     def _softest(self, largest: float) -> float:

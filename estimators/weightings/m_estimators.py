@@ -33,8 +33,9 @@ from typing import Any
 
 import numpy as np
 
-from simnav.compiled import helper, kernel
+from simnav.compiled import Kernel, kernel
 from simnav.kernel_types import IntegerVector, Vector
+from simnav.records import Record
 from simnav.types import Array
 
 from .base import Factors
@@ -48,56 +49,62 @@ __all__ = [
     "efficiency",
     "geman_mcclure",
     "huber",
+    "of_array",
     "truncated",
     "tukey",
 ]
 
-WeightFunction = Callable[[Array], Array]
+#: A function of an array, in Python, or a kernel of one number.
+WeightFunction = Callable[[Any], Any]
 
 
-@helper
-def huber(u: Any) -> Any:
+def of_array(weight: WeightFunction, u: Array) -> Array:
+    """A weight function at many u; a kernel is written so that its source takes an array, too."""
+    plain = weight.function if isinstance(weight, Kernel) else weight
+    weights: Array = plain(u)
+    return weights
+
+
+@kernel(passed=True)
+def huber(u: float) -> float:
     """Huber's weight ``min(1, 1/u)``."""
-    return 1.0 / np.maximum(u, 1.0)
+    weight: float = 1.0 / np.maximum(u, 1.0)
+    return weight
 
 
-@helper
-def tukey(u: Any) -> Any:
+@kernel(passed=True)
+def tukey(u: float) -> float:
     """The weight of Tukey's biweight: ``(1 - u^2)^2``, and 0 from u = 1 on."""
-    v = np.maximum(1.0 - u * u, 0.0)
+    v: float = np.maximum(1.0 - u * u, 0.0)
     return v * v
 
 
-@helper
-def cauchy(u: Any) -> Any:
+@kernel(passed=True)
+def cauchy(u: float) -> float:
     """The weight of Cauchy's cost, ``1 / (1 + u^2)``."""
     return 1.0 / (1.0 + u * u)
 
 
-@helper
-def geman_mcclure(u: Any) -> Any:
+@kernel(passed=True)
+def geman_mcclure(u: float) -> float:
     """The weight of Geman and McClure, ``1 / (1 + u^2)^2``."""
     v = 1.0 + u * u
     return 1.0 / (v * v)
 
 
-#: The weight functions that `_weigh` knows by their number. Each is written once, for an array and for one number.
-COMPILED: tuple[WeightFunction, ...] = (huber, tukey, cauchy, geman_mcclure)
+class _Weights(Record):
+    """A weight function of u, and 1/c for each number of components."""
+
+    function: Callable[[float], float]
+    scale: Vector
 
 
 @kernel
-def _weigh(function: int, norm: Vector, components: IntegerVector, scale: Vector, weight: Vector) -> None:
-    """Weights of M measurements by a function in `COMPILED`; ``scale`` has 1/c for each number of components."""
+def _weigh(weights: _Weights, norm: Vector, components: IntegerVector, weight: Vector) -> None:
+    """Set the weights of M measurements."""
+    function, scale = weights.function, weights.scale
     for i in range(norm.size):
-        u = norm[i] * scale[components[i]]
-        if function == 0:
-            weight[i] = huber(u)
-        elif function == 1:
-            weight[i] = tukey(u)
-        elif function == 2:
-            weight[i] = cauchy(u)
-        else:
-            weight[i] = geman_mcclure(u)
+        weight[i] = function(norm[i] * scale[components[i]])
 
 
 def truncated(u: Array) -> Array:
@@ -129,7 +136,7 @@ def efficiency(weight: WeightFunction, constant: float, components: int) -> floa
     """
     r: Array = np.linspace(0.00125, 9.99875, 4000)  # midpoints up to 10
     density = r ** (components - 1) * np.exp(-0.5 * r * r)
-    w = weight(r / constant)
+    w = of_array(weight, r / constant)
     moments = density @ np.stack([np.ones_like(r), w * r * r, (w * r) ** 2], axis=1)
     return float(moments[1] ** 2 / (components * moments[2] * moments[0]))
 
@@ -162,7 +169,7 @@ class MEstimator(RobustWeighting):
     Parameters
     ----------
     weight : callable
-        Weight in [0, 1] as a function of ``u = r/c``, for arrays.
+        Weight in [0, 1] as a function of ``u = r/c``: a Python function of an array, or a kernel of one number.
     constants : (3,) sequence of float
         Constants c of measurements with 1, 2 and 3 components.
     """
@@ -172,15 +179,14 @@ class MEstimator(RobustWeighting):
             raise ValueError(f"constants = {constants}: they must be above 0")
         super().__init__(smallest)
         self.weight = weight
-        self._compiled = COMPILED.index(weight) if weight in COMPILED else -1
-        self._scale = 1.0 / np.array([1.0, *constants])
+        self._weights = _Weights(function=weight, scale=1.0 / np.array([1.0, *constants]))
 
     def choose(self, factors: Factors) -> bool:
         """Set the weights of the measurements."""
-        if self._compiled >= 0:
-            _weigh.unchecked(self._compiled, factors.norm, factors.components, self._scale, factors.weight)
+        if self._weights.compiled:
+            _weigh.unchecked(self._weights, factors.norm, factors.components, factors.weight)
         else:
-            factors.weight[:] = self.weight(factors.norm * self._scale[factors.components])
+            factors.weight[:] = self.weight(factors.norm * self._weights.scale[factors.components])
         return True
 
 

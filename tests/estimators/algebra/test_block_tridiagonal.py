@@ -6,9 +6,47 @@ import numpy as np
 import pytest
 
 from simnav.estimators.algebra.block_tridiagonal import after_step, half_squares, keep_weights, solve_chain, whiten
+from simnav.estimators.algebra.factors import AidingFactors, Motions, Nodes, Prior, Rows, Window
 from simnav.estimators.algebra.whitening import whitening
 
-N, COUNT = 5, 6
+N, COUNT, BASE = 5, 6, 7
+#: Shapes of the entries of a column, with n states; the others are numbers.
+VECTORS = ("predicted_shift", "filtered_shift", "step", "begin_shift", "end_shift", "residual", "whitened")
+MATRICES = ("predicted", "filtered", "transition", "noise", "whitener", "jacobian")
+OF_THREE = {"value": (3,), "innovation": (3,), "residual": (3,), "whitened": (3,), "noise": (3, 3), "whitener": (3, 3)}
+
+
+def columns(kind: type, rows: int, n: int = N, **known: np.ndarray):
+    """A record of a window with so many rows, NaN where nothing is known."""
+    shapes = dict.fromkeys(VECTORS, (n,)) | dict.fromkeys(MATRICES, (n, n))
+    if kind is AidingFactors:
+        shapes = OF_THREE | dict.fromkeys(("jacobian", "cross", "white"), (3, n))
+    whole = ("node", "between", "instrument", "components", "bare", "used") if kind is AidingFactors else ()
+    made = {name: np.full((rows, *shapes.get(name, ())), np.nan) for name in kind.numba_fields if name not in whole}
+    made |= {name: np.zeros(rows, np.int64) for name in whole}
+    return kind(**(made | {name: np.ascontiguousarray(array) for name, array in known.items()}))
+
+
+def window_of(nodes: Nodes, motions: Motions, aids: AidingFactors, prior: Prior | None = None) -> Window:
+    n = nodes.step.shape[1]
+    return Window(
+        nodes=nodes, motions=motions, aids=aids,
+        prior=prior or Prior(covariance=np.eye(n), whitener=np.eye(n), shift=np.zeros(n)),
+    )  # fmt: skip
+
+
+def rows_of(nodes: int, aids: int, before: int = 0) -> Rows:
+    """Where a window is in columns with so many rows before it."""
+    return Rows(before, nodes, before, before, aids, 0, 0, BASE, 0)
+
+
+def padded(record, before: int = 2, after: int = 1):
+    """A record with further rows of sevens before and after."""
+    kind = type(record)
+    arrays = {name: getattr(record, name) for name in kind.numba_fields}
+    return kind(**{
+        name: np.concatenate([np.full_like(x[:before], 7), x, np.full_like(x[:after], 7)]) for name, x in arrays.items()
+    })  # fmt: skip
 
 
 class Problem:
@@ -32,34 +70,31 @@ class Problem:
         self.v = rng.uniform(0.2, 1.0, total)
 
     @property
-    def rows(self) -> tuple[int, ...]:
-        return 0, COUNT, 0, 0, len(self.node), 7
+    def window(self) -> Window:
+        """The factors as they are, and nodes that nothing is known of."""
+        aids = columns(
+            AidingFactors, len(self.node), node=self.node + BASE, instrument=self.instrument, components=self.m,
+            jacobian=self.H, residual=self.r, noise=self.R, weight=self.v,
+        )  # fmt: skip
+        motions = columns(Motions, COUNT - 1, jacobian=self.F, noise=self.Q, residual=self.e, weight=self.w)
+        prior = Prior(covariance=self.prior, whitener=np.empty((N, N)), shift=self.shift)
+        return window_of(columns(Nodes, COUNT), motions, aids, prior)
 
-    def solve(self, damping: float = 0.0, first: int = 0, left: tuple = ()):
-        """Largest step; predicted and filtered covariances and shifts, step; and what is left of each measurement.
+    def solve(self, damping: float = 0.0, first: int = 0, left: Window | None = None):
+        """Largest step; predicted and filtered covariances and shifts, step.
 
-        ``left`` is what solving returned for the nodes before ``first``.
+        ``left`` is the window that solving left for the nodes before ``first``.
         """
-        total = len(self.node)
-        nodes = (
-            np.full((COUNT, N, N), np.nan), np.full((COUNT, N), np.nan), np.full((COUNT, N, N), np.nan),
-            np.full((COUNT, N), np.nan),
-        )  # fmt: skip
-        aids = (
-            np.full((total, 3, N), np.nan), np.full((total, 3, N), np.nan), np.full((total, 3), np.nan),
-            np.zeros(total, np.int64),
-        )  # fmt: skip
-        for ours, theirs in zip((*nodes, *aids), left):
-            rows = first if len(theirs) == COUNT else int(np.searchsorted(self.node, first))
-            ours[:rows] = theirs[:rows]
-        step = np.empty((COUNT, N))
-        size = solve_chain(
-            (self.prior, self.shift), self.rows, (self.F, self.Q, self.e, self.w),
-            (self.node + 7, self.instrument, self.m, self.H, self.r, self.R, self.v), damping, first,
-            nodes, aids, (step, np.empty(COUNT)),
-        )  # fmt: skip
-        self.left = *nodes, *aids
-        return size, (*nodes, step)
+        window = self.window
+        if left is not None:
+            for name in ("predicted", "predicted_shift", "filtered", "filtered_shift"):
+                getattr(window.nodes, name)[:first] = getattr(left.nodes, name)[:first]
+            older = int(np.searchsorted(self.node, first))
+            for name in ("cross", "white", "innovation", "used"):
+                getattr(window.aids, name)[:older] = getattr(left.aids, name)[:older]
+        size = solve_chain(window, rows_of(COUNT, len(self.node)), self.prior, damping, first)
+        self.left, nodes = window, window.nodes
+        return size, (nodes.predicted, nodes.predicted_shift, nodes.filtered, nodes.filtered_shift, nodes.step)
 
     def dense(self, last: int = COUNT, own: bool = True, damping: np.ndarray | None = None):
         """Normal matrix and right side of the first ``last`` nodes, the last with its own measurements or without."""
@@ -131,7 +166,7 @@ def test_measurements_of_one_instrument_on_one_node_are_their_mean():
     p.R[1] *= 3.0
     p.v[3] = 0.0  # counts for nothing
     size, merged = p.solve()
-    assert p.left[-1].tolist() == [1, 0, 1, 0, 1, 1, 1, 1, 1]
+    assert p.left.aids.used.tolist() == [1, 0, 1, 0, 1, 1, 1, 1, 1]
     p.instrument = np.arange(len(order))
     alone, single = p.solve()
     np.testing.assert_allclose(size, alone, rtol=1e-9)
@@ -169,51 +204,38 @@ def test_older_nodes_need_not_be_eliminated_again(first: int):
 
 
 def test_rows_before_and_after_do_not_count():
-    """Arrays that hold more rows than those of the chain give the same step, and keep the others."""
+    """Columns that hold more rows than those of the window give the same step, and keep the others."""
     p = Problem(11)
-    size, alone = p.solve()
-    nodes, motions, aids = (
-        [np.concatenate([np.full_like(x[:2], 7), x, np.full_like(x[:1], 7)]) for x in arrays]
-        for arrays in (alone, (p.F, p.Q, p.e, p.w), (p.node, p.instrument, p.m, p.H, p.r, p.R, p.v))
-    )
-    left = [np.concatenate([np.full_like(x[:2], 7), x, np.full_like(x[:1], 7)]) for x in p.left[4:]]
-    for column in left[:3]:
-        column[2:-1] = np.nan  # as `Problem.solve` begins
-    for column in nodes:
-        column[2:-1] = 0.0
-    again = solve_chain(
-        (p.prior, p.shift), (2, COUNT, 2, 2, len(p.node), 0), tuple(motions), tuple(aids), 0.0, 0, tuple(nodes[:4]),
-        tuple(left), (nodes[4], np.empty(COUNT + 3)),
-    )  # fmt: skip
-    assert again == size
-    for ours, theirs in zip((*nodes, *left), (*alone, *p.left[4:])):
-        np.testing.assert_array_equal(ours[2:-1], theirs)
-        assert np.all(ours[:2] == 7)
-        assert np.all(ours[-1] == 7)
+    size, _ = p.solve()
+    alone, fresh = p.left, p.window
+    window = window_of(padded(fresh.nodes), padded(fresh.motions), padded(fresh.aids), fresh.prior)
+    assert solve_chain(window, rows_of(COUNT, len(p.node), 2), p.prior, 0.0, 0) == size
+    for part in ("nodes", "aids"):
+        ours, theirs = getattr(window, part), getattr(alone, part)
+        for name in type(ours).numba_fields:
+            column = getattr(ours, name)
+            np.testing.assert_array_equal(column[2:-1], getattr(theirs, name))
+            assert np.all(column[:2] == 7)
+            assert np.all(column[-1] == 7)
 
 
 def test_after_a_step_there_is_none_to_take():
     """Residuals and prior moved as the step supposes: what is linear is solved."""
     p = Problem(10)
-    _, (_, predicted_shift, _, filtered_shift, step) = p.solve()
-    left = p.left
-    motion, aids = (np.empty((COUNT - 1, N)), np.empty(COUNT - 1)), (np.empty_like(p.r), np.empty(len(p.node)))
-    unit, one = np.tile(np.eye(N), (COUNT - 1, 1, 1)), np.tile(np.eye(3), (len(p.node), 1, 1))
-    p.shift -= step[0]
-    prior = np.empty((N, N))
-    whitening(p.prior, prior)
-    cost = after_step(
-        p.rows, (prior, p.shift), (step, predicted_shift, filtered_shift), (p.F, p.e, unit, *motion, p.w),
-        (p.node + 7, p.H, p.r, one, *aids, p.v),
-    )  # fmt: skip
-    assert cost == half_squares(p.rows, (prior, p.shift), (motion[1], p.w), (aids[1], p.v))
-    assert np.abs(step).max() > 0.1
+    p.solve()
+    w, rows = p.left, rows_of(COUNT, len(p.node))
+    w.motions.whitener[:], w.aids.whitener[:] = np.eye(N), np.eye(3)
+    w.prior.shift -= w.nodes.step[0]
+    whitening(p.prior, w.prior.whitener)
+    cost = after_step(w, rows)
+    assert cost == half_squares(w, rows)
+    assert np.abs(w.nodes.step).max() > 0.1
     for first in (0, 3, COUNT):  # whatever is eliminated anew
-        _, (*_, after) = p.solve(first=first, left=left)
-        np.testing.assert_allclose(after, 0.0, atol=1e-9)
-    for error, (white, norm) in ((p.e, motion), (p.r, aids)):
-        np.testing.assert_array_equal(white, error)
-        np.testing.assert_allclose(norm, np.linalg.norm(error, axis=1))
+        solve_chain(w, rows, p.prior, 0.0, first)
+        np.testing.assert_allclose(w.nodes.step, 0.0, atol=1e-9)
+    for factors in (w.motions, w.aids):
+        np.testing.assert_array_equal(factors.whitened, factors.residual)
+        np.testing.assert_allclose(factors.norm, np.linalg.norm(factors.residual, axis=1))
 
 
 def test_a_factor_without_weight_counts_for_nothing():
@@ -284,8 +306,10 @@ def test_the_cost_is_half_the_weighted_sum_of_squares():
     norm, weight = rng.uniform(size=(2, 3))
     aid_norm, aid_weight = rng.uniform(size=(2, 5))
     squares = shift @ np.linalg.solve(P, shift) + weight @ norm**2 + aid_weight @ aid_norm**2
-    around = [np.concatenate([[9.0], x, [9.0]]) for x in (norm, weight, aid_norm, aid_weight)]
-    cost = half_squares((1, 4, 1, 1, 5, 0), (W, shift), (around[0], around[1]), (around[2], around[3]))
+    motions = padded(columns(Motions, 3, 4, norm=norm, weight=weight), 1)
+    aids = padded(columns(AidingFactors, 5, 4, norm=aid_norm, weight=aid_weight), 1)
+    prior = Prior(covariance=P, whitener=W, shift=shift)
+    cost = half_squares(window_of(columns(Nodes, 6, 4), motions, aids, prior), rows_of(4, 5, 1))
     assert cost == pytest.approx(0.5 * squares)  # rows before and after do not count
 
 
@@ -303,7 +327,10 @@ def test_weights_that_have_hardly_changed_are_kept(motion: int | None, aid: int 
         if which is not None:
             weights[which] += 0.03 / max(norms[which], 1.0)
             changed.append((weights, which, weights[which]))
-    assert keep_weights((before, norm, weight), node + 7, 7, (aid_before, aid_norm, aid_weight), 0.01) == first
+    motions = columns(Motions, 3, norm=norm, weight=weight)
+    aids = columns(AidingFactors, 5, node=node + BASE, norm=aid_norm, weight=aid_weight)
+    window = window_of(columns(Nodes, 4), motions, aids)
+    assert keep_weights(window, rows_of(4, 5), before, aid_before, 0.01) == first
     for weights, which, wanted in changed:
         assert weights[which] == wanted
     kept = [np.delete(w, [] if i is None else i) for w, i in ((weight, motion), (aid_weight, aid))]

@@ -9,6 +9,14 @@ import numpy as np
 import pytest
 
 from simnav.estimators.models.columns import Columns, Made
+from simnav.kernel_types import IntegerVector, Matrix, Vector
+from simnav.records import Record
+
+
+class Table(Record):
+    time: Vector
+    value: Matrix
+    node: IntegerVector
 
 
 def filled(rows: int, made: Made | None = None) -> Columns:
@@ -20,9 +28,9 @@ def filled(rows: int, made: Made | None = None) -> Columns:
 
 def test_a_kernel_appends_rows_where_they_are_free():
     columns = filled(3)
-    time, value = columns.whole(("time", "value"))
-    assert columns.free == len(time) - 3
-    time[columns.last], value[columns.last] = 7.0, (8.0, 9.0)
+    table = columns.record(Table)
+    assert columns.free == len(table.time) - 3
+    table.time[columns.last], table.value[columns.last] = 7.0, (8.0, 9.0)
     assert len(columns["time"]) == 3
     columns.grow(1)
     assert columns["time"].tolist() == [0.0, 1.0, 2.0, 7.0]
@@ -37,9 +45,9 @@ def test_reserved_rows_are_free_and_the_others_stay(dropped: int, count: int):
     columns.reserve(count)
     assert columns.free >= count
     np.testing.assert_array_equal(columns["value"], kept)
-    time, value = columns.whole(("time", "value"))
-    assert len(time) == len(value) >= len(kept) + count
-    np.testing.assert_array_equal(value[columns.first : columns.last], kept)
+    table = columns.record(Table)
+    assert len(table.time) == len(table.value) >= len(kept) + count
+    np.testing.assert_array_equal(table.value[columns.first : columns.last], kept)
 
 
 def test_rows_are_not_moved_without_need():
@@ -52,13 +60,13 @@ def test_rows_are_not_moved_without_need():
 def test_what_was_made_of_whole_columns_goes_when_an_array_is_replaced():
     made = Made()
     columns = filled(10, made)
-    made["key"] = columns.whole(("time",))
+    made["key"] = columns.record(Table)
     columns.drop(3)
     columns.reserve(55)  # the rows move to the front of the same arrays
-    assert made["key"][0] is columns.whole(("time",))[0]
+    assert made["key"].time is columns.record(Table).time
     columns.reserve(1000)
     assert not made
-    assert len(columns.whole(("time",))[0]) >= 1007
+    assert len(columns.record(Table).time) >= 1007
 
 
 @pytest.mark.parametrize("copied", [copy.deepcopy, lambda columns: pickle.loads(pickle.dumps(columns))])
@@ -76,9 +84,9 @@ def test_a_copy_has_rows_of_its_own(copied):
 def test_copies_of_two_tables_share_what_is_made_of_them_and_begin_without():
     made = Made()
     first, second = filled(3, made), filled(4, made)
-    made["key"] = first.whole(("time",))
+    made["key"] = first.record(Table)
     one, other = copy.deepcopy((first, second))
-    assert made["key"][0] is first.whole(("time",))[0]
+    assert made["key"].time is first.record(Table).time
     assert one._made is other._made
     assert one._made is not made
     assert not one._made

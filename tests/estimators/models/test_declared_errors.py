@@ -173,7 +173,7 @@ def initial_variances(plugins) -> dict[str, tuple[float, int]]:
         chain = chain_of(model)
         chain.begin(start, instruments)
         at = model.blocks.of(compass.name)[0]
-        found[name] = float(chain.prior.diagonal()[at].sum()), chain.size
+        found[name] = float(chain.prior.covariance.diagonal()[at].sum()), chain.size
     noise = InertialModel(calibrate=False)
     noise.begin(start, aids)
     found["without states"] = float(noise.noise[compass.name][0, 0]), noise.size

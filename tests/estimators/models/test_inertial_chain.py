@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from simnav.estimators.models.dvl_calibration import DvlCalibrationModel
 from simnav.estimators.models.inertial import InertialModel
 from simnav.estimators.models.inertial_chain import InertialChain
-from simnav.estimators.models.inertial_take import TAKEN
 from simnav.estimators.models.nine_state import NineStateModel
+from simnav.estimators.solvers.window import WindowEstimator
 from simnav.geometry.rotation import dcm_from_rotation_vector, dcm_from_rpy, left_jacobian, rotation_vector_from_dcm
 from simnav.recording import Recording
 from simnav.scenario import load
 from simnav.source import record
-from simnav.types import Array, Measurement
+from simnav.types import Array
 from tests.cases import ROV
 from tests.cases.derivatives import along
 
@@ -230,7 +232,7 @@ def test_a_folded_measurement_is_seen_through_the_motion(recording: Recording):
     at_nodes, onto_first = folded(recording, True), folded(recording, False)
     n = onto_first.size
     assert len(onto_first.nodes) == 1
-    assert len(onto_first.folds) == len(set(onto_first.aids["time"])) >= 2
+    assert len(onto_first.between) == len(set(onto_first.aids["time"])) >= 2
     shift = np.zeros(n)
     shift[:15] = LARGE * np.random.default_rng(5).uniform(-0.5, 0.5, 15)
     onto_first.retract(shift[None].copy())
@@ -268,7 +270,7 @@ def test_folded_noise_is_the_measurements_and_the_motions(recording: Recording):
     linearised = front.measure(last)
     assert linearised is not None
     H, d = linearised.jacobian, len(last.value)
-    expected = 0.01 * np.eye(d) + H @ chain.folds["noise"][-1] @ H.T
+    expected = 0.01 * np.eye(d) + H @ chain.between["noise"][-1] @ H.T
     for _ in range(2):  # it is added once
         chain.linearise_aids()
         np.testing.assert_allclose(chain.aids["noise"][-1][:d, :d], expected, rtol=1e-9)
@@ -328,76 +330,46 @@ def test_a_covariance_about_another_attitude_is_turned_by_the_left_jacobian(size
     np.testing.assert_allclose(InertialChain(InertialModel()).turned(P, shift), J @ P @ J.T, rtol=1e-9, atol=1e-9)
 
 
-def one_by_one(chain: InertialChain, measurements: list[Measurement], until: float, spacing: float) -> tuple[int, int]:
-    """What `Chain.take` says, by its single steps."""
-    attached = unused = 0
-    for m in measurements:
-        chain.propagate(min(m.time, until))
-        noise = chain.nominal_noise(m)
-        if noise is None:
-            unused += 1
-            continue
-        if chain.ahead > 0.0 and (m.time == measurements[-1].time or chain.ahead >= spacing):
-            chain.extend()
-        chain.attach(m, noise)
-        attached += 1
-    return attached, unused
-
-
 @pytest.mark.parametrize("spacing", [0.0, 0.3, 1.0])
-def test_a_step_taken_in_one_call_is_its_measurements_one_by_one(spacing: float):
-    """Nodes, motions, factors and folds to the last bit: a DVL at 23 Hz, a depth sensor and fixes (``rov.toml``)."""
+def test_a_step_in_compiled_code_is_that_by_methods(spacing: float):
+    """Nodes, motions, factors and states to the last bit: a DVL at 23 Hz, a depth sensor and fixes (``rov.toml``)."""
     rov = record(load(ROV).model_copy(update={"duration": 6.0}), 2)
-    taken, single = (InertialChain(InertialModel()) for _ in range(2))
-    for chain in (taken, single):
-        chain.begin(rov.start, rov.instruments)
-    wholly = 0
+    compiled, methods = (WindowEstimator(InertialModel(), spacing=spacing) for _ in range(2))
+    for estimator in (compiled, methods):
+        estimator.reset(rov.start, rov.instruments)
+    assert compiled._compiled
+    methods._compiled = False
     for packet in rov.steps():
-        aids = sorted(packet.aids, key=lambda m: m.time)
-        for chain in (taken, single):
-            chain.load(packet.imu)
-        counts = taken.take(aids, packet.time, spacing)
-        wholly += counts is not None
-        if counts is None:  # the factors fill their columns
-            counts = one_by_one(taken, aids, packet.time, spacing)
-        assert counts == one_by_one(single, aids, packet.time, spacing)
-        assert taken.ahead == single.ahead
-        assert taken.time == single.time
-        for name in ("nodes", "motions", "aids", "folds"):
-            ours, theirs = getattr(taken, name), getattr(single, name)
-            assert len(ours) == len(theirs) > 0 or (name == "folds" and spacing == 0.0)
-            written = {key for _, group in TAKEN.groups for key in group}
-            for column in written & ours.names:
+        a, b = compiled.update(packet), methods.update(packet)
+        np.testing.assert_equal(a.diagnostics, b.diagnostics)
+        for name in ("nodes", "motions", "aids", "between"):
+            ours, theirs = getattr(compiled.chain, name), getattr(methods.chain, name)
+            assert len(ours) == len(theirs) > 0 or (name == "between" and spacing == 0.0)
+            for column in ours.names:
                 np.testing.assert_array_equal(ours[column], theirs[column], err_msg=f"{name}, {column}")
-        for name in taken.front.state:
-            np.testing.assert_array_equal(getattr(taken.front, name), getattr(single.front, name))
-    assert wholly >= 4
+        assert compiled.chain.ahead == methods.chain.ahead
+        for name in compiled.chain.front.state:
+            np.testing.assert_array_equal(getattr(compiled.chain.front, name), getattr(methods.chain.front, name))
 
 
-def test_a_heading_near_the_vertical_is_not_taken(recording: Recording):
+@pytest.mark.parametrize("compiled", [True, False])
+def test_a_heading_near_the_vertical_is_not_used(recording: Recording, compiled: bool):
     """It counts as one that cannot be used, and leaves no node."""
-    chain = InertialChain(InertialModel())
-    chain.begin(recording.start, recording.instruments)
-    packet = next(iter(recording.steps()))
-    chain.load(packet.imu)
-    heading = next(m for m in packet.aids if m.kind == "gyrocompass")
+    estimator = WindowEstimator(InertialModel())
+    estimator.reset(recording.start, recording.instruments)
+    estimator._compiled = compiled
+    chain, packet = estimator.chain, next(iter(recording.steps()))
     chain.front.dcm[:] = dcm_from_rpy([0.0, np.pi / 2.0, 0.3])
-    assert chain.take([heading], packet.time, 0.5) == (0, 1)
+    heading = next(m for m in packet.aids if m.kind == "gyrocompass")
+    estimate = estimator.update(replace(packet, aids=[heading]))
+    assert estimate.diagnostics["skipped"] == 1.0
     assert len(chain.nodes) == 1
     assert len(chain.aids) == 0
     assert chain.ahead > 0.0
 
 
-def test_measurements_are_taken_one_by_one_where_something_chooses_or_there_is_no_room(recording: Recording):
-    packet = next(iter(recording.steps()))
-    for model in (NineStateModel(), DvlCalibrationModel()):  # a motion or a reading of their own
-        chain = InertialChain(model)
-        chain.begin(recording.start, recording.instruments)
-        chain.load(packet.imu)
-        assert chain.take(list(packet.aids), packet.time, 0.5) is None
-        assert chain.time < packet.time
-    chain = InertialChain(InertialModel())
-    chain.begin(recording.start, recording.instruments)
-    chain.load(packet.imu)
-    assert chain.take(list(packet.aids) * 40, packet.time, 0.5) is None
-    assert len(chain.aids) == 0
+def test_a_motion_or_a_reading_of_its_own_is_taken_by_methods(recording: Recording):
+    for model, compiled in ((NineStateModel(), False), (DvlCalibrationModel(), False), (InertialModel(), True)):
+        estimator = WindowEstimator(model)
+        estimator.reset(recording.start, recording.instruments)
+        assert estimator._compiled == compiled

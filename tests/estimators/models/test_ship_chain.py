@@ -138,7 +138,7 @@ def test_a_folded_measurement_is_one_at_a_node_without_motion_error(recording_of
     nodes, first = found
     n = first.size
     assert len(first.nodes) == 1
-    assert len(first.folds) >= 2
+    assert len(first.between) >= 2
     step = np.zeros((len(nodes.nodes), n))
     step[0] = np.random.default_rng(7).standard_normal(n) * np.where(np.arange(n) < 2, 30.0, 0.02)
     step[0, 3] = 0.8
@@ -184,7 +184,7 @@ def test_retract_takes_what_it_adds_off_the_prior(chain: ShipChain):
     step[0] = np.arange(chain.size)
     before, x = chain.nodes["position"].copy(), chain.nodes["x"].copy()
     chain.retract(step)
-    np.testing.assert_array_equal(chain.prior_shift, -step[0])
+    np.testing.assert_array_equal(chain.prior.shift, -step[0])
     np.testing.assert_allclose(
         earth.relative_position(chain.nodes["position"][0], before[0]), [0.0, 1.0, 0.0], atol=1e-8
     )

@@ -98,7 +98,7 @@ def test_spacing_makes_fewer_nodes():
         for packet in recording.steps():
             estimator.update(packet)
         count.append(len(estimator.chain.nodes))
-        assert len(estimator.chain.folds) <= len(estimator.chain.aids)
+        assert len(estimator.chain.between) <= len(estimator.chain.aids)
     assert count[0] > 20 * 25
     assert count[1] < 20 * 8
     assert count[2] <= 20 * 2

@@ -24,13 +24,13 @@ from simnav.estimators.weightings.graduated_non_convexity import (
     softened_truncated,
 )
 from simnav.estimators.weightings.m_estimators import (
-    COMPILED,
     MEstimator,
     cauchy,
     constants,
     efficiency,
     geman_mcclure,
     huber,
+    of_array,
     truncated,
     tukey,
 )
@@ -110,10 +110,10 @@ def test_the_base_lets_all_count_in_full():
 
 def test_weight_functions_in_closed_form():
     u = np.array([0.0, 0.5, 1.0, 2.0, 1e6])
-    np.testing.assert_allclose(huber(u), [1.0, 1.0, 1.0, 0.5, 1e-6])
-    np.testing.assert_allclose(tukey(u), [1.0, 0.5625, 0.0, 0.0, 0.0])
-    np.testing.assert_allclose(cauchy(u), [1.0, 0.8, 0.5, 0.2, 1e-12], rtol=1e-9)
-    np.testing.assert_allclose(geman_mcclure(u), [1.0, 0.64, 0.25, 0.04, 1e-24], rtol=1e-9)
+    np.testing.assert_allclose(of_array(huber, u), [1.0, 1.0, 1.0, 0.5, 1e-6])
+    np.testing.assert_allclose(of_array(tukey, u), [1.0, 0.5625, 0.0, 0.0, 0.0])
+    np.testing.assert_allclose(of_array(cauchy, u), [1.0, 0.8, 0.5, 0.2, 1e-12], rtol=1e-9)
+    np.testing.assert_allclose(of_array(geman_mcclure, u), [1.0, 0.64, 0.25, 0.04, 1e-24], rtol=1e-9)
     np.testing.assert_allclose(covariance_scaling(u), [1.0, 1.0, 1.0, 0.16, 4e-24], rtol=1e-9)
 
 
@@ -121,7 +121,7 @@ def test_weight_functions_in_closed_form():
 @given(u=st.floats(0.0, 1e4), step=st.floats(0.0, 10.0))
 @settings(max_examples=100)
 def test_a_weight_starts_at_one_and_never_rises(function, u: float, step: float):
-    at = function(np.array([0.0, u, u + step]))
+    at = of_array(function, np.array([0.0, u, u + step]))
     assert at[0] == 1.0
     assert 0.0 <= at[2] <= at[1] <= 1.0
 
@@ -129,7 +129,7 @@ def test_a_weight_starts_at_one_and_never_rises(function, u: float, step: float)
 @pytest.mark.parametrize("function", FUNCTIONS.values(), ids=FUNCTIONS)
 def test_influence_is_bounded_and_redescends_but_for_hubers(function):
     """The influence w r of a gross error tends to 0, Huber's to c."""
-    influence = function(np.array([1e5])) * 1e5
+    influence = of_array(function, np.array([1e5])) * 1e5
     assert influence == pytest.approx(1.0 if function is huber else 0.0, abs=1e-4)
 
 
@@ -149,7 +149,7 @@ def test_efficiency_is_that_of_the_derivative_form(function, m: int):
         return sum(quad(lambda r: f(r) * chi.pdf(r, m), a, b)[0] for a, b in pairwise(kinks))
 
     def w(r: float) -> float:
-        return float(function(np.array([r / c]))[0])
+        return float(of_array(function, np.array([r / c]))[0])
 
     def divergence(r: float) -> float:
         h = 1e-6 * max(r, 1e-3)
@@ -166,7 +166,7 @@ def test_efficiency_is_what_a_location_shows():
     mean = x.mean(axis=1, keepdims=True)
     estimate = mean
     for _ in range(30):
-        w = tukey(np.linalg.norm(x - estimate, axis=2) / c)[..., None]
+        w = of_array(tukey, np.linalg.norm(x - estimate, axis=2) / c)[..., None]
         estimate = (w * x).sum(axis=1, keepdims=True) / w.sum(axis=1, keepdims=True)
     assert np.var(mean) / np.var(estimate) == pytest.approx(0.95, abs=0.02)
 
@@ -303,13 +303,13 @@ def test_max_mixture_picks_the_more_probable_component(m: int):
 NORMS = np.concatenate([[0.0, 1e-300, 1e12, np.nan], np.random.default_rng(4).uniform(0.0, 12.0, 200)])
 
 
-@pytest.mark.parametrize("function", COMPILED)
+@pytest.mark.parametrize("function", [huber, tukey, cauchy, geman_mcclure])
 @pytest.mark.parametrize("m", [1, 2, 3])
 def test_a_weight_in_a_kernel_is_that_of_the_array_to_the_last_bit(function, m: int):
     c = constants(function)
     f = factors(along(NORMS), components=m)
     MEstimator(function, c).choose(f)
-    np.testing.assert_array_equal(f.weight, function(f.norm * (1.0 / np.array(c))[m - 1]))
+    np.testing.assert_array_equal(f.weight, of_array(function, f.norm * (1.0 / np.array(c))[m - 1]))
 
 
 @pytest.mark.parametrize(("cost", "function"), [("tls", softened_truncated), ("gm", softened_geman_mcclure)])
@@ -324,7 +324,7 @@ def test_softened_weights_in_a_kernel_are_those_of_the_array_to_the_last_bit(cos
     f = factors(along(norms))
     weighting._fresh, f.iteration = True, 1
     assert weighting.weigh(f)
-    np.testing.assert_array_equal(f.weight, function(f.norm * f.norm * scale, mu))
+    np.testing.assert_array_equal(f.weight, function.function(f.norm * f.norm * scale, mu))
 
 
 # Graduated non-convexity
@@ -332,13 +332,13 @@ def test_softened_weights_in_a_kernel_are_those_of_the_array_to_the_last_bit(cos
 
 def test_softened_costs_end_as_the_hard_ones_and_begin_convex():
     square = np.linspace(0.0, 9.0, 901)
-    np.testing.assert_allclose(softened_geman_mcclure(square, 1.0), geman_mcclure(square**0.5))
+    np.testing.assert_allclose(softened_geman_mcclure.function(square, 1.0), of_array(geman_mcclure, square**0.5))
     away = np.abs(square - 1.0) > 1e-3
-    np.testing.assert_allclose(softened_truncated(square, 1e4)[away], truncated(square**0.5)[away])
+    np.testing.assert_allclose(softened_truncated.function(square, 1e4)[away], truncated(square**0.5)[away])
     # Soft enough, the cost of every residual up to u^2 = 9 has a positive second derivative: w + u w' > 0.
     for soft, mu in ((softened_geman_mcclure, 30.0), (softened_truncated, 1.0 / 17.0)):
         u = np.linspace(0.01, 2.99, 300)
-        influence = soft(u * u, mu) * u
+        influence = soft.function(u * u, mu) * u
         assert np.all(np.diff(influence) > -1e-9 if soft is softened_geman_mcclure else influence > 0.0)
 
 
@@ -348,7 +348,7 @@ def test_the_band_of_truncated_least_squares_in_closed_form():
     low, high = mu / (mu + 1.0), (mu + 1.0) / mu
     square = np.array([0.5 * low, low, 1.0, high, 2.0 * high])
     expected = [1.0, 1.0, np.sqrt(mu * (mu + 1.0)) - mu, 0.0, 0.0]
-    np.testing.assert_allclose(softened_truncated(square, mu), expected, atol=1e-12)
+    np.testing.assert_allclose(softened_truncated.function(square, mu), expected, atol=1e-12)
 
 
 @pytest.mark.parametrize("cost", ["tls", "gm"])
@@ -368,7 +368,7 @@ def test_it_hardens_only_where_there_is_an_outlier(cost: str):
     f = factors(np.vstack([calm, along([25.0])]))
     assert epoch(f) > 3
     hard = truncated if cost == "tls" else geman_mcclure
-    np.testing.assert_allclose(f.weight, np.maximum(hard(f.norm / constants(hard)[2]), 1e-3), rtol=1e-9)
+    np.testing.assert_allclose(f.weight, np.maximum(of_array(hard, f.norm / constants(hard)[2]), 1e-3), rtol=1e-9)
     assert epoch(factors(np.vstack([calm, along([25.0, 1.0])]))) == 1  # the old outlier begins no new schedule
 
 

@@ -1,6 +1,7 @@
-"""What folding does to a reading: its Jacobian goes through the motion from the node, whose noise is added to its own.
+"""Intermediate states: times between nodes at which readings are predicted, by the motion from the node before.
 
-See `simnav.estimators.models.chain`.
+A reading at an intermediate state is a reading of its node: its Jacobian goes through the motion from the node, and the
+noise of that motion is added to its own (`simnav.estimators.models.chain`).
 """
 
 from __future__ import annotations
@@ -9,10 +10,36 @@ import numpy as np
 
 from simnav.compiled import helper, kernel
 from simnav.estimators.algebra.whitening import whitening
-from simnav.kernel_types import IntegerVector, Stack
+from simnav.kernel_types import IntegerVector, Matrix, Stack, Vector
+from simnav.records import Record
 from simnav.types import Array
 
-__all__ = ["add_motion_noise", "add_noise", "through_motion", "through_one"]
+__all__ = ["IntermediateStates", "add_motion_noise", "add_noise", "through_motion", "through_one"]
+
+
+class IntermediateStates(Record):
+    """The intermediate states of a window as kernels take them: whole columns.
+
+    Attributes
+    ----------
+    node : (J,) array of int
+        Number of the node before it since the start of the run.
+    time : (J,) array
+        Time [s].
+    transition, noise : (J, n, n) arrays
+        Of the motion from the node, as predicted.
+    shift : (J, n) array
+        By how much the node has moved since the prediction.
+    jacobian : (J, n, n) array
+        Derivative of the motion by the node.
+    """
+
+    node: IntegerVector
+    time: Vector
+    transition: Stack
+    noise: Stack
+    shift: Matrix
+    jacobian: Stack
 
 
 @helper
@@ -38,20 +65,20 @@ def through_one(transition: Array, coupled: int, jacobian: Array, at_node: Array
 
 @kernel
 def through_motion(first: int, row: IntegerVector, coupled: int, transition: Stack, jacobian: Stack) -> None:
-    """Convert Jacobians with respect to the states at folds to Jacobians with respect to their nodes, in place.
+    """Convert Jacobians with respect to intermediate states to Jacobians with respect to their nodes, in place.
 
     Parameters
     ----------
     first : int
         Index of the first aiding factor that is converted.
     row : (M,) int array
-        Index of the fold of each aiding factor; -1 for factors without a fold.
+        Index of the intermediate state of each aiding factor; -1 for factors at their nodes.
     coupled : int
         States from this index on are independent and only decay; each may also move by the one after it.
-    transition : (K, n, n) array
-        Transition matrices from the nodes to the K folds.
+    transition : (J, n, n) array
+        Transition matrices from the nodes to the J intermediate states.
     jacobian : (M, 3, n) array
-        Jacobians with respect to the states at the folds; overwritten.
+        Jacobians with respect to the intermediate states; overwritten.
     """
     at_node = np.empty(transition.shape[1])
     for i in range(first, row.size):
@@ -90,20 +117,20 @@ def add_motion_noise(
     whitener: Stack,
     bare: IntegerVector,
 ) -> None:
-    """Add the noise Q of the motion up to a fold to the noise R of the measurements there, ``R + H Q H'``, once.
+    """Add the noise Q of the motion up to a state to the noise R of the measurements there, ``R + H Q H'``, once.
 
     Parameters
     ----------
     first : int
         Index of the first aiding factor that is changed.
     row : (M,) int array
-        Index of the fold of each aiding factor; -1 for factors without a fold.
+        Index of the intermediate state of each aiding factor; -1 for factors at their nodes.
     components : (M,) int array
         Number of components of each measurement.
     jacobian : (M, 3, n) array
-        Jacobian H with respect to the state at the fold.
-    motion_noise : (K, n, n) array
-        Process noise Q of the motions from the nodes to the folds.
+        Jacobian H with respect to the intermediate state.
+    motion_noise : (J, n, n) array
+        Process noise Q of the motions from the nodes to the J intermediate states.
     noise, whitener : (M, 3, 3) arrays
         Noise R of the measurements and its inverse Cholesky factor; overwritten.
     bare : (M,) int array

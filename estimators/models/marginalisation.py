@@ -1,0 +1,92 @@
+"""What a window does when nodes leave: what they say about the first node that stays becomes its prior.
+
+The elimination of a window (`simnav.estimators.algebra.block_tridiagonal`) has what all older nodes say about each
+node: a covariance, and a mean relative to the node. After the last step of the node both are referred to the node as it
+is now. How a shift and a covariance are referred to another state depends on the model: rotations compose.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from simnav.compiled import kernel
+from simnav.estimators.algebra.factors import Rows, Window
+from simnav.estimators.algebra.whitening import whitening
+from simnav.kernel_types import Matrix, Vector
+from simnav.records import Record
+
+from .intermediate_states import IntermediateStates
+
+__all__ = ["Leaving", "Reference", "keep_covariance", "marginalise", "subtract_step"]
+
+
+class Reference(Record):
+    """How a model refers a shift and a covariance to another state.
+
+    Attributes
+    ----------
+    turn : callable
+        Overwrites its third argument with a covariance at one state, transformed to the state at a shift.
+    relative_shift : callable
+        Overwrites its third argument with a shift as seen from the state after a step.
+    """
+
+    turn: Callable[[Matrix, Vector, Matrix], None]
+    relative_shift: Callable[[Vector, Vector, Vector], None]
+
+
+class Leaving(NamedTuple):
+    """How many aiding factors and intermediate states leave with their nodes."""
+
+    aids: int
+    between: int
+
+
+@kernel(passed=True)
+def keep_covariance(covariance: Matrix, shift: Vector, out: Matrix) -> None:
+    """The covariance of a model without rotations, which is the same at any state."""
+    for i in range(shift.size):
+        for j in range(shift.size):
+            out[i, j] = covariance[i, j]
+
+
+@kernel(passed=True)
+def subtract_step(shift: Vector, step: Vector, out: Vector) -> None:
+    """The shift of a model without rotations."""
+    for j in range(shift.size):
+        out[j] = shift[j] - step[j]
+
+
+@kernel
+def marginalise(leaving: int, window: Window, between: IntermediateStates, rows: Rows, reference: Reference) -> Leaving:
+    """Make the prior of the first node that stays from what was predicted for it.
+
+    Parameters
+    ----------
+    leaving : int
+        Number of nodes that leave.
+    window : Window
+        The nodes and factors; the prior is overwritten.
+    between : IntermediateStates
+        The intermediate states.
+    rows : Rows
+        Where all of them are.
+    reference : Reference
+        How the model refers shifts and covariances to another state.
+    """
+    stays, node, of_state = rows.first_node + leaving, window.aids.node, between.node
+    prior, step, mean = window.prior, window.nodes.step[stays], np.empty(window.prior.shift.size)
+    for j in range(mean.size):
+        mean[j] = window.nodes.predicted_shift[stays, j] + step[j]
+    reference.turn(window.nodes.predicted[stays], mean, prior.covariance)
+    reference.relative_shift(mean, step, prior.shift)
+    whitening(prior.covariance, prior.whitener)
+    aids, states, first = 0, 0, rows.base + leaving
+    while aids < rows.aids and node[rows.first_aid + aids] < first:
+        aids += 1
+    while states < rows.between and of_state[rows.first_between + states] < first:
+        states += 1
+    return Leaving(aids, states)
