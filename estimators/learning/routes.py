@@ -50,7 +50,7 @@ class Routes:
     @property
     def tracks(self) -> Tracks:
         """All of them, as the kernels take them."""
-        return self.of, self.length, self.points, self.geodetic, self.course, self.along
+        return Tracks(self.of, self.length, self.points, self.geodetic, self.course, self.along)
 
     def dive(self, at: NDArray[np.int64]) -> Array:
         """(n, 2) array: the values of `dives` at a point of each voyage's track."""

@@ -27,6 +27,14 @@ from simnav.sensors.stepwise import (
     HELD,
     INERTIAL,
     UNTOUCHED,
+    AidDraws,
+    BatchProgress,
+    Delivered,
+    FaultLayers,
+    ImuDraws,
+    ImuSteps,
+    SampleTimes,
+    TriadTables,
     begin_step,
     sense,
     sense_imu,
@@ -82,10 +90,7 @@ class SteppedRuns:
         self._streams: list[dict[str, AidStream]] = [{} for _ in range(n)]
         self._arrivals = [Arrivals() for _ in range(n)]
         self._compiled, self._batch = np.zeros(n, np.bool_), np.zeros(n, np.int64)
-        self._at, self._end = (
-            np.zeros(n, np.int64),
-            np.zeros(n, np.int64),
-        )  # step in the batch, and its length
+        self._at, self._end = np.zeros(n, np.int64), np.zeros(n, np.int64)  # step in the batch, and its length
         self._imu = np.zeros(n, np.bool_)
         # Of one step: see `simnav.sensors.stepwise.sort_out` and `begin_step`.
         self._which = (np.zeros(n, np.bool_), np.zeros(n, np.bool_), np.zeros(n, np.bool_))
@@ -191,9 +196,9 @@ class SteppedRuns:
 
     def advance(self, active: NDArray[np.bool_]) -> None:
         """Advance some runs by one step each."""
-        which = self._compiled, self._imu, self._at, self._end
+        progress = BatchProgress(self._compiled, self._imu, self._at, self._end)
         compiled, inertial, due = self._which
-        found = sort_out(active, which, self._which)
+        found = sort_out(active, progress, self._which)
         if found & BLOCKS:
             for b in np.flatnonzero(active & ~self._compiled).tolist():
                 self._block(b)
@@ -204,26 +209,35 @@ class SteppedRuns:
                 self._draw(b)
         place, first, last = self._limits
         drawn = self.edge, self.samples_a_step
-        most = begin_step(compiled, drawn, (self._at, self.step, self.samples), self._limits)
+        most = begin_step.unchecked(compiled, drawn, (self._at, self.step, self.samples), self._limits)
         if most > self._taps.shape[1]:
             self._taps = np.zeros((self.n, most, motion.TAP_COLUMNS))
-        motion.advance(
+        # Their arrays are made here, of the right types.
+        motion.advance.unchecked(
             compiled, (self.x, self.index), self.p, self.sizes, (self.rows, self.points),
-            (self.phase, self.table, self.eddies), (self.tap_time, first, last, self._taps),
+            (self.phase, self.table, self.eddies), motion.RequestedStates(self.tap_time, first, last, self._taps),
             (self.samples, self.rate, self.force),
         )  # fmt: skip
         if found & INERTIAL:
-            sense_imu(
-                inertial, place, self.samples, (self.matrix, self.bias, self.triads, self.residual),
-                (self.variates, self.instability, self.walk, self.tables), (self.disturbed, self.disturbance),
-                self.clock, (self.imu_time, self.imu_interval, self.rate, self.force),
-            )  # fmt: skip
-        sense(
-            compiled, (first, last, self.tap_time, self._taps, self.owner),
-            (self.error, self.white, self.interval, self.fault), (self.layout, self.numbers),
-            (self._layers, self.operations, self.sizes_of_noise, self.held),
-            (self.count, self.who, self.when, self.value, self.faults), self.truth,
-        )  # fmt: skip
+            triads = TriadTables(self.matrix, self.bias, self.triads, self.residual)
+            draws = ImuDraws(self.variates, self.instability, self.walk, self.tables)
+            disturbances = self.disturbed, self.disturbance
+            sense_imu.unchecked(inertial, place, triads, draws, disturbances, self.clock, self.imu_steps)
+        samples = SampleTimes(first, last, self.tap_time, self._taps, self.owner)
+        draws_of_aids = AidDraws(self.error, self.white, self.interval, self.fault)
+        layers = FaultLayers(self._layers, self.operations, self.sizes_of_noise, self.held)
+        instruments = self.layout, self.numbers
+        sense.unchecked(compiled, samples, draws_of_aids, instruments, layers, self.delivered, self.truth)
+
+    @property
+    def delivered(self) -> Delivered:
+        """The measurements of the last step of all runs; only the first ``number`` of each run count."""
+        return Delivered(self.count, self.who, self.when, self.value, self.faults)
+
+    @property
+    def imu_steps(self) -> ImuSteps:
+        """The IMU samples of the last step of all runs; only the first ``number`` of each run count."""
+        return ImuSteps(self.samples, self.imu_time, self.imu_interval, self.rate, self.force)
 
     def interval_of(self, b: int) -> tuple[float, float]:
         """Beginning and end of the last step of a run [s]."""

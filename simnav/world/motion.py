@@ -10,6 +10,7 @@ loop, whose iterations the processor overlaps, or a loop of vector instructions.
 from __future__ import annotations
 
 from math import atan2, cos, exp, inf, sin
+from typing import NamedTuple
 
 import numpy as np
 
@@ -45,6 +46,7 @@ __all__ = [
     "PARAMETERS",
     "STATE",
     "TAP_COLUMNS",
+    "RequestedStates",
     "advance",
     "command",
     "initialise",
@@ -445,6 +447,25 @@ def _advance_one(
         x[ROLL], x[PITCH] = block[ANGLES, n], block[ANGLES + 1, n]
 
 
+class RequestedStates(NamedTuple):
+    """The times at which the states of w worlds are required.
+
+    Attributes
+    ----------
+    time : (w, k) array
+        The times, ascending [s].
+    first, last : (w,) int array
+        Index of the first of these times within the block, and index after the last one.
+    states : (w, m, 14) array
+        Overwritten with the states at these times.
+    """
+
+    time: Matrix
+    first: IntegerVector
+    last: IntegerVector
+    states: Stack
+
+
 @kernel
 def advance(
     active: FlagVector,
@@ -453,7 +474,7 @@ def advance(
     sizes: IntegerMatrix,
     plan: tuple[Matrix, Matrix],
     water: tuple[Matrix, Matrix, Matrix],
-    wanted: tuple[Matrix, IntegerVector, IntegerVector, Stack],
+    requested: RequestedStates,
     imu: tuple[IntegerVector, Stack, Stack],
 ) -> None:
     """Advance w worlds, each by its own number of samples.
@@ -478,9 +499,8 @@ def advance(
     water : three (w, ...) arrays
         Phases (updated) and table of the wave components (`simnav.world.sea.components`); the variable part of the
         current (`simnav.world.current.eddies`).
-    wanted : (w, ...), (w,) int, (w,) int and (w, ..., 14) arrays
-        Ascending times at which the state is required [s]; index of the first of these times within the block, and
-        index after the last one; the states at these times, overwritten.
+    requested : RequestedStates
+        The times at which the state is required, and the states there.
     imu : (w,) int, (w, ..., 3) and (w, ..., 3) arrays
         Number of samples by which each world is advanced; ideal mean angular rate [rad/s] and specific force [m/s^2],
         overwritten.
@@ -488,7 +508,7 @@ def advance(
     x, index = state
     rows, points = plan
     phase, table, eddies = water
-    tap_time, first, last, taps = wanted
+    first, last = requested.first, requested.last
     samples, rate, force = imu
     block = np.empty((BLOCK_ROWS, BLOCK_COLUMNS))
     for w in range(active.size):
@@ -503,7 +523,7 @@ def advance(
                 phase[w, : PHASES * c].reshape((PHASES, c)), table[w, : ROWS * c].reshape((ROWS, c)),
                 eddies[w, : EDDY_COLUMNS * e].reshape((e, EDDY_COLUMNS)),
             ),
-            tap_time[w, first[w] : last[w]], taps[w, :m], (rate[w, :n], force[w, :n]), block,
+            requested.time[w, first[w] : last[w]], requested.states[w, :m], (rate[w, :n], force[w, :n]), block,
         )  # fmt: skip
 
 

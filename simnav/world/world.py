@@ -214,7 +214,8 @@ class World:
         n = round(self.rate)
         room = np.empty((1, n, 3))
         none, states = np.zeros(1, np.int64), np.empty((1, 0, motion.TAP_COLUMNS))
-        nowhere, imu = (np.empty((1, 0)), none, none, states), (np.array([n]), room, room.copy())
+        nowhere = motion.RequestedStates(np.empty((1, 0)), none, none, states)
+        imu = np.array([n]), room, room.copy()
         arguments: Any = (*self._one(), nowhere, imu)
         track, position, dive = np.empty((seconds, 4)), np.empty((seconds, 3)), np.empty((seconds, 2))
         for i in range(seconds):
@@ -277,8 +278,10 @@ class World:
         times = np.concatenate([np.empty(0), *taps.values()])
         order = np.argsort(times, kind="stable")
         sorted_states = np.empty((1, len(times), motion.TAP_COLUMNS))
-        within = times[None, order], np.zeros(1, np.int64), np.array([len(times)]), sorted_states
-        arguments: Any = (*self._one(), within, (np.array([n]), rate, force))
+        requested = motion.RequestedStates(
+            times[None, order], np.zeros(1, np.int64), np.array([len(times)]), sorted_states
+        )
+        arguments: Any = (*self._one(), requested, (np.array([n]), rate, force))
         motion.advance(*arguments)
         states = np.empty_like(sorted_states[0])
         states[order] = sorted_states[0]
