@@ -11,7 +11,7 @@ keeps the order of its operations. The loops over increments depend on the sampl
 from __future__ import annotations
 
 from math import cos, sin, sqrt
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -39,6 +39,7 @@ __all__ = [
     "POSITION",
     "SAMPLE_ROWS",
     "VELOCITY",
+    "IdealSample",
     "Nine",
     "ideal_samples",
     "increments",
@@ -166,10 +167,29 @@ def _nu(change: Triple, nu: Triple, a: Triple, m: Nine, inverse: float) -> Tripl
     )
 
 
+class IdealSample(NamedTuple):
+    """The sample of ideal instruments over an interval.
+
+    Attributes
+    ----------
+    angular_rate, specific_force : three floats
+        Means [rad/s], [m/s^2], body axes.
+    displacement : three floats
+        Changes of latitude and longitude [rad] and of height [m].
+    earth_rate : two floats
+        Earth rate in the middle of the interval, north and down [rad/s].
+    """
+
+    angular_rate: Triple
+    specific_force: Triple
+    displacement: Triple
+    earth_rate: tuple[float, float]
+
+
 @helper(borrows=True)
 def sample_from_motion(
     latitude: float, height: float, v: Triple, w: Triple, c: Nine, d: Nine, memory: Array, dt: float
-) -> tuple[float, ...]:
+) -> IdealSample:
     """The sample of ideal instruments over one interval: the exact inverse of `simnav.strapdown.mechanize_step`.
 
     Parameters
@@ -187,12 +207,12 @@ def sample_from_motion(
 
     Returns
     -------
-    tuple of 11 floats
-        Mean angular rate [rad/s] and mean specific force [m/s^2], body axes; changes of latitude and longitude [rad]
-        and of height [m]; the Earth rate, north and down, at the middle of the interval [rad/s].
+    IdealSample
     """
     m0, m1, m2 = 0.5 * (v[0] + w[0]), 0.5 * (v[1] + w[1]), 0.5 * (v[2] + w[2])
-    e0, e2, k0, k1, k2, g, per_north, per_east, _ = local_rates(latitude, height, m0, m1, m2, dt)
+    local = local_rates(latitude, height, m0, m1, m2, dt)
+    e0, e2 = local.earth_north, local.earth_down
+    k0, k1, k2 = local.transport_north, local.transport_east, local.transport_down
     z = (e0 + k0) * dt, k1 * dt, (e2 + k2) * dt
     sz, bz = rotation_coefficients(_square(z))
     x0, x1, x2 = _twice_sine(c, d, z, sz, bz)
@@ -201,7 +221,7 @@ def sample_from_motion(
     # alpha from phi = (I + [alpha'/12 x]) alpha
     h = memory[0] * TWELFTH, memory[1] * TWELFTH, memory[2] * TWELFTH
     a = _solved(h, r)
-    change = _velocity_change(c, v, w, z, (e0, e2), (k0, k1, k2), g, dt)
+    change = _velocity_change(c, v, w, z, (e0, e2), (k0, k1, k2), local.gravity, dt)
     angle2 = _square(r)
     sa, b = rotation_coefficients(angle2)
     k = 1.0 / 6.0 - angle2 * (1.0 / 120.0) if angle2 < 1e-3 else (1.0 - sa) / angle2
@@ -209,10 +229,12 @@ def sample_from_motion(
     n = _nu(change, (memory[3], memory[4], memory[5]), a, m, inverse)
     memory[0], memory[1], memory[2], memory[3], memory[4], memory[5] = a[0], a[1], a[2], n[0], n[1], n[2]
     inverse = 1.0 / dt
-    return (
-        a[0] * inverse, a[1] * inverse, a[2] * inverse, n[0] * inverse, n[1] * inverse, n[2] * inverse,
-        dt * m0 * per_north, dt * m1 * per_east, -dt * m2, e0, e2,
-    )  # fmt: skip
+    return IdealSample(
+        angular_rate=(a[0] * inverse, a[1] * inverse, a[2] * inverse),
+        specific_force=(n[0] * inverse, n[1] * inverse, n[2] * inverse),
+        displacement=(dt * m0 * local.per_north, dt * m1 * local.per_east, -dt * m2),
+        earth_rate=(e0, e2),
+    )
 
 
 @helper(borrows=True)
@@ -313,11 +335,14 @@ def ideal_samples(block: Array, n: int, memory: Array, rate: Array, force: Array
             0.5 * (block[VELOCITY, k] + block[VELOCITY, k + 1]),
             0.5 * (block[VELOCITY + 1, k] + block[VELOCITY + 1, k + 1]),
         )
-        e0, e2, k0, k1, k2, g, per_east = rates_in_the_middle(
+        rates = rates_in_the_middle(
             block[SINE, k], block[COSINE, k], block[HEIGHT, k], block[RADIUS, k], block[PER_NORTH, k], m0, m1
         )
+        e0, e2 = rates.earth_north, rates.earth_down
+        k0, k1, k2 = rates.transport_north, rates.transport_east, rates.transport_down
         z0, z1, z2 = (e0 + k0) * dt, k1 * dt, (e2 + k2) * dt
-        block[EARTH, k], block[EARTH + 1, k], block[GRAVITY, k], block[PER_EAST, k] = e0, e2, g, per_east
+        block[EARTH, k], block[EARTH + 1, k] = e0, e2
+        block[GRAVITY, k], block[PER_EAST, k] = rates.gravity, rates.per_east
         block[TRANSPORT, k], block[TRANSPORT + 1, k], block[TRANSPORT + 2, k] = k0, k1, k2
         block[ZETA, k], block[ZETA + 1, k], block[ZETA + 2, k] = z0, z1, z2
         block[SQUARE, k] = _square((z0, z1, z2))

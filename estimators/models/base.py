@@ -10,7 +10,7 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 
 from simnav.estimator.needs import Needs
-from simnav.estimators.algebra.inflation import inflate_motion
+from simnav.estimators.algebra.inflation import MotionStates, inflate_motion
 from simnav.geometry.rotation import left_jacobian
 from simnav.types import (
     NO_SIDE,
@@ -252,8 +252,8 @@ class ErrorModel(ABC):
             corrections stay in the linear range.
         """
         motion, attitude = self.moving
-        places = (*motion.indices(self.size)[:2], *attitude.indices(self.size)[:2])
-        inflate_motion(covariance, inflation, first, places)
+        states = MotionStates(*motion.indices(self.size)[:2], *attitude.indices(self.size)[:2])
+        inflate_motion(covariance, inflation, first, states)
 
     def by_correction(self, jacobian: Array, correction: Array) -> Array:
         """A (m, n) Jacobian at the corrected state, taken with respect to the correction that led there.

@@ -97,9 +97,10 @@ def propagate_points(
         memory,
         interval,
     )
-    end_latitude = position[0] + sample[6]
-    end_longitude = position[1] + sample[7]
-    end_height = position[2] + sample[8]
+    rate, force = sample.angular_rate, sample.specific_force
+    end_latitude = position[0] + sample.displacement[0]
+    end_longitude = position[1] + sample.displacement[1]
+    end_height = position[2] + sample.displacement[2]
     meridian, prime = radii_scalar(sin(position[0]))
     north, east = meridian + position[2], (prime + position[2]) * cos(position[0])
     meridian, prime = radii_scalar(sin(end_latitude))
@@ -121,8 +122,8 @@ def propagate_points(
         memory[:] = 0.0
         mechanize_step(
             p, v, m, memory,
-            (sample[0] - errors[k, 9], sample[1] - errors[k, 10], sample[2] - errors[k, 11]),
-            (sample[3] - errors[k, 12], sample[4] - errors[k, 13], sample[5] - errors[k, 14]),
+            (rate[0] - errors[k, 9], rate[1] - errors[k, 10], rate[2] - errors[k, 11]),
+            (force[0] - errors[k, 12], force[1] - errors[k, 13], force[2] - errors[k, 14]),
             interval,
         )  # fmt: skip
         errors[k, 0] = (p[0] - end_latitude) * next_north

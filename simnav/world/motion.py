@@ -90,11 +90,54 @@ TAP_COLUMNS = 14
 #: Rows of the phases of waves, and columns of an eddy.
 PHASES, EDDY_COLUMNS = 3, 6
 
-#: Without waves and current: speed, yaw rate, heading, its cosine and sine, path angle, its cosine and sine, depth,
-#: sway velocity.
-Course = tuple[float, float, float, float, float, float, float, float, float, float]
-#: Velocity north-east-down [m/s], roll, pitch [rad], cosine and sine of the heading of the bow.
-Composed = tuple[Triple, float, float, float, float]
+
+class Course(NamedTuple):
+    """The motion without waves and current.
+
+    Attributes
+    ----------
+    speed, yaw_rate : float
+        Surge velocity through the water [m/s], and [rad/s].
+    heading, cos_heading, sin_heading : float
+        [rad], and its cosine and sine.
+    path, cos_path, sin_path : float
+        Flight-path angle [rad], and its cosine and sine.
+    depth : float
+        [m].
+    sway : float
+        Sway velocity [m/s].
+    """
+
+    speed: float
+    yaw_rate: float
+    heading: float
+    cos_heading: float
+    sin_heading: float
+    path: float
+    cos_path: float
+    sin_path: float
+    depth: float
+    sway: float
+
+
+class Composed(NamedTuple):
+    """The motion with waves and current.
+
+    Attributes
+    ----------
+    velocity : three floats
+        North, east, down [m/s].
+    roll, pitch : float
+        [rad].
+    cos_bow, sin_bow : float
+        Cosine and sine of the heading of the bow.
+    """
+
+    velocity: Triple
+    roll: float
+    pitch: float
+    cos_bow: float
+    sin_bow: float
 
 
 @helper(borrows=True)
@@ -216,8 +259,8 @@ def _guide(x: Array, index: Integers, p: Array, rows: Array, points: Array, time
 @helper(borrows=True)
 def _compose(course: Course, water: tuple[float, float], yaw_answer: float, p: Array, waves: Responses) -> Composed:
     """Velocity, roll, pitch, and cosine and sine of the heading of the bow, with current and waves added."""
-    w0, w1, w2, w3, w4, w5, w6 = waves
-    u, r, psi, cp, sp, gamma, cg, sg, depth, sway = course
+    u, cp, sp, cg = course.speed, course.cos_heading, course.sin_heading, course.cos_path
+    depth, sway = course.depth, course.sway
     shade, flow = 1.0, 1.0
     # The bow yaws about the course that the vessel keeps.
     ch, sh = cp, sp
@@ -225,45 +268,60 @@ def _compose(course: Course, water: tuple[float, float], yaw_answer: float, p: A
         shade = exp(-p[ATTENUATION] * depth)
         flow = max(0.0, 1.0 - p[SHEAR] * depth)
     if p[OSCILLATORS] > 0.0:
-        yaw = psi + shade * yaw_answer
+        yaw = course.heading + shade * yaw_answer
         ch, sh = cos(yaw), sin(yaw)
-    v0 = u * cg * cp + flow * water[0] + shade * w0
-    v1 = u * cg * sp + flow * water[1] + shade * w1
-    v2 = -u * sg + shade * w2
-    roll = shade * (w3 * sp - w4 * cp) - p[HEEL] * u * r * (1.0 / 9.81)
-    pitch = gamma + shade * (w5 * cp + w6 * sp)
+    v0 = u * cg * cp + flow * water[0] + shade * waves.north
+    v1 = u * cg * sp + flow * water[1] + shade * waves.east
+    v2 = -u * course.sin_path + shade * waves.down
+    roll = shade * (waves.roll_north * sp - waves.roll_east * cp) - p[HEEL] * u * course.yaw_rate * (1.0 / 9.81)
+    pitch = course.path + shade * (waves.pitch_north * cp + waves.pitch_east * sp)
     if p[HAS_HULL] > 0.0:
         v0, v1 = v0 - sway * sp, v1 + sway * cp
-    return (v0, v1, v2), roll, pitch, ch, sh
+    return Composed((v0, v1, v2), roll, pitch, ch, sh)
 
 
 @helper(borrows=True)
 def _course(x: Array) -> Course:
     """The course of a state."""
-    return (
-        x[U], x[R], x[PSI], x[COS_PSI], x[SIN_PSI], x[GAMMA], x[COS_GAMMA], x[SIN_GAMMA], x[DEPTH_CALM],
-        x[HULL_STATE + SWAY],
-    )  # fmt: skip
+    return Course(
+        speed=x[U],
+        yaw_rate=x[R],
+        heading=x[PSI],
+        cos_heading=x[COS_PSI],
+        sin_heading=x[SIN_PSI],
+        path=x[GAMMA],
+        cos_path=x[COS_GAMMA],
+        sin_path=x[SIN_GAMMA],
+        depth=x[DEPTH_CALM],
+        sway=x[HULL_STATE + SWAY],
+    )
 
 
 @helper(borrows=True)
 def _course_at(block: Array, k: int) -> Course:
     """The course at the end of interval k."""
-    return (
-        block[COURSE, k], block[COURSE + 1, k], block[COURSE + 2, k], block[COURSE + 3, k], block[COURSE + 4, k],
-        block[COURSE + 5, k], block[COURSE + 6, k], block[COURSE + 7, k], block[DEPTHS, k], block[DEPTHS + 1, k],
-    )  # fmt: skip
+    return Course(
+        speed=block[COURSE, k],
+        yaw_rate=block[COURSE + 1, k],
+        heading=block[COURSE + 2, k],
+        cos_heading=block[COURSE + 3, k],
+        sin_heading=block[COURSE + 4, k],
+        path=block[COURSE + 5, k],
+        cos_path=block[COURSE + 6, k],
+        sin_path=block[COURSE + 7, k],
+        depth=block[DEPTHS, k],
+        sway=block[DEPTHS + 1, k],
+    )
 
 
 @helper(borrows=True)
 def _through_water(p: Array, course: Course) -> tuple[float, float]:
     """Velocity through the water, north and east [m/s], without the waves."""
-    u, _, _, cp, sp, _, cg, _, _, sway = course
-    ahead = u * cg
-    north, east = ahead * cp, ahead * sp
+    ahead = course.speed * course.cos_path
+    north, east = ahead * course.cos_heading, ahead * course.sin_heading
     if p[HAS_HULL] > 0.0:
-        north -= sway * sp
-        east += sway * cp
+        north -= course.sway * course.sin_heading
+        east += course.sway * course.cos_heading
     return north, east
 
 
@@ -285,10 +343,9 @@ def _sail(x: Array, p: Array, rate_command: float, time: float, decay: tuple[flo
     h[SPEED], h[SPEED_CHANGE] = _lag(h[SPEED], h[SPEED_CHANGE], x[SPEED_COMMAND], dt, p[TAU_U], decay[0])
     h[RATE], h[RATE_CHANGE] = _lag(h[RATE], h[RATE_CHANGE], rate_command, dt, p[TAU_R], decay[1])
     flow = max(0.0, 1.0 - p[SHEAR] * max(0.0, x[DEPTH_CALM]))
-    x[U], x[DU], x[R], x[DR], x[PSI] = sail(
-        p[HULL_NUMBERS:PARAMETERS], h, (x[U], x[R], x[PSI]), (p[TAU_U], p[TAU_R]),
-        (flow * x[WATER_NORTH], flow * x[WATER_EAST]), time, dt,
-    )  # fmt: skip
+    water = flow * x[WATER_NORTH], flow * x[WATER_EAST]
+    at = sail(p[HULL_NUMBERS:PARAMETERS], h, (x[U], x[R], x[PSI]), (p[TAU_U], p[TAU_R]), water, time, dt)
+    x[U], x[DU], x[R], x[DR], x[PSI] = at.surge, at.surge_change, at.yaw_rate, at.yaw_rate_change, at.heading
 
 
 @kernel
@@ -301,15 +358,25 @@ def initialise(x: Vector, p: Vector, phase: Matrix, table: Matrix, eddies: Matri
     w = wave_responses(phase, table, north, east, 0.0)
     if p[OSCILLATORS] > 0.0:
         own = p[OSCILLATORS:HAS_HULL]
-        w = answers(x[ANSWERS:HULL_STATE], own, w, course[3], course[4], phase, table, 0.0, transitions(own, 0.0))
-    v, roll, pitch, ch, sh = _compose(course, (x[WATER_NORTH], x[WATER_EAST]), x[YAW_ANSWER], p, w)
-    x[V], x[V + 1], x[V + 2] = v
-    cr, sr = cosine_sine(roll)
-    ct, st = cosine_sine(pitch)
-    c = matrix(cr, sr, ct, st, ch, sh)
+        w = answers(
+            x[ANSWERS:HULL_STATE],
+            own,
+            w,
+            course.cos_heading,
+            course.sin_heading,
+            phase,
+            table,
+            0.0,
+            transitions(own, 0.0),
+        )
+    now = _compose(course, (x[WATER_NORTH], x[WATER_EAST]), x[YAW_ANSWER], p, w)
+    x[V], x[V + 1], x[V + 2] = now.velocity
+    cr, sr = cosine_sine(now.roll)
+    ct, st = cosine_sine(now.pitch)
+    c = matrix(cr, sr, ct, st, now.cos_bow, now.sin_bow)
     for i in range(9):
         x[C + i] = c[i]
-    x[ROLL], x[PITCH] = roll, pitch
+    x[ROLL], x[PITCH] = now.roll, now.pitch
 
 
 @helper(borrows=True)
@@ -347,10 +414,11 @@ def _steer(x: Array, index: Integers, p: Array, plan: tuple[Array, Array], block
         if x[PSI] != psi:
             psi = x[PSI]
             x[COS_PSI], x[SIN_PSI] = cos(psi), sin(psi)
-        (
-            block[COURSE, k], block[COURSE + 1, k], block[COURSE + 2, k], block[COURSE + 3, k], block[COURSE + 4, k],
-            block[COURSE + 5, k], block[COURSE + 6, k], block[COURSE + 7, k], block[DEPTHS, k], block[DEPTHS + 1, k],
-        ) = _course(x)  # fmt: skip
+        course = _course(x)
+        block[COURSE, k], block[COURSE + 1, k], block[COURSE + 2, k] = course.speed, course.yaw_rate, course.heading
+        block[COURSE + 3, k], block[COURSE + 4, k] = course.cos_heading, course.sin_heading
+        block[COURSE + 5, k], block[COURSE + 6, k], block[COURSE + 7, k] = course.path, course.cos_path, course.sin_path
+        block[DEPTHS, k], block[DEPTHS + 1, k] = course.depth, course.sway
 
 
 @helper(borrows=True)
@@ -378,12 +446,13 @@ def _drift(
         north, east = _through_water(p, course)
         waves = wave_responses(phase, table, north, east, dt)
         if p[OSCILLATORS] > 0.0:
-            waves = answers(swell, own, waves, course[3], course[4], phase, table, dt, by)
+            waves = answers(swell, own, waves, course.cos_heading, course.sin_heading, phase, table, dt, by)
         _water(x, p, eddies, (time + k + 1) * dt)
-        v, roll, pitch, ch, sh = _compose(course, (x[WATER_NORTH], x[WATER_EAST]), x[YAW_ANSWER], p, waves)
+        now = _compose(course, (x[WATER_NORTH], x[WATER_EAST]), x[YAW_ANSWER], p, waves)
+        v = now.velocity
         block[VELOCITY, k + 1], block[VELOCITY + 1, k + 1], block[VELOCITY + 2, k + 1] = v
-        block[ANGLES, k + 1], block[ANGLES + 1, k + 1] = roll, pitch
-        block[BOW, k], block[BOW + 1, k] = ch, sh
+        block[ANGLES, k + 1], block[ANGLES + 1, k + 1] = now.roll, now.pitch
+        block[BOW, k], block[BOW + 1, k] = now.cos_bow, now.sin_bow
         block[FLOW, k], block[FLOW + 1, k] = x[WATER_NORTH], x[WATER_EAST]
         x[NORTH] += 0.5 * dt * (block[VELOCITY, k] + v[0])
         x[EAST] += 0.5 * dt * (block[VELOCITY + 1, k] + v[1])

@@ -26,10 +26,9 @@ def one_by_one(time: Vector, velocity: Matrix, dcm: Stack, memory: Vector, posit
             memory,
             time[k + 1] - time[k],
         )
-        for i in range(6):
-            samples[k, i] = out[i]
         for i in range(3):
-            position[k + 1, i] = position[k, i] + out[6 + i]
+            samples[k, i], samples[k, 3 + i] = out.angular_rate[i], out.specific_force[i]
+            position[k + 1, i] = position[k, i] + out.displacement[i]
 
 
 def voyage(n: int, interval: float, turning: float) -> tuple[Array, Array, Array]:
