@@ -438,7 +438,7 @@ class OwnObservation:
 
         A reading has it by the swing of a lever arm. `linearise` leaves it out: a filter that subtracts its estimate of
         the gyroscopes' bias from the rate is left with the error of that estimate, which is small. A model whose rate
-        is not corrected needs it (`simnav.estimators.models.about_truth`).
+        is not corrected needs it (`simnav.estimators.models.truth_linearised`).
         """
         jacobian = np.zeros((len(self.kind.components), 3))
         reading = self.read(point)

@@ -10,7 +10,6 @@ import pytest
 from simnav.blocks import StateBlock
 from simnav.estimator import make
 from simnav.estimators.models import declared_errors
-from simnav.estimators.models.about_truth import AboutTruthModel
 from simnav.estimators.models.chain import chain_of
 from simnav.estimators.models.channels import by_channel
 from simnav.estimators.models.declared_errors import DeclaredError, error_of_fault, errors_of, errors_of_triad
@@ -20,6 +19,7 @@ from simnav.estimators.models.inertial_points import InertialPoints
 from simnav.estimators.models.ship import ShipModel
 from simnav.estimators.models.state_blocks import StateBlocks
 from simnav.estimators.models.sum_of_processes import apart, merged, with_variance
+from simnav.estimators.models.truth_linearised import TruthLinearisedModel
 from simnav.plugins import import_file
 from simnav.scenario import load
 from simnav.source import record
@@ -163,7 +163,7 @@ def initial_variances(plugins) -> dict[str, tuple[float, int]]:
     for name, model, instruments in (
         ("filter", InertialModel(), aids),
         ("points", InertialPoints(), aids),
-        ("oracle", AboutTruthModel(recording.data.truth), aids),
+        ("oracle", TruthLinearisedModel(recording.data.truth), aids),
         ("ship", ShipModel(), no_imu),
         ("general", general(), no_imu),
     ):

@@ -9,11 +9,11 @@ import pytest
 
 from simnav.blocks import LEVER_ARM
 from simnav.estimator import make
-from simnav.estimators.models.about_truth import AboutTruthModel
 from simnav.estimators.models.channels import by_channel, reading_of
 from simnav.estimators.models.inertial import InertialModel
 from simnav.estimators.models.levered import with_lever_arms
 from simnav.estimators.models.own_observation import OwnObservation
+from simnav.estimators.models.truth_linearised import TruthLinearisedModel
 from simnav.estimators.solvers.kalman import KalmanEstimator
 from simnav.geometry.rotation import dcm_from_rpy
 from simnav.recording import Recording
@@ -166,7 +166,7 @@ def test_without_such_figures_nothing_changes(recording: Recording):
 def test_the_oracle_has_the_swing_by_the_bias_of_the_gyroscopes(scenario, source):
     """Its nominal rate is as measured: a bias of the rate moves the innovation by the Jacobian times the bias."""
     recording = record(scenario.model_copy(update={"duration": 2.0}), 1)
-    model = AboutTruthModel(recording.data.truth)
+    model = TruthLinearisedModel(recording.data.truth)
     model.begin(recording.start, by_channel(recording.instruments))
     stream = recording.data.aids[source.partition(":")[0]]
     reading = reading_of(next(m for m in stream.measurements() if source.endswith(m.channel)))

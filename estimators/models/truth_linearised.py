@@ -54,13 +54,13 @@ from simnav.types import (
 from .base import ErrorModel, Linearised
 from .declared_errors import errors_of, errors_of_triad
 from .equations import equation_of
-from .factors_about_truth import FactorsAboutTruth
 from .inertial import InertialModel, roll_pitch_yaw
 from .propagation import correct_inertial
 from .state_blocks import StateBlocks
 from .sum_of_processes import apart, merged
+from .truth_linearised_factors import TruthLinearisedFactors
 
-__all__ = ["AboutTruthModel"]
+__all__ = ["TruthLinearisedModel"]
 
 _NAV, _INERTIAL = 9, 15
 #: Times closer than this are one and the same [s].
@@ -86,10 +86,10 @@ class _AidErrors(NamedTuple):
     scale: int
     misalignment: int
     deviation: int
-    processes: list[tuple[int, int, FactorsAboutTruth]]
+    processes: list[tuple[int, int, TruthLinearisedFactors]]
 
 
-class AboutTruthModel(ErrorModel):
+class TruthLinearisedModel(ErrorModel):
     """The model of the module.
 
     Parameters
@@ -188,11 +188,11 @@ class AboutTruthModel(ErrorModel):
             timing=None,  # the times of validity are known
         )  # fmt: skip
 
-    def _processes(self, sheet: Datasheet) -> list[tuple[int, int, FactorsAboutTruth]]:
+    def _processes(self, sheet: Datasheet) -> list[tuple[int, int, TruthLinearisedFactors]]:
         """Make the states of the processes that a datasheet declares by name, each as it is."""
         found = []
         for process in sheet.processes:
-            factors = FactorsAboutTruth(process.factors, self.truth)
+            factors = TruthLinearisedFactors(process.factors, self.truth)
             block = process.block if process.exact is None else process.exact
             for component, rates in enumerate(block.rates()):
                 label = f"{process.name}_of_{component}"
