@@ -13,7 +13,7 @@ apart. One more process of an error is one more block here, and nothing else.
 - a lasting fault, for estimators that know the faults: its size (`error_of_fault`)
 
 What an instrument needs beyond that it brings along in its datasheet (`Datasheet.blocks`): the error of its lever arm
-if ``lever_arm_sigma`` says how well that was measured (`simnav.estimators.models.levered`), and whatever an instrument
+if ``lever_arm_sigma`` says how well that was measured (`simnav.estimators.models.lever_arms`), and whatever an instrument
 of somebody else depends on.
 """
 

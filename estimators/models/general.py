@@ -39,7 +39,7 @@ from .chain import Chain, chain_of
 from .columns import Columns
 from .declared_errors import bias_of
 from .equations import EQUATIONS, equation_of
-from .levered import is_own, with_lever_arms
+from .lever_arms import has_measurement_function, with_lever_arms
 from .moving_chain import MovingChain, MovingModel
 from .own_observation import OwnObservation
 from .points import PointModel
@@ -150,7 +150,7 @@ class GeneralModel(PointModel, MovingModel):
                 if error in self.errors:
                     first = self.blocks.add(name, error, rates) - self.n_own
                     at[error] = slice(first, first + len(rates))
-        brought = [s for s in self.sheets.values() if is_own(s)]
+        brought = [s for s in self.sheets.values() if has_measurement_function(s)]
         self.blocks.bring(brought)
         self.own = {s.name: OwnObservation(s, self.blocks.places(s.name, self.n_own), start.time) for s in brought}
         self.size = self.blocks.size

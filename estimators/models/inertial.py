@@ -63,7 +63,7 @@ from .delayed import is_delayed
 from .equations import EQUATIONS, equation_of
 from .filtering import AidTable, Dynamics, ModelFunctions
 from .inertial_functions import INERTIAL_FUNCTIONS
-from .levered import is_own, with_lever_arms
+from .lever_arms import has_measurement_function, with_lever_arms
 from .many_readings import of_instruments
 from .measurements import (
     HEADING,
@@ -262,7 +262,7 @@ class InertialModel(ErrorModel):
                 self.bias_at.get(sheet.name, -1), self.scale_at.get(sheet.name, -1),
             )  # fmt: skip
         self._more_blocks()
-        own = [sheet for sheet in observed if is_own(sheet)]
+        own = [sheet for sheet in observed if has_measurement_function(sheet)]
         if self.calibrate:
             self.blocks.bring(own)
         for sheet in own:

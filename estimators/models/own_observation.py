@@ -32,7 +32,7 @@ from simnav.types import KINDS, NO_SIDE, Array, Datasheet
 from .ambiguity import innovation_of
 from .channels import ChannelDatasheet, whole
 from .delayed import acceleration, is_delayed
-from .levered import observation_of
+from .lever_arms import observation_of
 
 __all__ = ["OwnObservation"]
 
@@ -53,7 +53,7 @@ class OwnObservation:
     Parameters
     ----------
     sheet : Datasheet
-        Datasheet of an instrument that is observed by a function (`simnav.estimators.models.levered.is_own`). For one
+        Datasheet of an instrument that is observed by a function (`simnav.estimators.models.lever_arms.has_measurement_function`). For one
         with channels it is that of a channel (`simnav.estimators.models.channels.by_channel`); the function receives
         that of the instrument.
     places : mapping of str to int, optional

@@ -37,7 +37,7 @@ from .base import ErrorModel, Linearised
 from .declared_errors import bias_of
 from .equations import equation_of
 from .filtering import AidTable, Dynamics, ModelFunctions
-from .levered import is_own, with_lever_arms
+from .lever_arms import has_measurement_function, with_lever_arms
 from .many_readings import of_instruments
 from .measurements import wrap
 from .moving_chain import MovingModel
@@ -194,7 +194,7 @@ class ShipModel(MovingModel):
         self.scale_at: dict[str, int] = {}
         for sheet in instruments.values():
             self._calibrate(sheet)
-        self.blocks.bring(s for s in instruments.values() if is_own(s) and self.observes(s))
+        self.blocks.bring(s for s in instruments.values() if has_measurement_function(s) and self.observes(s))
         self.size = n = self.blocks.size
         variance, decay, density = self.blocks.columns(U)
         self.decay, self.density = np.concatenate([[0.0, 0.0], decay]), np.concatenate([[0.0, 0.0], density])
@@ -237,7 +237,7 @@ class ShipModel(MovingModel):
 
     def _calibrate(self, sheet: Datasheet) -> None:
         """The states of an instrument where the compiled loops expect them: the bias of what it measures, and scale."""
-        equation, own = equation_of(sheet), is_own(sheet)
+        equation, own = equation_of(sheet), has_measurement_function(sheet)
         if own and not self.observes(sheet):
             return
         if not own and not (equation.is_heading or equation.is_position or equation.through_water):
@@ -256,7 +256,7 @@ class ShipModel(MovingModel):
         for name, sheet in self.instruments.items():
             if not self.observes(sheet):
                 continue
-            if is_own(sheet):
+            if has_measurement_function(sheet):
                 bias_at, white, places = self.bias_at.get(name, -1), _white(sheet), self.blocks.places(name, 0)
                 self.own[name] = ShipObservation(sheet, places, bias_at, white, self._height_variance, self.sway**2)
             else:

@@ -26,10 +26,10 @@ from .declared_errors import errors_of
 from .delayed import is_delayed, observation_at_delay, with_delay
 from .equations import equation_of
 
-__all__ = ["is_own", "observation_of", "with_lever_arms"]
+__all__ = ["has_measurement_function", "observation_of", "with_lever_arms"]
 
 
-def is_own(sheet: Datasheet) -> bool:
+def has_measurement_function(sheet: Datasheet) -> bool:
     """Whether an instrument is observed by a function, and not by a compiled equation."""
     return KINDS[sheet.kind].observation is not None or _has_states(sheet)
 

@@ -11,7 +11,7 @@ from simnav.blocks import LEVER_ARM
 from simnav.estimator import make
 from simnav.estimators.models.channels import by_channel, reading_of
 from simnav.estimators.models.inertial import InertialModel
-from simnav.estimators.models.levered import with_lever_arms
+from simnav.estimators.models.lever_arms import with_lever_arms
 from simnav.estimators.models.own_observation import OwnObservation
 from simnav.estimators.models.truth_linearised import TruthLinearisedModel
 from simnav.estimators.solvers.kalman import KalmanEstimator
