@@ -25,7 +25,7 @@ from simnav.types import (
 
 from .filtering import AidTable, Dynamics, ModelFunctions
 from .many_readings import ManyReadings
-from .own_observation import OwnObservation
+from .measurement_functions import MeasurementFunction
 from .propagation import Samples
 
 __all__ = ["NO_SAMPLES", "ErrorModel", "Linearised", "Observation"]
@@ -66,7 +66,7 @@ class ErrorModel(ABC):
         Number n of components of the error.
     time : float
         Time of the state [s].
-    own : mapping of str to OwnObservation
+    own : mapping of str to MeasurementFunction
         The observed instruments whose kind has a measurement equation of its own.
     many : sequence of ManyReadings
         Of these, the instruments with channels whose kind can predict many readings at one time.
@@ -74,7 +74,7 @@ class ErrorModel(ABC):
 
     size: int
     time: float
-    own: Mapping[str, OwnObservation] = MappingProxyType({})
+    own: Mapping[str, MeasurementFunction] = MappingProxyType({})
     many: Sequence[ManyReadings] = ()
     #: Whether `estimate` reports all states of instruments (`simnav.types.Estimate.states`), or only the blocks that
     #: instruments bring along.

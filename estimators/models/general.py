@@ -40,8 +40,8 @@ from .columns import Columns
 from .declared_errors import bias_of
 from .equations import EQUATIONS, equation_of
 from .lever_arms import has_measurement_function, with_lever_arms
+from .measurement_functions import MeasurementFunction
 from .moving_chain import MovingChain, MovingModel
-from .own_observation import OwnObservation
 from .points import PointModel
 from .state_blocks import StateBlocks
 from .sum_of_processes import merged_states
@@ -124,7 +124,7 @@ class GeneralModel(PointModel, MovingModel):
             return reading
         return KINDS[sheet.kind].add_error(reading, errors["bias"])
 
-    def _point(self, own: OwnObservation, x: Array, time: float, extra: Array, side: Array) -> NavigationPoint:
+    def _point(self, own: MeasurementFunction, x: Array, time: float, extra: Array, side: Array) -> NavigationPoint:
         """The state at which a function predicts a reading."""
         point = self.navigation(x, time)
         return point._replace(blocks=own.blocks(extra), channel=own.channel, side=side)
@@ -152,7 +152,7 @@ class GeneralModel(PointModel, MovingModel):
                     at[error] = slice(first, first + len(rates))
         brought = [s for s in self.sheets.values() if has_measurement_function(s)]
         self.blocks.bring(brought)
-        self.own = {s.name: OwnObservation(s, self.blocks.places(s.name, self.n_own), start.time) for s in brought}
+        self.own = {s.name: MeasurementFunction(s, self.blocks.places(s.name, self.n_own), start.time) for s in brought}
         self.size = self.blocks.size
         self.extra = np.zeros(self.size - self.n_own)
         variance, _, _ = self.blocks.columns(self.n_own)

@@ -65,6 +65,7 @@ from .filtering import AidTable, Dynamics, ModelFunctions
 from .inertial_functions import INERTIAL_FUNCTIONS
 from .lever_arms import has_measurement_function, with_lever_arms
 from .many_readings import of_instruments
+from .measurement_functions import MeasurementFunction
 from .measurements import (
     HEADING,
     Aid,
@@ -72,7 +73,6 @@ from .measurements import (
     has_heading,
     observe,
 )
-from .own_observation import OwnObservation
 from .propagation import (
     MOTION_NUMBERS,
     TURN_TIME,
@@ -115,7 +115,7 @@ class InertialModel(ErrorModel):
     aid_parameters : dict of str to Aid
         Parameters of each instrument for `simnav.estimators.models.measurements.observe_inertial`: code, lever arm, and
         the indices of its first bias and of its scale factor (-1: none).
-    own : dict of str to OwnObservation
+    own : dict of str to MeasurementFunction
         The instruments whose kind has a measurement equation of its own; their code is `OWN`.
     noise : dict of str to (d, d) array
         Covariance of the white noise of each instrument.
@@ -241,7 +241,7 @@ class InertialModel(ErrorModel):
         self.noise: dict[str, Array] = {}
         self.uncalibrated: set[str] = set()
         self.aid_parameters: dict[str, Aid] = {}
-        self.own: dict[str, OwnObservation] = {}
+        self.own: dict[str, MeasurementFunction] = {}
         observed = [sheet for sheet in self.instruments.values() if self.observes(sheet)]
         for sheet in observed:
             bias, equation, states = bias_of(sheet), equation_of(sheet), merged_states(sheet)
@@ -266,7 +266,7 @@ class InertialModel(ErrorModel):
         if self.calibrate:
             self.blocks.bring(own)
         for sheet in own:
-            self.own[sheet.name] = OwnObservation(sheet, self.blocks.places(sheet.name, _NAV), self._since)
+            self.own[sheet.name] = MeasurementFunction(sheet, self.blocks.places(sheet.name, _NAV), self._since)
         self.delayed = any(is_delayed(sheet) for sheet in own)
         self.many = of_instruments(self.own, self.bias_at)
         self._many_of = {name: many for many in self.many for name in many.sources}

@@ -2,7 +2,7 @@
 
 Their datasheet brings a block of states ``lever_arm`` along (`simnav.sensors.AidSpec.blocks`). The compiled loops have
 no place for it. So here the equation is a function with states, like that of a kind of somebody else
-(`simnav.estimators.models.own_observation`). The scale factor and the misalignment become blocks, too.
+(`simnav.estimators.models.measurement_functions`). The scale factor and the misalignment become blocks, too.
 
 With position p, velocity v, direction cosine matrix C, lever arm l and body rate w relative to the Earth, the
 derivatives by the error of the lever arm are (Groves 2013, section 14.3): ``C`` for a position, ``C [w x]`` for a

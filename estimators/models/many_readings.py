@@ -2,7 +2,7 @@
 
 A window predicts each reading of each of its nodes again in every iteration: 20 satellites in 20 nodes are 400 calls of
 a Python function. A kind that has `simnav.kinds.Kind.observations` is called once instead. The result is that of
-`simnav.estimators.models.own_observation`, reading by reading.
+`simnav.estimators.models.measurement_functions`, reading by reading.
 """
 
 from __future__ import annotations
@@ -20,19 +20,19 @@ from simnav.types import Array
 
 from .ambiguity import innovation_of
 from .channels import ChannelDatasheet, whole
-from .own_observation import OwnObservation
+from .measurement_functions import MeasurementFunction
 
 __all__ = ["ManyReadings", "of_instruments"]
 
 
 def of_instruments(
-    own: Mapping[str, OwnObservation], bias_at: Mapping[str, int], form: type[ManyReadings] | None = None
+    own: Mapping[str, MeasurementFunction], bias_at: Mapping[str, int], form: type[ManyReadings] | None = None
 ) -> list[ManyReadings]:
     """One `ManyReadings` for each instrument with channels whose kind can predict many readings at one time.
 
     Parameters
     ----------
-    own : mapping of str to OwnObservation
+    own : mapping of str to MeasurementFunction
         The equation of each source of readings, by its name.
     bias_at : mapping of str to int
         Index in the error state of the first bias of a source; sources without one are not in it.
@@ -52,7 +52,7 @@ class ManyReadings:
 
     Parameters
     ----------
-    own : mapping of str to OwnObservation
+    own : mapping of str to MeasurementFunction
         The equation of each channel, by its source.
     bias_at : mapping of str to int
         As of `of_instruments`.
@@ -62,10 +62,10 @@ class ManyReadings:
     biased : bool
         Whether a channel has biases. Filters take such channels one by one; a change needs new versions of their rows.
     has_noise : bool
-        Whether the noise of a reading depends on the state (`OwnObservation.has_noise`).
+        Whether the noise of a reading depends on the state (`MeasurementFunction.has_noise`).
     """
 
-    def __init__(self, own: Mapping[str, OwnObservation], bias_at: Mapping[str, int]):
+    def __init__(self, own: Mapping[str, MeasurementFunction], bias_at: Mapping[str, int]):
         first = next(iter(own.values()))
         assert isinstance(first.sheet, ChannelDatasheet)
         assert first.observations is not None
@@ -159,7 +159,7 @@ class ManyReadings:
         jacobian[:, :, :9] = given
 
     def more_noise(self, sides: Sequence[Array]) -> Array | None:
-        """`OwnObservation.noise_without_state` of n readings.
+        """`MeasurementFunction.noise_without_state` of n readings.
 
         Each sigma is computed by itself: functions of NumPy may differ in the last digit between one number and many.
 

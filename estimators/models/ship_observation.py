@@ -20,7 +20,7 @@ from simnav.types import NO_SIDE, Array, Datasheet
 from .ambiguity import innovation_of
 from .base import Linearised
 from .many_readings import ManyReadings
-from .own_observation import OwnObservation
+from .measurement_functions import MeasurementFunction
 from .ship_kernels import CE, CN, PSI, E, N, R, U
 
 __all__ = ["HEEL", "VERTICAL_SPEED", "ShipObservation", "ShipReadings"]
@@ -31,7 +31,7 @@ HEEL = 0.03
 VERTICAL_SPEED = 1.0
 
 
-class ShipObservation(OwnObservation):
+class ShipObservation(MeasurementFunction):
     """The measurement equation of one instrument on a ship.
 
     Parameters

@@ -17,7 +17,7 @@ from simnav.estimators.models.channels import by_channel, owners
 from simnav.estimators.models.columns import Columns
 from simnav.estimators.models.delayed import DELAY
 from simnav.estimators.models.inertial import InertialModel
-from simnav.estimators.models.own_observation import OwnObservation
+from simnav.estimators.models.measurement_functions import MeasurementFunction
 from simnav.estimators.models.ship import ShipModel
 from simnav.estimators.solvers.admission import Admission, together
 from simnav.geometry.earth import relative_position
@@ -148,8 +148,8 @@ def test_an_unknown_delay_has_no_such_form():
     given = BEAMS + "timing = { offset_s = 0.05 }"
     sheet = by_channel(Scenario.from_toml(tomllib.loads(given), source="beams").instruments_sheet())["beams:2"]
     late = replace(sheet, blocks=(*sheet.blocks, StateBlock(DELAY, 1, "s", 0.05)))
-    assert OwnObservation(sheet).observations is not None
-    assert OwnObservation(late).observations is None
+    assert MeasurementFunction(sheet).observations is not None
+    assert MeasurementFunction(late).observations is None
 
 
 @pytest.mark.parametrize("name", ["sw-fgo", "gnc-fgo"])

@@ -34,7 +34,7 @@ from .channels import ChannelDatasheet, whole
 from .delayed import acceleration, is_delayed
 from .lever_arms import observation_of
 
-__all__ = ["OwnObservation"]
+__all__ = ["MeasurementFunction"]
 
 #: Number of columns of an observation's Jacobian: position, velocity, attitude.
 _COMPONENTS = 9
@@ -47,7 +47,7 @@ _RATE_STEP = 1e-2
 _NONE: Mapping[str, Array] = MappingProxyType({})
 
 
-class OwnObservation:
+class MeasurementFunction:
     """The measurement equation of one instrument, or of one of its channels.
 
     Parameters
@@ -101,7 +101,7 @@ class OwnObservation:
             s * _PART_OF_SIGMA or _SMALLEST_STEP for b in sheet.blocks for s in np.atleast_1d(b.sigma).tolist()
         ]
 
-    def __deepcopy__(self, memo: object) -> OwnObservation:
+    def __deepcopy__(self, memo: object) -> MeasurementFunction:
         """Itself: it never changes, and an estimator that takes late readings is copied in each step."""
         return self
 
