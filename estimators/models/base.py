@@ -23,8 +23,8 @@ from simnav.types import (
     Measurement,
 )
 
+from .channel_readings import ChannelReadings
 from .filtering import AidTable, Dynamics, ModelFunctions
-from .many_readings import ManyReadings
 from .measurement_functions import MeasurementFunction
 from .propagation import Samples
 
@@ -68,14 +68,14 @@ class ErrorModel(ABC):
         Time of the state [s].
     own : mapping of str to MeasurementFunction
         The observed instruments whose kind has a measurement equation of its own.
-    many : sequence of ManyReadings
+    many : sequence of ChannelReadings
         Of these, the instruments with channels whose kind can predict many readings at one time.
     """
 
     size: int
     time: float
     own: Mapping[str, MeasurementFunction] = MappingProxyType({})
-    many: Sequence[ManyReadings] = ()
+    many: Sequence[ChannelReadings] = ()
     #: Whether `estimate` reports all states of instruments (`simnav.types.Estimate.states`), or only the blocks that
     #: instruments bring along.
     reports_all: bool = False

@@ -45,8 +45,8 @@ from simnav.types import (
 )
 
 from .base import ErrorModel, Linearised
+from .channel_readings import ChannelReadings as ManyReadings
 from .columns import Columns, Made, Selection
-from .many_readings import ManyReadings
 
 __all__ = ["STEPPED", "Chain", "attach_one", "begin_motion", "chain_of"]
 

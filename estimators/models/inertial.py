@@ -58,13 +58,13 @@ from simnav.types import (
 )
 
 from .base import NO_SAMPLES, ErrorModel, Linearised
+from .channel_readings import channel_readings_of
 from .declared_errors import CURRENT, bias_of, bias_of_triad
 from .delayed import is_delayed
 from .equations import EQUATIONS, equation_of
 from .filtering import AidTable, Dynamics, ModelFunctions
 from .inertial_functions import INERTIAL_FUNCTIONS
 from .lever_arms import has_measurement_function, with_lever_arms
-from .many_readings import of_instruments
 from .measurement_functions import MeasurementFunction
 from .measurements import (
     HEADING,
@@ -268,7 +268,7 @@ class InertialModel(ErrorModel):
         for sheet in own:
             self.own[sheet.name] = MeasurementFunction(sheet, self.blocks.places(sheet.name, _NAV), self._since)
         self.delayed = any(is_delayed(sheet) for sheet in own)
-        self.many = of_instruments(self.own, self.bias_at)
+        self.many = channel_readings_of(self.own, self.bias_at)
         self._many_of = {name: many for many in self.many for name in many.sources}
         #: Of these: the noise without that of the datasheet, and a unit matrix.
         self._beyond: dict[str, tuple[Array, Array]] = {}

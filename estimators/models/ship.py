@@ -34,11 +34,11 @@ from simnav.estimator.needs import Needs
 from simnav.types import KINDS, NO_SIDE, Array, Datasheet, Estimate, InitialState, Instruments, Measurement
 
 from .base import ErrorModel, Linearised
+from .channel_readings import channel_readings_of
 from .declared_errors import bias_of
 from .equations import equation_of
 from .filtering import AidTable, Dynamics, ModelFunctions
 from .lever_arms import has_measurement_function, with_lever_arms
-from .many_readings import of_instruments
 from .measurements import wrap
 from .moving_chain import MovingModel
 from .ship_functions import SHIP_FUNCTIONS, SHIP_NUMBERS, ship_state
@@ -263,7 +263,7 @@ class ShipModel(MovingModel):
                 kind, numbers = _aid(sheet, self.sway)
                 code = np.array([kind, self.bias_at.get(name, -1), self.scale_at.get(name, -1)], dtype=np.int64)
                 self.aids[name] = code, np.array(numbers), 1 if kind in (HEADING, LOG) else 2
-        self.many = of_instruments(self.own, self.bias_at, ShipReadings)
+        self.many = channel_readings_of(self.own, self.bias_at, ShipReadings)
 
     def components(self, instrument: Datasheet) -> int:
         """Without the height and the velocity down."""

@@ -19,7 +19,7 @@ from simnav.types import NO_SIDE, Array, Datasheet
 
 from .ambiguity import innovation_of
 from .base import Linearised
-from .many_readings import ManyReadings
+from .channel_readings import ChannelReadings
 from .measurement_functions import MeasurementFunction
 from .ship_kernels import CE, CN, PSI, E, N, R, U
 
@@ -155,7 +155,7 @@ class ShipObservation(MeasurementFunction):
         return NavigationPoint(time, position, *_kinematics(x), self.blocks(x), self.channel, side)
 
 
-class ShipReadings(ManyReadings):
+class ShipReadings(ChannelReadings):
     """The readings of all channels of an instrument, at the states ``position, x`` of a ship."""
 
     def _navigation(self, states: Sequence[Array], row: NDArray[np.intp], own: Array) -> tuple[Array, ...]:

@@ -22,13 +22,13 @@ from .ambiguity import innovation_of
 from .channels import ChannelDatasheet, whole
 from .measurement_functions import MeasurementFunction
 
-__all__ = ["ManyReadings", "of_instruments"]
+__all__ = ["ChannelReadings", "channel_readings_of"]
 
 
-def of_instruments(
-    own: Mapping[str, MeasurementFunction], bias_at: Mapping[str, int], form: type[ManyReadings] | None = None
-) -> list[ManyReadings]:
-    """One `ManyReadings` for each instrument with channels whose kind can predict many readings at one time.
+def channel_readings_of(
+    own: Mapping[str, MeasurementFunction], bias_at: Mapping[str, int], form: type[ChannelReadings] | None = None
+) -> list[ChannelReadings]:
+    """One `ChannelReadings` for each instrument with channels whose kind can predict many readings at one time.
 
     Parameters
     ----------
@@ -37,17 +37,17 @@ def of_instruments(
     bias_at : mapping of str to int
         Index in the error state of the first bias of a source; sources without one are not in it.
     form : type, optional
-        The class for the states of the model. Default: `ManyReadings`, for those of an inertial model.
+        The class for the states of the model. Default: `ChannelReadings`, for those of an inertial model.
     """
     groups: dict[str, list[str]] = {}
     for name, observation in own.items():
         sheet = observation.sheet
         if isinstance(sheet, ChannelDatasheet) and observation.observations is not None:
             groups.setdefault(sheet.instrument, []).append(name)
-    return [(form or ManyReadings)({name: own[name] for name in names}, bias_at) for names in groups.values()]
+    return [(form or ChannelReadings)({name: own[name] for name in names}, bias_at) for names in groups.values()]
 
 
-class ManyReadings:
+class ChannelReadings:
     """The measurement equation of all channels of an instrument.
 
     Parameters
@@ -55,7 +55,7 @@ class ManyReadings:
     own : mapping of str to MeasurementFunction
         The equation of each channel, by its source.
     bias_at : mapping of str to int
-        As of `of_instruments`.
+        As of `channel_readings_of`.
 
     Attributes
     ----------
@@ -81,7 +81,7 @@ class ManyReadings:
         self._at = [(b.name, slice(places[b.name], places[b.name] + b.size)) for b in stated]
         self._zeros = {b.name: np.zeros((1, b.size)) for b in first.sheet.blocks if b.name not in places}
 
-    def __deepcopy__(self, memo: object) -> ManyReadings:
+    def __deepcopy__(self, memo: object) -> ChannelReadings:
         """Itself: it never changes, and an estimator that takes late readings is copied in each step."""
         return self
 
