@@ -154,9 +154,9 @@ class ChannelReadings:
         turning = rate[:, :3] - bias[:, :3] - np.einsum("nji,nj->ni", dcm, earth_rate(position[:, 0]))
         return tuple(column.take(row, axis=0) for column in (position, velocity, dcm, turning))
 
-    def _by_navigation(self, given: Array, own: Array, jacobian: Array) -> None:
+    def _by_navigation(self, derivative: Array, own: Array, jacobian: Array) -> None:
         """Write the (n, d, 9) derivative by the navigation state into that by the error state."""
-        jacobian[:, :, :9] = given
+        jacobian[:, :, :9] = derivative
 
     def more_noise(self, sides: Sequence[Array]) -> Array | None:
         """`MeasurementFunction.noise_without_state` of n readings.

@@ -13,7 +13,7 @@ A subclass says in plain NumPy
 From these come the transition matrix, the Jacobian of each measurement, sigma points, and the chain for windows and
 full graphs (`GeneralChain`). Derivatives are central differences. A subclass may override `transition` or `read` with
 faster forms. After its own states come the errors of its instruments
-(`simnav.estimators.models.sum_of_processes.merged_states`) and the blocks that instruments bring along
+(`simnav.estimators.models.error_states.merged_states`) and the blocks that instruments bring along
 (`simnav.blocks`).
 
 `simnav.estimators.models.inertial` and `simnav.estimators.models.ship` are compiled forms of such models. In the tests
@@ -39,12 +39,12 @@ from .chain import Chain, chain_of
 from .columns import Columns
 from .declared_errors import bias_of
 from .equations import EQUATIONS, equation_of
+from .error_states import merged_states
 from .lever_arms import has_measurement_function, with_lever_arms
 from .measurement_functions import MeasurementFunction
 from .moving_chain import MovingChain, MovingModel
 from .points import PointModel
 from .state_blocks import StateBlocks
-from .sum_of_processes import merged_states
 
 __all__ = ["GeneralChain", "GeneralModel"]
 

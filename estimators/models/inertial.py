@@ -62,6 +62,7 @@ from .channel_readings import channel_readings_of
 from .declared_errors import CURRENT, bias_of, bias_of_triad
 from .delayed import is_delayed
 from .equations import EQUATIONS, equation_of
+from .error_states import merged, merged_states
 from .filtering import AidTable, Dynamics, ModelFunctions
 from .inertial_functions import INERTIAL_FUNCTIONS
 from .lever_arms import has_measurement_function, with_lever_arms
@@ -83,7 +84,6 @@ from .propagation import (
     propagate_inertial,
 )
 from .state_blocks import StateBlocks
-from .sum_of_processes import merged, merged_states
 
 __all__ = ["InertialModel", "roll_pitch_yaw"]
 

@@ -53,9 +53,9 @@ class MeasurementFunction:
     Parameters
     ----------
     sheet : Datasheet
-        Datasheet of an instrument that is observed by a function (`simnav.estimators.models.lever_arms.has_measurement_function`). For one
-        with channels it is that of a channel (`simnav.estimators.models.channels.by_channel`); the function receives
-        that of the instrument.
+        Datasheet of an instrument that is observed by a function
+        (`simnav.estimators.models.lever_arms.has_measurement_function`). For one with channels it is that of a channel
+        (`simnav.estimators.models.channels.by_channel`); the function receives that of the instrument.
     places : mapping of str to int, optional
         Index of the first state of each of its blocks in the array of values that `point` receives. A block without a
         place has no state: it is zero, and its uncertainty counts as noise.
@@ -157,11 +157,11 @@ class MeasurementFunction:
         d = len(self.kind.components)
         bare = isinstance(result, np.ndarray)
         try:
-            reading, given = (result, {}) if bare else result
+            reading, derivatives = (result, {}) if bare else result
             reading = np.asarray(reading, dtype=np.float64)
-            if not isinstance(given, Mapping):
-                given = {NAVIGATION: given}
-            blocks = {name: np.asarray(part, dtype=np.float64) for name, part in given.items()}
+            if not isinstance(derivatives, Mapping):
+                derivatives = {NAVIGATION: derivatives}
+            blocks = {name: np.asarray(part, dtype=np.float64) for name, part in derivatives.items()}
         except (TypeError, ValueError):
             raise self._wrong(repr(result)) from None
         sizes = {name: (d, at.stop - at.start) for name, at in self._columns.items()}
@@ -189,12 +189,12 @@ class MeasurementFunction:
         except Exception as error:
             raise ValueError(f"{self._label()} raised {type(error).__name__}: {error}") from error
 
-    def _wrong(self, given: str) -> ValueError:
+    def _wrong(self, returned: str) -> ValueError:
         """The error for a result of another form."""
         d = len(self.kind.components)
         message = (
             f"{self._label()} should return a reading of shape {(d,)} and its Jacobian "
-            f"of shape {(d, _COMPONENTS)}, or None, not {given}"
+            f"of shape {(d, _COMPONENTS)}, or None, not {returned}"
         )
         if self.sheet.blocks:
             sizes = ", ".join(f"{name!r}: {(d, at.stop - at.start)}" for name, at in self._columns.items())

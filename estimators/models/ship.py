@@ -7,7 +7,7 @@ time T of a state, and ' for the time derivative:
 
 - p' = u (cos psi, sin psi) + c
 - u' = white noise; psi' = r; r' = -r/T + noise; c' = -c/T + noise; biases as in
-  `simnav.estimators.models.sum_of_processes.merged`
+  `simnav.estimators.models.error_states.merged`
 
 Speed and heading are states, and log and compass are measurements of them. So their biases are estimated while there is
 GNSS, and the position is propagated through an outage. Height, roll and pitch are not estimated. A lever arm is turned
@@ -37,6 +37,7 @@ from .base import ErrorModel, Linearised
 from .channel_readings import channel_readings_of
 from .declared_errors import bias_of
 from .equations import equation_of
+from .error_states import merged_states, with_variance
 from .filtering import AidTable, Dynamics, ModelFunctions
 from .lever_arms import has_measurement_function, with_lever_arms
 from .measurements import wrap
@@ -62,7 +63,6 @@ from .ship_kernels import (
 )
 from .ship_observation import HEEL, VERTICAL_SPEED, ShipObservation, ShipReadings
 from .state_blocks import StateBlocks
-from .sum_of_processes import merged_states, with_variance
 
 __all__ = ["OBSERVED", "POSITIONS", "E", "N", "ShipModel"]
 

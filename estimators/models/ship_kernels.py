@@ -54,7 +54,7 @@ STEP = 1.0
 
 @helper
 def steps_of(elapsed: float, turn_time: float) -> tuple[int, float, float]:
-    """Number of integration steps of a stretch, their length, and the integral of the decaying turn rate over one."""
+    """Number of integration steps of an interval, their length, and the integral of the decaying turn rate over one."""
     steps = max(1, ceil(elapsed / STEP - 1e-9))
     dt = elapsed / steps
     return steps, dt, turn_time * (1.0 - exp(-dt / turn_time))

@@ -161,12 +161,12 @@ class ShipReadings(ChannelReadings):
     def _navigation(self, states: Sequence[Array], row: NDArray[np.intp], own: Array) -> tuple[Array, ...]:
         return states[0].take(row, axis=0), *_kinematics(own)
 
-    def _by_navigation(self, given: Array, own: Array, jacobian: Array) -> None:
+    def _by_navigation(self, derivative: Array, own: Array, jacobian: Array) -> None:
         c, s, u = np.cos(own[:, PSI, None]), np.sin(own[:, PSI, None]), own[:, U, None]
-        jacobian[:, :, N], jacobian[:, :, E] = given[:, :, 0], given[:, :, 1]
-        jacobian[:, :, CN], jacobian[:, :, CE] = given[:, :, 3], given[:, :, 4]
-        jacobian[:, :, U] = given[:, :, 3] * c + given[:, :, 4] * s
-        jacobian[:, :, PSI] = given[:, :, 8] + (given[:, :, 4] * c - given[:, :, 3] * s) * u
+        jacobian[:, :, N], jacobian[:, :, E] = derivative[:, :, 0], derivative[:, :, 1]
+        jacobian[:, :, CN], jacobian[:, :, CE] = derivative[:, :, 3], derivative[:, :, 4]
+        jacobian[:, :, U] = derivative[:, :, 3] * c + derivative[:, :, 4] * s
+        jacobian[:, :, PSI] = derivative[:, :, 8] + (derivative[:, :, 4] * c - derivative[:, :, 3] * s) * u
 
 
 def _kinematics(x: Array) -> tuple[Array, Array, Array]:

@@ -266,14 +266,14 @@ class InertialGraph:
         x, v, b = self.keys(node)
         origin, axes, m = self.frame.origin, self.frame.axes, len(noise)
         moving = code in (GNSS_VELOCITY, DVL, SPEED_LOG)
-        levered = moving and bool(np.any(arm))
+        with_rate = moving and bool(np.any(arm))
         still, unbiased = np.zeros(3), np.zeros(6)
 
         def error(_: Any, values: Any, jacobians: Any) -> Array:
             pose = values.atPose3(x)
             rotation = np.ascontiguousarray(pose.rotation().matrix())
             speed = values.atPoint3(v) if moving else still
-            bias = values.atConstantBias(b).vector() if levered else unbiased
+            bias = values.atConstantBias(b).vector() if with_rate else unbiased
             e, h = np.zeros(3), np.zeros((3, 15))
             state = TangentState(rotation, np.array(pose.translation()), speed, rate, bias)
             observe_tangent((code, arm), value, origin, axes, state, e, h)
@@ -281,11 +281,11 @@ class InertialGraph:
                 jacobians[0] = h[:m, :6]
                 if moving:
                     jacobians[1] = h[:m, 6:9]
-                if levered:
+                if with_rate:
                     jacobians[2] = h[:m, 9:]
             return e[:m]
 
-        keys = [x, v, b] if levered else [x, v] if moving else [x]
+        keys = [x, v, b] if with_rate else [x, v] if moving else [x]
         return gtsam.CustomFactor(gtsam.noiseModel.Gaussian.Covariance(noise), keys, error)
 
     def read(self, values: Any, node: int) -> tuple[Any, Any]:

@@ -43,8 +43,8 @@ class OracleEstimator(KalmanEstimator):
     It knows the labels and the statistics of the faults, not their values (`simnav.estimators.adaptations.truth`).
     Gross errors are rejected, and lasting errors such as multipath are states
     (`simnav.estimators.models.fault_states`). A disturbance of the IMU is subtracted from its samples. The filter is
-    linearised about the truth (`simnav.estimators.models.truth_linearised`), and knows the velocity of the water. Without an
-    IMU it knows the motion of the vessel (`simnav.estimators.models.true_motion`).
+    linearised about the truth (`simnav.estimators.models.truth_linearised`), and knows the velocity of the water.
+    Without an IMU it knows the motion of the vessel (`simnav.estimators.models.true_motion`).
 
     Parameters
     ----------

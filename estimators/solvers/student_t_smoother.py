@@ -106,7 +106,7 @@ def _forward(
     Parameters
     ----------
     transition, process : (k, n, n) array
-        Phi and process noise of the stretches.
+        Phi and process noise of the intervals.
     moved : (k + 1, n) array
         d: what the filter added to its state at each stop.
     first : (k + 2,) array of int
@@ -190,16 +190,16 @@ class StudentTSmoother(Smoother):
         super().use(correction, linearised, noise)
 
     def _backward(self, model: ErrorModel, covariance: Array) -> Iterator[tuple[int, list[Array], Array, Array]]:
-        matrices = [s.matrices() for s in self._stretches]
+        matrices = [s.matrices() for s in self._intervals]
         p, phi, m = (np.concatenate(parts) for parts in zip(*matrices, strict=True))
         process = m - phi @ p @ phi.swapaxes(1, 2)
-        # `Stretches.correction` is that at the beginning of a stretch; those of the last stop are still here.
-        moved = np.concatenate([*(s.correction[: s.count] for s in self._stretches), self._here[None]])
+        # `FilteredIntervals.correction` is that at the beginning of an interval; those of the last stop are still here.
+        moved = np.concatenate([*(s.correction[: s.count] for s in self._intervals), self._here[None]])
         first = p[0] if len(p) else covariance
         shift, spread = self._smoothed(
             np.ascontiguousarray(phi), 0.5 * (process + process.swapaxes(1, 2)), moved, first
         )
-        states = [state for s in self._stretches for state in s.states] + [model.snapshot()]
+        states = [state for s in self._intervals for state in s.states] + [model.snapshot()]
         for stop in range(len(states) - 1, -1, -1):
             yield stop, states[stop], shift[stop], spread[stop]
 

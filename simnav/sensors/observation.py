@@ -85,35 +85,35 @@ def observe_one(code: int, q: Array, tap: Array, value: Array) -> bool:
     bool
         True if the instrument delivers a measurement at this state.
     """
-    levered = q[LEVERED] > 0.0
+    has_lever_arm = q[LEVERED] > 0.0
     n, e, d = 0.0, 0.0, 0.0
-    if levered and (code <= HORIZONTAL_POSITION or code == DEPTH or q[DEPTH_OF_WATER] == q[DEPTH_OF_WATER]):
+    if has_lever_arm and (code <= HORIZONTAL_POSITION or code == DEPTH or q[DEPTH_OF_WATER] == q[DEPTH_OF_WATER]):
         n, e, d = _to_ned(tap[6], tap[7], tap[8], q[LEVER], q[LEVER + 1], q[LEVER + 2])
     wx = tap[10] * q[LEVER + 2] - tap[11] * q[LEVER + 1]
     wy = tap[11] * q[LEVER] - tap[9] * q[LEVER + 2]
     wz = tap[9] * q[LEVER + 1] - tap[10] * q[LEVER]
     if code <= HORIZONTAL_POSITION:
         latitude, longitude, height = tap[0], tap[1], tap[2]
-        if levered:
+        if has_lever_arm:
             latitude, longitude, height = displace_scalar(latitude, longitude, height, n, e, d)
         value[0], value[1] = latitude, longitude
         if code == POSITION:
             value[2] = height
     elif code == VELOCITY:
         value[0], value[1], value[2] = tap[3], tap[4], tap[5]
-        if levered:
+        if has_lever_arm:
             n, e, d = _to_ned(tap[6], tap[7], tap[8], wx, wy, wz)
             value[0], value[1], value[2] = tap[3] + n, tap[4] + e, tap[5] + d
     elif code == BODY_VELOCITY:
         x, y, z = _to_body(tap[6], tap[7], tap[8], tap[3], tap[4], tap[5])
-        if levered:
+        if has_lever_arm:
             x, y, z = x + wx, y + wy, z + wz
         for j in range(3):
             m = OWN + 3 * j
             value[j] = x * q[m] + y * q[m + 1] + z * q[m + 2]
     elif code == WATER_SPEED:
         x, _, _ = _to_body(tap[6], tap[7], tap[8], tap[3] - tap[12], tap[4] - tap[13], tap[5] - tap[14])
-        if levered:
+        if has_lever_arm:
             x += wx
         value[0] = (1.0 + q[SCALE]) * x
     elif code == COMPASS:
@@ -132,12 +132,12 @@ def observe_one(code: int, q: Array, tap: Array, value: Array) -> bool:
             value[0] = tap[8] + atan2(tap[3] / (meridian + tap[2]), north)
     else:
         depth = -tap[2]
-        if levered:
+        if has_lever_arm:
             depth = depth + d
         value[0] = (1.0 + q[SCALE]) * depth
     if code == BODY_VELOCITY and q[DEPTH_OF_WATER] == q[DEPTH_OF_WATER]:
         altitude = q[DEPTH_OF_WATER] + tap[2]
-        if levered:
+        if has_lever_arm:
             altitude -= d
         within: bool = q[LOWEST] <= altitude <= q[HIGHEST]
         return within
@@ -186,7 +186,7 @@ class CompiledInstrument(Instrument):
     def __init__(self, spec: AidSpec, name: str, seed: int):
         super().__init__(spec, name, seed)
         self.numbers = q = np.zeros(NUMBERS)
-        q[SCALE], q[LEVER : LEVER + 3], q[LEVERED] = self.scale, self.lever_arm, float(self.levered)
+        q[SCALE], q[LEVER : LEVER + 3], q[LEVERED] = self.scale, self.lever_arm, float(self.has_lever_arm)
         q[DEPTH_OF_WATER] = np.nan
         d = len(self.sigma)
         q[SIGMA : SIGMA + d], q[SIGMA_SQUARED : SIGMA_SQUARED + d] = self.sigma, self.sigma**2
