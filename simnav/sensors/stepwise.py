@@ -40,14 +40,37 @@ __all__ = [
     "sort_out",
 ]
 
-#: State of a layer that repeats values: the last value, and 1 if there is one; number of the interval, and the repeated
-#: value.
-LAST, HAS_LAST, NUMBER, VALUE = 0, 3, 4, 5
+#: Length of the array that holds a `HeldReading`.
 HELD = 8
 #: Number of the interval of a measurement that a layer does not affect.
 UNTOUCHED = -2
 #: What `sort_out` finds: a run with only the block form; one that is compiled, with an IMU, at the end of the batch.
 BLOCKS, COMPILED, INERTIAL, DUE = 1, 2, 4, 8
+
+
+class HeldReading(NamedTuple):
+    """The state of a layer that repeats values: parts of one array.
+
+    Attributes
+    ----------
+    last, has_last : (3,), (1,) array
+        The last value, and 1 if there is one.
+    number : (1,) array
+        Number of the interval, from 1 on.
+    value : (3,) array
+        The repeated value.
+    """
+
+    last: Array
+    has_last: Array
+    number: Array
+    value: Array
+
+
+@helper
+def held_reading(q: Array) -> HeldReading:
+    """The parts of an array of `HELD` numbers."""
+    return HeldReading(last=q[0:3], has_last=q[3:4], number=q[4:5], value=q[5:8])
 
 
 class BatchProgress(NamedTuple):
@@ -74,15 +97,21 @@ class TriadTables(NamedTuple):
     ----------
     matrix, bias : (b, 2, 3, 3), (b, 2, 3) array
         As of `simnav.sensors.imu.TriadErrors`.
-    numbers : (b, 2, 8) array
-        Density of the white noise, range, quantization, and points a second of both tables of `ImuDraws`.
+    density, range, step : (b, 2) array
+        As of the same.
+    instability_per_second, walk_per_second : (b, 2) array
+        Rows a second of the tables of `ImuDraws`.
     residual : (b, 2, 3) array
         Residual of the quantization; updated.
     """
 
     matrix: Hypermatrix
     bias: Stack
-    numbers: Stack
+    density: Matrix
+    range: Matrix
+    step: Matrix
+    instability_per_second: Matrix
+    walk_per_second: Matrix
     residual: Stack
 
 
@@ -95,14 +124,19 @@ class ImuDraws(NamedTuple):
         Unit variates of the samples.
     instability, walk : (b, 2, k, 3) array
         Tables of the in-run biases and of the random walks.
-    tables : (b, 2, 4) int array
-        Length and first grid point of both tables.
+    instability_rows, walk_rows : (b, 2) int array
+        Lengths of the tables.
+    instability_first, walk_first : (b, 2) int array
+        Numbers of their first rows.
     """
 
     variates: Hypermatrix
     instability: Hypermatrix
     walk: Hypermatrix
-    tables: IntegerStack
+    instability_rows: IntegerMatrix
+    instability_first: IntegerMatrix
+    walk_rows: IntegerMatrix
+    walk_first: IntegerMatrix
 
 
 class ImuSteps(NamedTuple):
@@ -329,10 +363,17 @@ def sense_imu(
             interval[b, i] = 1.0 / clock[b, 1]
         for t in range(2):
             out = rate[b, :n] if t == 0 else force[b, :n]
-            q, table = triads.numbers[b, t], drawn.tables[b, t]
-            triad = TriadErrors(triads.matrix[b, t], triads.bias[b, t], q[0], q[1], q[2])
-            in_run = HeldTable(instability[b, t, : table[0]], table[1], q[3])
-            walked = HeldTable(walk[b, t, : table[2]], table[3], q[4])
+            triad = TriadErrors(
+                triads.matrix[b, t], triads.bias[b, t], triads.density[b, t], triads.range[b, t], triads.step[b, t]
+            )
+            in_run = HeldTable(
+                instability[b, t, : drawn.instability_rows[b, t]],
+                drawn.instability_first[b, t],
+                triads.instability_per_second[b, t],
+            )
+            walked = HeldTable(
+                walk[b, t, : drawn.walk_rows[b, t]], drawn.walk_first[b, t], triads.walk_per_second[b, t]
+            )
             triad_errors(
                 out,
                 variates[b, t, begin : begin + n],
@@ -418,7 +459,7 @@ def sense(
                     continue
                 touched = number >= 0
                 if what == HOLDS:
-                    touched = _hold(layers.held[b, i, k], number, reading, d)
+                    touched = _hold(held_reading(layers.held[b, i, k]), number, reading, d)
                 elif what == DROPS:
                     if touched:
                         there = False
@@ -452,15 +493,15 @@ def sense(
 
 
 @helper
-def _hold(held: Array, number: int, reading: Array, d: int) -> bool:
+def _hold(held: HeldReading, number: int, reading: Array, d: int) -> bool:
     """Replace a reading within an interval by the last one before it (or the first within). Return whether it did."""
-    if number >= 0 and held[NUMBER] != number + 1.0:
-        held[NUMBER] = number + 1.0
+    if number >= 0 and held.number[0] != number + 1.0:
+        held.number[0] = number + 1.0
         for j in range(d):
-            held[VALUE + j] = held[LAST + j] if held[HAS_LAST] > 0.0 else reading[j]
+            held.value[j] = held.last[j] if held.has_last[0] > 0.0 else reading[j]
     for j in range(d):
-        held[LAST + j] = reading[j]
+        held.last[j] = reading[j]
         if number >= 0:
-            reading[j] = held[VALUE + j]
-    held[HAS_LAST] = 1.0
+            reading[j] = held.value[j]
+    held.has_last[0] = 1.0
     return number >= 0

@@ -188,9 +188,10 @@ class SteppedRuns:
             self._put("matrix", b, np.stack([t.matrix for t in triads]))
             self._put("bias", b, np.stack([t.bias for t in triads]))
             self._put("residual", b, np.stack([t.residual for t in triads]))
-            self._put("triads", b, np.array([
-                [t.density, t.range, t.step, t.instability.per_second, t.walk.per_second, 0.0, 0.0, 0.0] for t in triads
-            ]))  # fmt: skip
+            for name in ("density", "range", "step"):
+                self._put(name + "_of_triad", b, np.array([getattr(t, name) for t in triads], np.float64))
+            self._put("instability_per_second", b, np.array([t.instability.per_second for t in triads], np.float64))
+            self._put("walk_per_second", b, np.array([t.walk.per_second for t in triads], np.float64))
 
     # ------------------------------------------------------------------------------------------- steps
 
@@ -219,8 +220,25 @@ class SteppedRuns:
             (self.samples, self.rate, self.force),
         )  # fmt: skip
         if found & INERTIAL:
-            triads = TriadTables(self.matrix, self.bias, self.triads, self.residual)
-            draws = ImuDraws(self.variates, self.instability, self.walk, self.tables)
+            triads = TriadTables(
+                self.matrix,
+                self.bias,
+                self.density_of_triad,
+                self.range_of_triad,
+                self.step_of_triad,
+                self.instability_per_second,
+                self.walk_per_second,
+                self.residual,
+            )
+            draws = ImuDraws(
+                self.variates,
+                self.instability,
+                self.walk,
+                self.instability_rows,
+                self.instability_first,
+                self.walk_rows,
+                self.walk_first,
+            )
             disturbances = self.disturbed, self.disturbance
             sense_imu.unchecked(inertial, place, triads, draws, disturbances, self.clock, self.imu_steps)
         samples = SampleTimes(first, last, self.tap_time, self._taps, self.owner)
@@ -330,13 +348,14 @@ class SteppedRuns:
         variates = self._grown("variates", (2, n, 3), np.float64)
         both = (imu.gyroscope, imu.accelerometer)
         triads: list[Any] = [t.ahead(variates[b, i, :n], float(time[-1])) for i, t in enumerate(both)]
-        self._put("clock", b, np.array([first, rate]))
+        self._put("clock", b, np.array([first, rate], np.float64))
         for k, name in ((0, "instability"), (2, "walk")):
             table = np.zeros((2, max(len(t[k]) for t in triads), 3))
             for i in range(2):
                 table[i, : len(triads[i][k])] = triads[i][k]
             self._put(name, b, table)
-        self._put("tables", b, np.array([[len(t[0]), t[1], len(t[2]), t[3]] for t in triads]))
+            self._put(name + "_rows", b, np.array([len(t[k]) for t in triads], np.int64))
+            self._put(name + "_first", b, np.array([t[k + 1] for t in triads], np.int64))
         found = [layer.ahead_imu(time) for layer in simulator.layers if layer.operation == DISTURBS_IMU]
         active = np.stack([f[0] for f in found]) if found else np.zeros((0, n), np.bool_)
         errors = np.stack([f[1] for f in found]) if found else np.zeros((0, n, 6))
