@@ -25,7 +25,7 @@ import numpy as np
 from simnav.compiled import helper, kernel
 from simnav.geometry.earth import radii_scalar
 from simnav.geometry.rotation import rotate_left, rotation_coefficients
-from simnav.inverse_strapdown import sample_from_motion
+from simnav.inverse_strapdown import sample_from_motion, small_matrix
 from simnav.kernel_types import Matrix, Vector
 from simnav.strapdown import mechanize_step
 from simnav.types import Array, Measurement
@@ -92,8 +92,8 @@ def propagate_points(
         position[2],
         (velocity[0], velocity[1], velocity[2]),
         (next_velocity[0], next_velocity[1], next_velocity[2]),
-        (c[0, 0], c[0, 1], c[0, 2], c[1, 0], c[1, 1], c[1, 2], c[2, 0], c[2, 1], c[2, 2]),
-        (d[0, 0], d[0, 1], d[0, 2], d[1, 0], d[1, 1], d[1, 2], d[2, 0], d[2, 1], d[2, 2]),
+        small_matrix(c),
+        small_matrix(d),
         memory,
         interval,
     )

@@ -374,8 +374,9 @@ def initialise(x: Vector, p: Vector, phase: Matrix, table: Matrix, eddies: Matri
     cr, sr = cosine_sine(now.roll)
     ct, st = cosine_sine(now.pitch)
     c = matrix(cr, sr, ct, st, now.cos_bow, now.sin_bow)
-    for i in range(9):
-        x[C + i] = c[i]
+    x[C], x[C + 1], x[C + 2] = c.c00, c.c01, c.c02
+    x[C + 3], x[C + 4], x[C + 5] = c.c10, c.c11, c.c12
+    x[C + 6], x[C + 7], x[C + 8] = c.c20, c.c21, c.c22
     x[ROLL], x[PITCH] = now.roll, now.pitch
 
 

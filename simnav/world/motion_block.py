@@ -20,7 +20,7 @@ from simnav.inverse_strapdown import (
     POSITION,
     SAMPLE_ROWS,
     VELOCITY,
-    Nine,
+    SmallMatrix,
 )
 from simnav.strapdown import Triple
 
@@ -72,9 +72,9 @@ def cosine_sine(angle: float) -> tuple[float, float]:
 
 
 @helper(borrows=True)
-def matrix(cr: float, sr: float, ct: float, st: float, ch: float, sh: float) -> Nine:
+def matrix(cr: float, sr: float, ct: float, st: float, ch: float, sh: float) -> SmallMatrix:
     """Direction cosine matrix of the body axes by rows, from cosines and sines of roll, pitch and heading."""
-    return (
+    return SmallMatrix(
         ct * ch, sr * st * ch - cr * sh, cr * st * ch + sr * sh,
         ct * sh, sr * st * sh + cr * ch, cr * st * sh - sr * ch,
         -st, sr * ct, cr * ct,
@@ -82,10 +82,10 @@ def matrix(cr: float, sr: float, ct: float, st: float, ch: float, sh: float) -> 
 
 
 @helper(borrows=True)
-def _put_matrix(block: Array, k: int, c: Nine) -> None:
-    block[AXES, k], block[AXES + 1, k], block[AXES + 2, k] = c[0], c[1], c[2]
-    block[AXES + 3, k], block[AXES + 4, k], block[AXES + 5, k] = c[3], c[4], c[5]
-    block[AXES + 6, k], block[AXES + 7, k], block[AXES + 8, k] = c[6], c[7], c[8]
+def _put_matrix(block: Array, k: int, c: SmallMatrix) -> None:
+    block[AXES, k], block[AXES + 1, k], block[AXES + 2, k] = c.c00, c.c01, c.c02
+    block[AXES + 3, k], block[AXES + 4, k], block[AXES + 5, k] = c.c10, c.c11, c.c12
+    block[AXES + 6, k], block[AXES + 7, k], block[AXES + 8, k] = c.c20, c.c21, c.c22
 
 
 @helper(borrows=True)
