@@ -25,13 +25,14 @@ from simnav.world.motion_block import (
     ANGLES,
     BLOCK_ROWS,
     BOW,
-    COURSE,
-    DEPTHS,
     FLOW,
+    Course,
     body_rate,
     cosine_sine,
+    course_at,
     matrix,
     orient,
+    put_course,
     tap_at,
     wrapped,
 )
@@ -89,35 +90,6 @@ PARAMETERS = HULL_NUMBERS + HULL
 TAP_COLUMNS = 14
 #: Rows of the phases of waves, and columns of an eddy.
 PHASES, EDDY_COLUMNS = 3, 6
-
-
-class Course(NamedTuple):
-    """The motion without waves and current.
-
-    Attributes
-    ----------
-    speed, yaw_rate : float
-        Surge velocity through the water [m/s], and [rad/s].
-    heading, cos_heading, sin_heading : float
-        [rad], and its cosine and sine.
-    path, cos_path, sin_path : float
-        Flight-path angle [rad], and its cosine and sine.
-    depth : float
-        [m].
-    sway : float
-        Sway velocity [m/s].
-    """
-
-    speed: float
-    yaw_rate: float
-    heading: float
-    cos_heading: float
-    sin_heading: float
-    path: float
-    cos_path: float
-    sin_path: float
-    depth: float
-    sway: float
 
 
 class Composed(NamedTuple):
@@ -298,23 +270,6 @@ def _course(x: Array) -> Course:
 
 
 @helper(borrows=True)
-def _course_at(block: Array, k: int) -> Course:
-    """The course at the end of interval k."""
-    return Course(
-        speed=block[COURSE, k],
-        yaw_rate=block[COURSE + 1, k],
-        heading=block[COURSE + 2, k],
-        cos_heading=block[COURSE + 3, k],
-        sin_heading=block[COURSE + 4, k],
-        path=block[COURSE + 5, k],
-        cos_path=block[COURSE + 6, k],
-        sin_path=block[COURSE + 7, k],
-        depth=block[DEPTHS, k],
-        sway=block[DEPTHS + 1, k],
-    )
-
-
-@helper(borrows=True)
 def _through_water(p: Array, course: Course) -> tuple[float, float]:
     """Velocity through the water, north and east [m/s], without the waves."""
     ahead = course.speed * course.cos_path
@@ -415,11 +370,7 @@ def _steer(x: Array, index: Integers, p: Array, plan: tuple[Array, Array], block
         if x[PSI] != psi:
             psi = x[PSI]
             x[COS_PSI], x[SIN_PSI] = cos(psi), sin(psi)
-        course = _course(x)
-        block[COURSE, k], block[COURSE + 1, k], block[COURSE + 2, k] = course.speed, course.yaw_rate, course.heading
-        block[COURSE + 3, k], block[COURSE + 4, k] = course.cos_heading, course.sin_heading
-        block[COURSE + 5, k], block[COURSE + 6, k], block[COURSE + 7, k] = course.path, course.cos_path, course.sin_path
-        block[DEPTHS, k], block[DEPTHS + 1, k] = course.depth, course.sway
+        put_course(block, k, _course(x))
 
 
 @helper(borrows=True)
@@ -442,7 +393,7 @@ def _drift(
     dt = p[DT]
     swell, own = x[ANSWERS:HULL_STATE], p[OSCILLATORS:HAS_HULL]
     for k in range(first, last):
-        course = _course_at(block, k)
+        course = course_at(block, k)
         # The encounter frequency is that of the speed through the water.
         north, east = _through_water(p, course)
         waves = wave_responses(phase, table, north, east, dt)
