@@ -399,7 +399,7 @@ class _Triad:
             part = slice(a, a + _CHUNK)
             if self.density > 0.0:
                 self._noise.fill(self._variates[: len(time[part])])
-            triad_errors(
+            triad_errors.unchecked(
                 ideal[part], self._variates, out[part], time[part], interval[part], triad, in_run, walk, self.residual
             )  # fmt: skip
 

@@ -11,6 +11,7 @@ named error processes. A run with one of them is advanced in blocks of one step.
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -49,6 +50,17 @@ __all__ = ["SteppedRuns"]
 
 #: Number of steps that are drawn in advance the first time. The number is doubled each time.
 FIRST_BATCH, LONGEST_BATCH = 4, 64
+#: Attributes that hold shared arrays in records.
+_RECORDS = (
+    "delivered",
+    "imu_steps",
+    "_requested",
+    "_times",
+    "_triads",
+    "_imu_draws",
+    "_aid_draws",
+    "_fault_layers",
+)
 
 
 class SteppedRuns:
@@ -159,7 +171,13 @@ class SteppedRuns:
             new = np.zeros((self.n, *most), old.dtype)
             new[tuple(slice(0, m) for m in old.shape)] = old
             old = arrays[name] = new
+            self._forget()
         return old
+
+    def _forget(self) -> None:
+        """Forget the records, which hold an array that was replaced."""
+        for name in _RECORDS:
+            self.__dict__.pop(name, None)
 
     def _put_instruments(self, b: int, simulator: Simulator, layers: list[FaultLayer]) -> None:
         aids = list(simulator.aids.values())
@@ -197,9 +215,8 @@ class SteppedRuns:
 
     def advance(self, active: NDArray[np.bool_]) -> None:
         """Advance some runs by one step each."""
-        progress = BatchProgress(self._compiled, self._imu, self._at, self._end)
         compiled, inertial, due = self._which
-        found = sort_out(active, progress, self._which)
+        found = sort_out(active, self._progress, self._which)
         if found & BLOCKS:
             for b in np.flatnonzero(active & ~self._compiled).tolist():
                 self._block(b)
@@ -208,54 +225,92 @@ class SteppedRuns:
         if found & DUE:
             for b in np.flatnonzero(due).tolist():
                 self._draw(b)
-        place, first, last = self._limits
+        place = self._limits[0]
         drawn = self.edge, self.samples_a_step
         most = begin_step.unchecked(compiled, drawn, (self._at, self.step, self.samples), self._limits)
         if most > self._taps.shape[1]:
             self._taps = np.zeros((self.n, most, motion.TAP_COLUMNS))
+            self._forget()
         # Their arrays are made here, of the right types.
         motion.advance.unchecked(
-            compiled, (self.x, self.index), self.p, self.sizes, (self.rows, self.points),
-            (self.phase, self.table, self.eddies), motion.RequestedStates(self.tap_time, first, last, self._taps),
+            compiled,
+            (self.x, self.index),
+            self.p,
+            self.sizes,
+            (self.rows, self.points),
+            (self.phase, self.table, self.eddies),
+            self._requested,
             (self.samples, self.rate, self.force),
-        )  # fmt: skip
+        )
         if found & INERTIAL:
-            triads = TriadTables(
-                self.matrix,
-                self.bias,
-                self.density_of_triad,
-                self.range_of_triad,
-                self.step_of_triad,
-                self.instability_per_second,
-                self.walk_per_second,
-                self.residual,
-            )
-            draws = ImuDraws(
-                self.variates,
-                self.instability,
-                self.walk,
-                self.instability_rows,
-                self.instability_first,
-                self.walk_rows,
-                self.walk_first,
-            )
             disturbances = self.disturbed, self.disturbance
-            sense_imu.unchecked(inertial, place, triads, draws, disturbances, self.clock, self.imu_steps)
-        samples = SampleTimes(first, last, self.tap_time, self._taps, self.owner)
-        draws_of_aids = AidDraws(self.error, self.white, self.interval, self.fault)
-        layers = FaultLayers(self._layers, self.operations, self.sizes_of_noise, self.held)
+            sense_imu.unchecked(
+                inertial, place, self._triads, self._imu_draws, disturbances, self.clock, self.imu_steps
+            )
         instruments = self.layout, self.numbers
-        sense.unchecked(compiled, samples, draws_of_aids, instruments, layers, self.delivered, self.truth)
+        sense.unchecked(
+            compiled, self._times, self._aid_draws, instruments, self._fault_layers, self.delivered, self.truth
+        )
 
-    @property
+    # The arrays by their names; `_grown` forgets a record where it replaces an array. Only the first ``number`` of a
+    # run's measurements and IMU samples are those of its last step.
+
+    @cached_property
     def delivered(self) -> Delivered:
-        """The measurements of the last step of all runs; only the first ``number`` of each run count."""
+        """The measurements of the last step of all runs."""
         return Delivered(self.count, self.who, self.when, self.value, self.faults)
 
-    @property
+    @cached_property
     def imu_steps(self) -> ImuSteps:
-        """The IMU samples of the last step of all runs; only the first ``number`` of each run count."""
+        """The IMU samples of the last step of all runs."""
         return ImuSteps(self.samples, self.imu_time, self.imu_interval, self.rate, self.force)
+
+    @cached_property
+    def _progress(self) -> BatchProgress:
+        return BatchProgress(self._compiled, self._imu, self._at, self._end)
+
+    @cached_property
+    def _requested(self) -> motion.RequestedStates:
+        _, first, last = self._limits
+        return motion.RequestedStates(self.tap_time, first, last, self._taps)
+
+    @cached_property
+    def _times(self) -> SampleTimes:
+        _, first, last = self._limits
+        return SampleTimes(first, last, self.tap_time, self._taps, self.owner)
+
+    @cached_property
+    def _triads(self) -> TriadTables:
+        return TriadTables(
+            self.matrix,
+            self.bias,
+            self.density_of_triad,
+            self.range_of_triad,
+            self.step_of_triad,
+            self.instability_per_second,
+            self.walk_per_second,
+            self.residual,
+        )
+
+    @cached_property
+    def _imu_draws(self) -> ImuDraws:
+        return ImuDraws(
+            self.variates,
+            self.instability,
+            self.walk,
+            self.instability_rows,
+            self.instability_first,
+            self.walk_rows,
+            self.walk_first,
+        )
+
+    @cached_property
+    def _aid_draws(self) -> AidDraws:
+        return AidDraws(self.error, self.white, self.interval, self.fault)
+
+    @cached_property
+    def _fault_layers(self) -> FaultLayers:
+        return FaultLayers(self._layers, self.operations, self.sizes_of_noise, self.held)
 
     def interval_of(self, b: int) -> tuple[float, float]:
         """Beginning and end of the last step of a run [s]."""

@@ -219,7 +219,7 @@ class World:
         arguments: Any = (*self._one(), nowhere, imu)
         track, position, dive = np.empty((seconds, 4)), np.empty((seconds, 3)), np.empty((seconds, 2))
         for i in range(seconds):
-            motion.advance(*arguments)
+            motion.advance.unchecked(*arguments)
             track[i] = self._x[_TRACK]
             position[i] = self._x[motion.LATITUDE : motion.HEIGHT + 1]
             dive[i] = self._x[motion.DIVE]
@@ -282,7 +282,7 @@ class World:
             times[None, order], np.zeros(1, np.int64), np.array([len(times)]), sorted_states
         )
         arguments: Any = (*self._one(), requested, (np.array([n]), rate, force))
-        motion.advance(*arguments)
+        motion.advance.unchecked(*arguments)
         states = np.empty_like(sorted_states[0])
         states[order] = sorted_states[0]
         out, i = {}, 0
