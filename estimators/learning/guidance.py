@@ -231,7 +231,7 @@ class GuidedVoyages:
         self.navigators.update(active)
         last = runs.step >= self._steps
         paces = self._dt, self._commands.planned, np.ascontiguousarray(runs.x[:, motion.U])
-        judge(
+        judge.unchecked(
             (active, last), paces, runs.truth, tracks,
             (ROUTES.index(o.route), o.half_width), self._true_at, self._tally,
             (self.aside, self._rewards, self._aground),

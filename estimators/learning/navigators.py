@@ -6,6 +6,7 @@ kernels, and gives the same numbers, bit for bit.
 
 from __future__ import annotations
 
+from functools import cached_property
 from math import atan2, hypot
 from typing import Any, NamedTuple
 
@@ -151,13 +152,19 @@ class Navigators:
             return
         for b in np.flatnonzero(banked).tolist():
             self._until[b] = runs.interval_of(b)[1]
-        a = self._arrays
-        known = a | {"size": self._size, "time": self._now}
-        instruments = AidTables(**{name: known[name] for name in AidTables._fields})
-        state = FilterStates(**{name: known[name] for name in FilterStates._fields})
-        process: Any = tuple(a[name] for name in _PROCESS)
+        instruments, process, state = self._bank
         result = self.estimate, self.spread
         navigate.unchecked(banked, self._until, runs.delivered, runs.imu_steps, instruments, process, state, result)
+
+    @cached_property
+    def _bank(self) -> tuple[AidTables, Any, FilterStates]:
+        """The arrays as `navigate` takes them; `_put` forgets them where it replaces one."""
+        known = self._arrays | {"size": self._size, "time": self._now}
+        return (
+            AidTables(**{name: known[name] for name in AidTables._fields}),
+            tuple(known[name] for name in _PROCESS),
+            FilterStates(**{name: known[name] for name in FilterStates._fields}),
+        )
 
     def _put(self, name: str, b: int, array: NDArray[Any]) -> None:
         """Store an array of voyage b; where there is no room for it, all get more."""
@@ -168,6 +175,7 @@ class Navigators:
             if old is not None:
                 new[tuple(slice(0, m) for m in old.shape)] = old
             old = self._arrays[name] = new
+            self.__dict__.pop("_bank", None)
         place: Any = (b, *(slice(0, m) for m in array.shape))
         old[place] = array
 
