@@ -22,7 +22,7 @@ a scenario is the mean of these covariances over the runs. (The inverse of the m
 without knowledge of the drawn values. It is never larger, and much smaller if runs differ.) It bounds the mean square
 error over runs whose initial errors and biases are drawn from the initial covariance. A single run may be better.
 
-The bound is that of the model (`simnav.estimators.models.about_truth`). A disturbance of the IMU, the motion of a
+The bound is that of the model (`simnav.estimators.models.truth_linearised`). A disturbance of the IMU, the motion of a
 vessel without an IMU and the velocity of the water count as known, and so do the times of outages.
 
 Smoothed output uses later measurements and has a bound of its own (``smoothed``): the covariance of a

@@ -34,7 +34,8 @@ def _judge(
     fix: tuple[float, float, float],
     position: tuple[float, float, float],
     antenna: tuple[float, float],
-    variances: tuple[float, float, float, float],
+    estimated: tuple[float, float],
+    measured: tuple[float, float],
     limits: tuple[float, float, float],
     course: Vector,
 ) -> int:
@@ -48,8 +49,8 @@ def _judge(
         The estimate: latitude, longitude [rad] and height [m].
     antenna : (float, float)
         Where the antenna is, north and east of the estimate [m].
-    variances : (float, float, float, float)
-        Variances of the estimate and of a fix, each north and east [m^2].
+    estimated, measured : (float, float)
+        Variances of the estimate and of a fix, north and east [m^2].
     limits : (float, float, float)
         Limit of chi-square for one fix; normal quantiles of a direction, and of too large a distance.
     course : array
@@ -60,7 +61,7 @@ def _judge(
     meridian, prime_vertical = radii_scalar(sin(position[0]))
     north = (fix[1] - position[0]) * (meridian + position[2]) - north
     east = (fix[2] - position[1]) * (prime_vertical + position[2]) * cos(position[0]) - east
-    u, v = north / sqrt(variances[0] + variances[2]), east / sqrt(variances[1] + variances[3])
+    u, v = north / sqrt(estimated[0] + measured[0]), east / sqrt(estimated[1] + measured[1])
     if not isfinite(u + v):
         return -1
     add_innovation(course, u, v, 0.0, 2, fix[0], u * u + v * v > limit)
@@ -139,9 +140,15 @@ class FixTest:
                 north, east = north + c * forward - s * starboard, east + s * forward + c * starboard
             else:  # it lies in some direction
                 first, second = (v + hypot(forward, starboard) ** 2 for v in (first, second))
-        fix, variances = m.value.tolist(), (covariance.item(0, 0), covariance.item(1, 1), first, second)
+        fix, estimated = m.value.tolist(), (covariance.item(0, 0), covariance.item(1, 1))
         against = _judge.unchecked(
-            (m.time, fix[0], fix[1]), tuple(position.tolist()), (north, east), variances, self._limits, course
+            (m.time, fix[0], fix[1]),
+            tuple(position.tolist()),
+            (north, east),
+            estimated,
+            (first, second),
+            self._limits,
+            course,
         )
         if against >= 0:
             self._against[m.instrument] = self._against[m.instrument] + 1 if against else 0

@@ -18,18 +18,34 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from math import cos, cosh, exp, inf, pi, sin, sinh, sqrt
+from typing import NamedTuple
 
 import numpy as np
 
 from simnav.blocks import StateBlock
 from simnav.compiled import Array, helper
 
-__all__ = ["DeclaredProcess", "Factor", "oscillation"]
+__all__ = ["DeclaredProcess", "Factor", "Oscillation", "oscillation"]
+
+
+class Oscillation(NamedTuple):
+    """The transition matrix of value and rate of a second-order process, by rows.
+
+    Attributes
+    ----------
+    value_by_value, value_by_rate, rate_by_value, rate_by_rate : float
+        What each becomes by each: [-], [s], [1/s], [-].
+    """
+
+    value_by_value: float
+    value_by_rate: float
+    rate_by_value: float
+    rate_by_rate: float
 
 
 @helper
-def oscillation(elapsed: float, frequency: float, damping: float) -> tuple[float, float, float, float]:
-    """Transition matrix [[a, b], [c, d]] of (x, x') of a second-order process, as (a, b, c, d).
+def oscillation(elapsed: float, frequency: float, damping: float) -> Oscillation:
+    """Transition matrix of value and rate of a second-order process.
 
     Parameters
     ----------
@@ -50,7 +66,7 @@ def oscillation(elapsed: float, frequency: float, damping: float) -> tuple[float
     else:
         c, h = 1.0, elapsed
     along = damping * frequency * h
-    return decay * (c + along), decay * h, -decay * frequency * frequency * h, decay * (c - along)
+    return Oscillation(decay * (c + along), decay * h, -decay * frequency * frequency * h, decay * (c - along))
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ keeps the order of its operations. The loops over increments depend on the sampl
 from __future__ import annotations
 
 from math import cos, sin, sqrt
-from typing import TypeAlias
+from typing import NamedTuple
 
 import numpy as np
 
@@ -39,13 +39,34 @@ __all__ = [
     "POSITION",
     "SAMPLE_ROWS",
     "VELOCITY",
-    "Nine",
+    "IdealSample",
+    "SmallMatrix",
     "ideal_samples",
     "increments",
     "sample_from_motion",
+    "small_matrix",
 ]
 
-Nine: TypeAlias = tuple[float, float, float, float, float, float, float, float, float]
+
+class SmallMatrix(NamedTuple):
+    """A (3, 3) matrix by its elements, which the compiler keeps in registers; ``c01`` is in row 0 and column 1."""
+
+    c00: float
+    c01: float
+    c02: float
+    c10: float
+    c11: float
+    c12: float
+    c20: float
+    c21: float
+    c22: float
+
+
+@helper(borrows=True)
+def small_matrix(c: Array) -> SmallMatrix:
+    """The elements of a (3, 3) array."""
+    return SmallMatrix(c[0, 0], c[0, 1], c[0, 2], c[1, 0], c[1, 1], c[1, 2], c[2, 0], c[2, 1], c[2, 2])
+
 
 #: Most samples of a block. Its array is small enough for the fastest memory of a processor.
 BLOCK = 64
@@ -87,16 +108,16 @@ def _ratio(square: float) -> float:
 
 
 @helper(borrows=True)
-def _twice_sine(c: Nine, d: Nine, z: Triple, sz: float, bz: float) -> Triple:
+def _twice_sine(c: SmallMatrix, d: SmallMatrix, z: Triple, sz: float, bz: float) -> Triple:
     """Twice the sine of the angle times the axis of the body rotation exp(phi x) = C' exp(zeta x) D."""
-    b00, b10, b20 = rotated(z[0], z[1], z[2], sz, bz, d[0], d[3], d[6])
-    b01, b11, b21 = rotated(z[0], z[1], z[2], sz, bz, d[1], d[4], d[7])
-    b02, b12, b22 = rotated(z[0], z[1], z[2], sz, bz, d[2], d[5], d[8])
+    b00, b10, b20 = rotated(z[0], z[1], z[2], sz, bz, d.c00, d.c10, d.c20)
+    b01, b11, b21 = rotated(z[0], z[1], z[2], sz, bz, d.c01, d.c11, d.c21)
+    b02, b12, b22 = rotated(z[0], z[1], z[2], sz, bz, d.c02, d.c12, d.c22)
     # From the skew part
     return (
-        (c[2] * b01 + c[5] * b11 + c[8] * b21) - (c[1] * b02 + c[4] * b12 + c[7] * b22),
-        (c[0] * b02 + c[3] * b12 + c[6] * b22) - (c[2] * b00 + c[5] * b10 + c[8] * b20),
-        (c[1] * b00 + c[4] * b10 + c[7] * b20) - (c[0] * b01 + c[3] * b11 + c[6] * b21),
+        (c.c02 * b01 + c.c12 * b11 + c.c22 * b21) - (c.c01 * b02 + c.c11 * b12 + c.c21 * b22),
+        (c.c00 * b02 + c.c10 * b12 + c.c20 * b22) - (c.c02 * b00 + c.c12 * b10 + c.c22 * b20),
+        (c.c01 * b00 + c.c11 * b10 + c.c21 * b20) - (c.c00 * b01 + c.c10 * b11 + c.c20 * b21),
     )
 
 
@@ -117,7 +138,7 @@ def _solved(h: Triple, r: Triple) -> Triple:
 
 @helper(borrows=True)
 def _velocity_change(
-    c: Nine, v: Triple, w: Triple, z: Triple, earth: tuple[float, float], k: Triple, g: float, dt: float
+    c: SmallMatrix, v: Triple, w: Triple, z: Triple, earth: tuple[float, float], k: Triple, g: float, dt: float
 ) -> Triple:
     """C' u for the velocity change u, from v+ - v = (I - zeta x / 2) u + gravity and Coriolis."""
     m0, m1, m2 = 0.5 * (v[0] + w[0]), 0.5 * (v[1] + w[1]), 0.5 * (v[2] + w[2])
@@ -127,14 +148,14 @@ def _velocity_change(
         (w[0] - v[0] + dt * y0, w[1] - v[1] + dt * y1, w[2] - v[2] + dt * y2 - dt * g),
     )
     return (
-        c[0] * u[0] + c[3] * u[1] + c[6] * u[2],
-        c[1] * u[0] + c[4] * u[1] + c[7] * u[2],
-        c[2] * u[0] + c[5] * u[1] + c[8] * u[2],
+        c.c00 * u[0] + c.c10 * u[1] + c.c20 * u[2],
+        c.c01 * u[0] + c.c11 * u[1] + c.c21 * u[2],
+        c.c02 * u[0] + c.c12 * u[1] + c.c22 * u[2],
     )
 
 
 @helper(borrows=True)
-def _cofactors(r: Triple, h: Triple, angle2: float, b: float, k: float) -> tuple[Nine, float]:
+def _cofactors(r: Triple, h: Triple, angle2: float, b: float, k: float) -> tuple[SmallMatrix, float]:
     """Cofactors and inverse of the determinant of I + b phi x + c (phi x)^2 + alpha' / 12 x, which is diagonally
     dominant; k is c.
     """
@@ -151,25 +172,44 @@ def _cofactors(r: Triple, h: Triple, angle2: float, b: float, k: float) -> tuple
     inverse = 1.0 / (m00 * x0 + m10 * x1 + m20 * x2)
     y0, y1, y2 = cross(m02, m12, m22, m00, m10, m20)
     t0, t1, t2 = cross(m00, m10, m20, m01, m11, m21)
-    return (x0, x1, x2, y0, y1, y2, t0, t1, t2), inverse
+    return SmallMatrix(x0, x1, x2, y0, y1, y2, t0, t1, t2), inverse
 
 
 @helper(borrows=True)
-def _nu(change: Triple, nu: Triple, a: Triple, m: Nine, inverse: float) -> Triple:
+def _nu(change: Triple, nu: Triple, a: Triple, m: SmallMatrix, inverse: float) -> Triple:
     """The velocity increment, by Cramer's rule; ``nu`` is that of the interval before, ``a`` the angle increment."""
     t0, t1, t2 = cross(nu[0], nu[1], nu[2], a[0], a[1], a[2])
     d0, d1, d2 = change[0] - t0 * TWELFTH, change[1] - t1 * TWELFTH, change[2] - t2 * TWELFTH
     return (
-        (d0 * m[0] + d1 * m[1] + d2 * m[2]) * inverse,
-        (d0 * m[3] + d1 * m[4] + d2 * m[5]) * inverse,
-        (d0 * m[6] + d1 * m[7] + d2 * m[8]) * inverse,
+        (d0 * m.c00 + d1 * m.c01 + d2 * m.c02) * inverse,
+        (d0 * m.c10 + d1 * m.c11 + d2 * m.c12) * inverse,
+        (d0 * m.c20 + d1 * m.c21 + d2 * m.c22) * inverse,
     )
+
+
+class IdealSample(NamedTuple):
+    """The sample of ideal instruments over an interval.
+
+    Attributes
+    ----------
+    angular_rate, specific_force : three floats
+        Means [rad/s], [m/s^2], body axes.
+    displacement : three floats
+        Changes of latitude and longitude [rad] and of height [m].
+    earth_rate : two floats
+        Earth rate in the middle of the interval, north and down [rad/s].
+    """
+
+    angular_rate: Triple
+    specific_force: Triple
+    displacement: Triple
+    earth_rate: tuple[float, float]
 
 
 @helper(borrows=True)
 def sample_from_motion(
-    latitude: float, height: float, v: Triple, w: Triple, c: Nine, d: Nine, memory: Array, dt: float
-) -> tuple[float, ...]:
+    latitude: float, height: float, v: Triple, w: Triple, c: SmallMatrix, d: SmallMatrix, memory: Array, dt: float
+) -> IdealSample:
     """The sample of ideal instruments over one interval: the exact inverse of `simnav.strapdown.mechanize_step`.
 
     Parameters
@@ -178,8 +218,8 @@ def sample_from_motion(
         Latitude [rad] and height [m] at the start of the interval.
     v, w : tuples of 3 floats
         Velocity at the start and at the end, north-east-down [m/s].
-    c, d : tuples of 9 floats
-        Direction cosine matrix from body axes to north-east-down at the start and at the end, row by row.
+    c, d : SmallMatrix
+        Direction cosine matrix from body axes to north-east-down at the start and at the end.
     memory : (6,) array
         Angle and velocity increments of the interval before; updated.
     dt : float
@@ -187,12 +227,12 @@ def sample_from_motion(
 
     Returns
     -------
-    tuple of 11 floats
-        Mean angular rate [rad/s] and mean specific force [m/s^2], body axes; changes of latitude and longitude [rad]
-        and of height [m]; the Earth rate, north and down, at the middle of the interval [rad/s].
+    IdealSample
     """
     m0, m1, m2 = 0.5 * (v[0] + w[0]), 0.5 * (v[1] + w[1]), 0.5 * (v[2] + w[2])
-    e0, e2, k0, k1, k2, g, per_north, per_east, _ = local_rates(latitude, height, m0, m1, m2, dt)
+    local = local_rates(latitude, height, m0, m1, m2, dt)
+    e0, e2 = local.earth_north, local.earth_down
+    k0, k1, k2 = local.transport_north, local.transport_east, local.transport_down
     z = (e0 + k0) * dt, k1 * dt, (e2 + k2) * dt
     sz, bz = rotation_coefficients(_square(z))
     x0, x1, x2 = _twice_sine(c, d, z, sz, bz)
@@ -201,7 +241,7 @@ def sample_from_motion(
     # alpha from phi = (I + [alpha'/12 x]) alpha
     h = memory[0] * TWELFTH, memory[1] * TWELFTH, memory[2] * TWELFTH
     a = _solved(h, r)
-    change = _velocity_change(c, v, w, z, (e0, e2), (k0, k1, k2), g, dt)
+    change = _velocity_change(c, v, w, z, (e0, e2), (k0, k1, k2), local.gravity, dt)
     angle2 = _square(r)
     sa, b = rotation_coefficients(angle2)
     k = 1.0 / 6.0 - angle2 * (1.0 / 120.0) if angle2 < 1e-3 else (1.0 - sa) / angle2
@@ -209,10 +249,12 @@ def sample_from_motion(
     n = _nu(change, (memory[3], memory[4], memory[5]), a, m, inverse)
     memory[0], memory[1], memory[2], memory[3], memory[4], memory[5] = a[0], a[1], a[2], n[0], n[1], n[2]
     inverse = 1.0 / dt
-    return (
-        a[0] * inverse, a[1] * inverse, a[2] * inverse, n[0] * inverse, n[1] * inverse, n[2] * inverse,
-        dt * m0 * per_north, dt * m1 * per_east, -dt * m2, e0, e2,
-    )  # fmt: skip
+    return IdealSample(
+        angular_rate=(a[0] * inverse, a[1] * inverse, a[2] * inverse),
+        specific_force=(n[0] * inverse, n[1] * inverse, n[2] * inverse),
+        displacement=(dt * m0 * local.per_north, dt * m1 * local.per_east, -dt * m2),
+        earth_rate=(e0, e2),
+    )
 
 
 @helper(borrows=True)
@@ -221,8 +263,8 @@ def _three(block: Array, row: int, k: int) -> Triple:
 
 
 @helper(borrows=True)
-def _nine(block: Array, row: int, k: int) -> Nine:
-    return (
+def _matrix_at(block: Array, row: int, k: int) -> SmallMatrix:
+    return SmallMatrix(
         block[row, k], block[row + 1, k], block[row + 2, k], block[row + 3, k], block[row + 4, k], block[row + 5, k],
         block[row + 6, k], block[row + 7, k], block[row + 8, k],
     )  # fmt: skip
@@ -313,19 +355,24 @@ def ideal_samples(block: Array, n: int, memory: Array, rate: Array, force: Array
             0.5 * (block[VELOCITY, k] + block[VELOCITY, k + 1]),
             0.5 * (block[VELOCITY + 1, k] + block[VELOCITY + 1, k + 1]),
         )
-        e0, e2, k0, k1, k2, g, per_east = rates_in_the_middle(
+        rates = rates_in_the_middle(
             block[SINE, k], block[COSINE, k], block[HEIGHT, k], block[RADIUS, k], block[PER_NORTH, k], m0, m1
         )
+        e0, e2 = rates.earth_north, rates.earth_down
+        k0, k1, k2 = rates.transport_north, rates.transport_east, rates.transport_down
         z0, z1, z2 = (e0 + k0) * dt, k1 * dt, (e2 + k2) * dt
-        block[EARTH, k], block[EARTH + 1, k], block[GRAVITY, k], block[PER_EAST, k] = e0, e2, g, per_east
+        block[EARTH, k], block[EARTH + 1, k] = e0, e2
+        block[GRAVITY, k], block[PER_EAST, k] = rates.gravity, rates.per_east
         block[TRANSPORT, k], block[TRANSPORT + 1, k], block[TRANSPORT + 2, k] = k0, k1, k2
         block[ZETA, k], block[ZETA + 1, k], block[ZETA + 2, k] = z0, z1, z2
         block[SQUARE, k] = _square((z0, z1, z2))
     _coefficients(block, n)
     large = 0
     for k in range(n):
-        c, z = _nine(block, AXES, k), _three(block, ZETA, k)
-        x0, x1, x2 = _twice_sine(c, _nine(block, AXES, k + 1), z, block[COEFFICIENTS, k], block[COEFFICIENTS + 1, k])
+        c, z = _matrix_at(block, AXES, k), _three(block, ZETA, k)
+        x0, x1, x2 = _twice_sine(
+            c, _matrix_at(block, AXES, k + 1), z, block[COEFFICIENTS, k], block[COEFFICIENTS + 1, k]
+        )
         change = _velocity_change(
             c, _three(block, VELOCITY, k), _three(block, VELOCITY, k + 1), z, (block[EARTH, k], block[EARTH + 1, k]),
             _three(block, TRANSPORT, k), block[GRAVITY, k], block[INTERVAL, k],
@@ -367,7 +414,7 @@ def ideal_samples(block: Array, n: int, memory: Array, rate: Array, force: Array
     nu = memory[3], memory[4], memory[5]
     for k in range(n):
         a = _three(block, ALPHA, k + 1)
-        nu = _nu(_three(block, CHANGE, k), nu, a, _nine(block, COFACTORS, k), block[INVERSE, k])
+        nu = _nu(_three(block, CHANGE, k), nu, a, _matrix_at(block, COFACTORS, k), block[INVERSE, k])
         inverse = 1.0 / block[INTERVAL, k]
         rate[k, 0], rate[k, 1], rate[k, 2] = a[0] * inverse, a[1] * inverse, a[2] * inverse
         force[k, 0], force[k, 1], force[k, 2] = nu[0] * inverse, nu[1] * inverse, nu[2] * inverse

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from functools import lru_cache
 from math import exp, log1p
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,21 +20,27 @@ from simnav.kernel_types import Matrix, Vector
 __all__ = ["NormalVariates"]
 
 Words = NDArray[np.uint64]
-#: State of SFC64.
-_State = tuple[np.uint64, np.uint64, np.uint64, np.uint64]
-
 #: Where the tail of the ziggurat begins, and its inverse.
 _TAIL, _PER_TAIL = 3.6541528853610087963519472518, 0.27366123732975827203338247596
 _ONE, _UNIT = np.uint64(1), 1.0 / 9007199254740992.0
 
 
+class _State(NamedTuple):
+    """State of the generator SFC64, with the names of its author."""
+
+    a: np.uint64
+    b: np.uint64
+    c: np.uint64
+    counter: np.uint64
+
+
 @helper(borrows=True)
 def _next(state: _State) -> tuple[np.uint64, _State]:
     """The next 64 random bits, and the state after them."""
-    a, b, c, counter = state
-    bits = a + b + counter
+    b, c = state.b, state.c
+    bits = state.a + b + state.counter
     turned = (c << np.uint64(24)) | (c >> np.uint64(40))
-    return bits, (b ^ (b >> np.uint64(11)), c + (c << np.uint64(3)), turned + bits, counter + _ONE)
+    return bits, _State(b ^ (b >> np.uint64(11)), c + (c << np.uint64(3)), turned + bits, state.counter + _ONE)
 
 
 @helper(borrows=True)
@@ -92,11 +98,11 @@ def _fill(
         Tables of the ziggurat: below ``least`` a number of 52 bits is accepted at once, and becomes a variate by
         ``width``; probability density at the edge of each layer.
     """
-    state = words[0], words[1], words[2], words[3]
+    state = _State(words[0], words[1], words[2], words[3])
     for i in range(out.shape[0]):
         for j in range(out.shape[1]):
             out[i, j], state = _variate(state, least, width, density)
-    words[0], words[1], words[2], words[3] = state
+    words[0], words[1], words[2], words[3] = state.a, state.b, state.c, state.counter
 
 
 @lru_cache

@@ -30,7 +30,7 @@ Dynamics 21(1) and 21(2), 1998. P. D. Groves 2013, chapter 5.
 from __future__ import annotations
 
 from math import cos, sin
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -52,6 +52,8 @@ TWELFTH = 1.0 / 12.0
 
 __all__ = [
     "TWELFTH",
+    "LocalRates",
+    "MiddleRates",
     "Triple",
     "integrate",
     "local_rates",
@@ -76,10 +78,55 @@ def per_north_scalar(s: float, hm: float) -> tuple[float, float]:
     return 1.0 / (meridian + hm), prime_vertical
 
 
+class MiddleRates(NamedTuple):
+    """The rates in the middle of an interval that follow from its latitude, height and velocity.
+
+    Attributes
+    ----------
+    earth_north, earth_down : float
+        Earth rate w_ie [rad/s].
+    transport_north, transport_east, transport_down : float
+        Transport rate w_en [rad/s].
+    gravity : float
+        Gravity [m/s^2].
+    per_east : float
+        d(longitude)/d(east) [rad/m].
+    """
+
+    earth_north: float
+    earth_down: float
+    transport_north: float
+    transport_east: float
+    transport_down: float
+    gravity: float
+    per_east: float
+
+
+class LocalRates(NamedTuple):
+    """The rates, gravity and radii in the middle of an interval.
+
+    Attributes
+    ----------
+    earth_north, earth_down, transport_north, transport_east, transport_down, gravity, per_east : float
+        As of `MiddleRates`.
+    per_north : float
+        d(latitude)/d(north) [rad/m].
+    """
+
+    earth_north: float
+    earth_down: float
+    transport_north: float
+    transport_east: float
+    transport_down: float
+    gravity: float
+    per_north: float
+    per_east: float
+
+
 @helper
 def rates_in_the_middle(
     s: float, c: float, hm: float, prime_vertical: float, per_north: float, vm0: float, vm1: float
-) -> tuple[float, float, float, float, float, float, float]:
+) -> MiddleRates:
     """Of `local_rates` the Earth rate, transport rate, gravity and d(longitude)/d(east).
 
     The arguments are sine and cosine of the latitude in the middle, height there, what `per_north_scalar` returns, and
@@ -87,7 +134,7 @@ def rates_in_the_middle(
     """
     per_east = 1.0 / (prime_vertical + hm)
     secant = 1.0 / c
-    return (
+    return MiddleRates(
         ROTATION_RATE * c,
         -ROTATION_RATE * s,
         vm1 * per_east,
@@ -99,7 +146,7 @@ def rates_in_the_middle(
 
 
 @helper
-def local_rates(latitude: float, height: float, vm0: float, vm1: float, vm2: float, dt: float) -> tuple[float, ...]:
+def local_rates(latitude: float, height: float, vm0: float, vm1: float, vm2: float, dt: float) -> LocalRates:
     """Earth rate, transport rate, gravity and radii at the middle of an interval.
 
     Parameters
@@ -113,15 +160,22 @@ def local_rates(latitude: float, height: float, vm0: float, vm1: float, vm2: flo
 
     Returns
     -------
-    tuple of 9 floats
-        w_ie north and down, w_en north, east, down [rad/s], gravity [m/s^2], d(latitude)/d(north) and
-        d(longitude)/d(east) [rad/m], height in the middle [m].
+    LocalRates
     """
     middle, hm = middle_latitude(latitude, vm0, dt), height - 0.5 * dt * vm2
     s, c = sin(middle), cos(middle)
     per_north, prime_vertical = per_north_scalar(s, hm)
-    e0, e2, k0, k1, k2, g, per_east = rates_in_the_middle(s, c, hm, prime_vertical, per_north, vm0, vm1)
-    return e0, e2, k0, k1, k2, g, per_north, per_east, hm
+    rates = rates_in_the_middle(s, c, hm, prime_vertical, per_north, vm0, vm1)
+    return LocalRates(
+        rates.earth_north,
+        rates.earth_down,
+        rates.transport_north,
+        rates.transport_east,
+        rates.transport_down,
+        rates.gravity,
+        per_north,
+        rates.per_east,
+    )
 
 
 #: Components along three axes.
@@ -170,7 +224,9 @@ def mechanize_step(
     v0, v1, v2 = velocity[0], velocity[1], velocity[2]
     # The mean velocity is implicit; each pass gains six digits, so that the second is exact to rounding.
     m0, m1, m2 = v0 + 0.5 * u0, v1 + 0.5 * u1, v2 + 0.5 * (u2 + 9.8 * dt)
-    e0, e2, _, _, _, g, per_north, per_east, _ = local_rates(position[0], position[2], m0, m1, m2, dt)
+    local = local_rates(position[0], position[2], m0, m1, m2, dt)
+    e0, e2, g = local.earth_north, local.earth_down, local.gravity
+    per_north, per_east = local.per_north, local.per_east
     tangent = -e2 / e0
     east_rate = per_east * e0 * (1.0 / ROTATION_RATE)
     z0, z1, z2 = 0.0, 0.0, 0.0

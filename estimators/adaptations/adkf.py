@@ -58,7 +58,7 @@ FACTORS: Mapping[str, Callable[[float, float, float], float]] = {
 
 
 @kernel
-def _printed_residual(residual: Vector, predicted: Matrix, noise: Matrix) -> float:
+def _published_residual(residual: Vector, predicted: Matrix, noise: Matrix) -> float:
     """Eq. 31: v'v / sqrt(tr S)."""
     square, trace = 0.0, 0.0
     for i in range(residual.size):
@@ -89,7 +89,7 @@ def adkf_noise(settings: Vector, memory: Vector, shared: Vector, prediction: Pre
     )
     copied(nominal, noise)
     if settings[PRINTED] > 0.0:
-        statistic = _printed_residual(innovation, predicted, nominal)
+        statistic = _published_residual(innovation, predicted, nominal)
     else:
         nis = normalised_square(innovation, predicted, nominal)
         if nis < 0.0:
@@ -192,13 +192,13 @@ class AdaptiveFactor(NoiseAdaptation):
         ):
             if value not in known:
                 raise ValueError(f"{name} = {value!r}: it must be one of {', '.join(known)}")
-        self.statistic, self.target, self.printed = statistic, target, preset == "paper"
+        self.statistic, self.target, self.as_published = statistic, target, preset == "paper"
         self.c0 = PRESETS[preset].c0[factor] if c0 is None else c0
         self.c1 = PRESETS[preset].c1 if c1 is None else c1
         if not (self.c0 > 0.0 and (factor != "three-segment" or self.c1 > self.c0)):
             raise ValueError(f"c0 = {self.c0:g} and c1 = {self.c1:g}: it must be 0 < c0 < c1")
         self.function, self.factor = list(FACTORS).index(factor), FACTORS[factor]
-        self.together = 0 if self.printed or target == "P" else together
+        self.together = 0 if self.as_published or target == "P" else together
         self.inflates = target == "P"
         self.inflates_motion = not self.inflates
 
@@ -214,7 +214,7 @@ class AdaptiveFactor(NoiseAdaptation):
 
     def settings_of(self, longer: float) -> list[float]:
         """As `NoiseAdaptation.settings_of`."""
-        return [self.printed, self.function, self.c0, self.c1, 2.0, self.SMALLEST]
+        return [self.as_published, self.function, self.c0, self.c1, 2.0, self.SMALLEST]
 
     def choose(self, innovation: Innovation) -> Array:
         """The noise to use: R divided by the factor if R is the target. Otherwise sets the inflation of P."""
@@ -239,7 +239,7 @@ class AdaptiveFactor(NoiseAdaptation):
         # y = S^-1 v = R^-1 e, and S^-1 H P H' = R^-1 H P+ H'
         solved = np.linalg.solve(innovation.noise, np.column_stack((posterior.residual, posterior.predicted)))
         y = solved[:, 0]
-        if self.statistic == "discrepancy" and self.printed:
+        if self.statistic == "discrepancy" and self.as_published:
             if innovation.covariance is None or innovation.cross is None:
                 raise ValueError("the printed discrepancy (eq. 30) needs P and P H' in the innovation")
             return float(np.linalg.norm(innovation.cross @ y) / sqrt(float(np.trace(innovation.covariance))))
@@ -248,7 +248,7 @@ class AdaptiveFactor(NoiseAdaptation):
         if self.statistic == "discrepancy":
             return sqrt(moved)
         left = max(float(posterior.residual @ y), 1e-12) / (m - share)
-        if self.printed:
+        if self.as_published:
             return moved / left
         name = innovation.measurement.instrument
         usual = self._variance.get(name, 1.0)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import cache
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -68,13 +68,30 @@ def _sums(rows: Array, count: int, n: int, sums: Array) -> None:
         r = r + 1 if r + 1 < ring else 0
 
 
+class _Window(NamedTuple):
+    """The length of a window.
+
+    Attributes
+    ----------
+    shortest, longest : int
+        Smallest and largest length; equal for a fixed one.
+    low, high : float
+        Bounds v_min and v_max of the ratio of variances between which the length is adapted.
+    """
+
+    shortest: int
+    longest: int
+    low: float
+    high: float
+
+
 @kernel
 def _average(
     rows: Matrix,
     count: int,
     predicted: Matrix,
     nominal: Matrix,
-    window: tuple[int, int, float, float],
+    window: _Window,
     newest: bool,
     forgetting: float,
     estimate: Matrix,
@@ -89,9 +106,8 @@ def _average(
         Number of epochs so far; the last r of them are in the buffer.
     predicted, nominal : (m, m) arrays
         H P H' and R.
-    window : (int, int, float, float)
-        Smallest and largest length of the window (equal for a fixed one); bounds v_min and v_max of the ratio of
-        variances between which the length is adapted.
+    window : _Window
+        The lengths that it may have.
     newest : bool
         True: subtract the newest H P H' from all epochs; False: from each epoch its own.
     forgetting : float
@@ -104,7 +120,7 @@ def _average(
     int
         Length of the window.
     """
-    shortest, longest, low, high = window
+    shortest, longest = window.shortest, window.longest
     m, ring, sums = nominal.shape[0], rows.shape[0], np.zeros(rows.shape[1])
     length, n = shortest, 0
     if longest > shortest and count > 1:
@@ -115,7 +131,7 @@ def _average(
             mean = sums[i] / n
             variance += sums[m + i * (m + 1)] / n - mean * mean
             trace += nominal[i, i] + predicted[i, i]
-        length = adaptive_window(variance, trace, low, high, shortest, longest)
+        length = adaptive_window(variance, trace, window.low, window.high, shortest, longest)
     if n != min(length, count, ring):
         n = min(length, count, ring)
         _sums(rows, count, n, sums)
@@ -203,10 +219,9 @@ def innovation_noise(settings: Vector, memory: Vector, shared: Vector, predictio
         memory[BEGUN], forgetting = 1.0, 1.0
     estimate = memory[ESTIMATE : ESTIMATE + m * m].reshape((m, m))
     shortest, longest = int(settings[SHORTEST]), int(settings[LONGEST])
-    length = _average(
-        rows, int(memory[COUNT]), predicted, nominal,
-        (shortest, longest, settings[LOW], settings[HIGH]), settings[NEWEST] > 0.0, forgetting, estimate,
-    )  # fmt: skip
+    window = _Window(shortest, longest, settings[LOW], settings[HIGH])
+    newest = settings[NEWEST] > 0.0
+    length = _average(rows, int(memory[COUNT]), predicted, nominal, window, newest, forgetting, estimate)
     place = LIMITS if length == shortest else LIMITS + 4 if length == longest else LIMITS + 2
     contradicted = _contradicted(settings, place, estimate, nominal, predicted)
     if contradicted:

@@ -9,6 +9,7 @@ there are zeros.
 from __future__ import annotations
 
 from math import sqrt
+from typing import NamedTuple
 
 import numpy as np
 
@@ -22,21 +23,33 @@ __all__ = ["normalised_square", "posterior"]
 LEAST = 1e-14
 
 
+class _Factor(NamedTuple):
+    """The lower triangle of a Cholesky factor of at most three rows, and whether it exists."""
+
+    definite: bool
+    a00: float
+    a10: float
+    a11: float
+    a20: float
+    a21: float
+    a22: float
+
+
 @helper
-def _factor(predicted: Array, noise: Array) -> tuple[bool, float, float, float, float, float, float]:
+def _factor(predicted: Array, noise: Array) -> _Factor:
     """Whether ``S = H P H' + R`` is positive definite, and the rows of its Cholesky factor."""
     m = predicted.shape[0]
     a10, a11, a20, a21, a22 = 0.0, 1.0, 0.0, 0.0, 1.0
     variance = predicted[0, 0] + noise[0, 0]
     if not variance > LEAST * variance:
-        return False, 0.0, a10, a11, a20, a21, a22
+        return _Factor(False, 0.0, a10, a11, a20, a21, a22)
     a00 = sqrt(variance)
     if m > 1:
         a10 = (predicted[1, 0] + noise[1, 0]) / a00
         variance = predicted[1, 1] + noise[1, 1]
         pivot = variance - a10 * a10
         if not pivot > LEAST * variance:
-            return False, a00, a10, a11, a20, a21, a22
+            return _Factor(False, a00, a10, a11, a20, a21, a22)
         a11 = sqrt(pivot)
     if m > 2:
         a20 = (predicted[2, 0] + noise[2, 0]) / a00
@@ -44,18 +57,18 @@ def _factor(predicted: Array, noise: Array) -> tuple[bool, float, float, float, 
         variance = predicted[2, 2] + noise[2, 2]
         pivot = variance - a20 * a20 - a21 * a21
         if not pivot > LEAST * variance:
-            return False, a00, a10, a11, a20, a21, a22
+            return _Factor(False, a00, a10, a11, a20, a21, a22)
         a22 = sqrt(pivot)
-    return True, a00, a10, a11, a20, a21, a22
+    return _Factor(True, a00, a10, a11, a20, a21, a22)
 
 
 @helper
-def _square(innovation: Array, a00: float, a10: float, a11: float, a20: float, a21: float, a22: float) -> float:
+def _square(innovation: Array, factor: _Factor) -> float:
     """``v' S^-1 v``, given the factor of S."""
     m = innovation.size
-    w0 = innovation[0] / a00
-    w1 = (innovation[1] - a10 * w0) / a11 if m > 1 else 0.0
-    w2 = (innovation[2] - a20 * w0 - a21 * w1) / a22 if m > 2 else 0.0
+    w0 = innovation[0] / factor.a00
+    w1 = (innovation[1] - factor.a10 * w0) / factor.a11 if m > 1 else 0.0
+    w2 = (innovation[2] - factor.a20 * w0 - factor.a21 * w1) / factor.a22 if m > 2 else 0.0
     square: float = w0 * w0 + w1 * w1 + w2 * w2
     return square
 
@@ -63,8 +76,8 @@ def _square(innovation: Array, a00: float, a10: float, a11: float, a20: float, a
 @kernel
 def normalised_square(innovation: Vector, predicted: Matrix, noise: Matrix) -> float:
     """Normalised innovation squared ``v' S^-1 v`` with ``S = H P H' + R``; -1 if S is singular."""
-    definite, a00, a10, a11, a20, a21, a22 = _factor(predicted, noise)
-    return _square(innovation, a00, a10, a11, a20, a21, a22) if definite else -1.0
+    factor = _factor(predicted, noise)
+    return _square(innovation, factor) if factor.definite else -1.0
 
 
 @kernel
@@ -90,14 +103,15 @@ def posterior(innovation: Vector, predicted: Matrix, noise: Matrix, residual: Ve
         Normalised innovation squared ``v' S^-1 v``; -1 if S is singular, and then there is no update.
     """
     m = innovation.size
-    definite, a00, a10, a11, a20, a21, a22 = _factor(predicted, noise)
-    if not definite:
+    factor = _factor(predicted, noise)
+    if not factor.definite:
         for r in range(m):
             residual[r] = innovation[r]
             for c in range(m):
                 after[r, c] = predicted[r, c]
         return -1.0
-    square = _square(innovation, a00, a10, a11, a20, a21, a22)
+    square = _square(innovation, factor)
+    a00, a10, a11, a20, a21, a22 = factor.a00, factor.a10, factor.a11, factor.a20, factor.a21, factor.a22
     v0, v1, v2 = innovation[0], innovation[1] if m > 1 else 0.0, innovation[2] if m > 2 else 0.0
     gains = np.zeros((3, 3))
     for r in range(m):  # gain of component r, and K S - P H'

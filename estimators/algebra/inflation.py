@@ -3,17 +3,35 @@
 from __future__ import annotations
 
 from math import sqrt
+from typing import NamedTuple
 
 import numpy as np
 
 from simnav.compiled import kernel
 from simnav.kernel_types import Matrix, Vector
 
-__all__ = ["inflate_motion"]
+__all__ = ["MotionStates", "inflate_motion"]
+
+
+class MotionStates(NamedTuple):
+    """Where the motion is in a state.
+
+    Attributes
+    ----------
+    linear, linear_end : int
+        First index of position and velocity, and the index after their last.
+    attitude, attitude_end : int
+        The same of the attitude.
+    """
+
+    linear: int
+    linear_end: int
+    attitude: int
+    attitude_end: int
 
 
 @kernel
-def inflate_motion(covariance: Matrix, inflation: float, first: Vector, moving: tuple[int, int, int, int]) -> None:
+def inflate_motion(covariance: Matrix, inflation: float, first: Vector, moving: MotionStates) -> None:
     """Inflate the covariance of the motion in place, with the correlations as they are.
 
     Parameters
@@ -24,13 +42,13 @@ def inflate_motion(covariance: Matrix, inflation: float, first: Vector, moving: 
         Factor on the variances, above 1.
     first : (n,) array
         Variances at the start of the run; those of the attitude are not inflated beyond them.
-    moving : (int, int, int, int)
-        First place of position and velocity, and the place after the last; the same of the attitude.
+    moving : MotionStates
+        Where they are in the state.
     """
     sigma = np.ones(covariance.shape[0])
-    for i in range(moving[0], moving[1]):
+    for i in range(moving.linear, moving.linear_end):
         sigma[i] = sqrt(inflation)
-    for i in range(moving[2], moving[3]):
+    for i in range(moving.attitude, moving.attitude_end):
         factor = first[i] / covariance[i, i]
         sigma[i] = 1.0 if factor < 1.0 else sqrt(inflation) if factor > inflation else sqrt(factor)
     for i in range(covariance.shape[0]):

@@ -7,32 +7,39 @@ estimator that holds a policy call the same three kernels, so that they agree bi
 from __future__ import annotations
 
 from math import exp, log, log1p, log10, sqrt
-from typing import Annotated, TypeAlias
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from simnav.compiled import Array, Flags, Integers, helper, kernel
+from simnav.compiled import Array, helper, kernel
 from simnav.estimators.algebra.cholesky import factorise, solve_factor
 from simnav.estimators.algebra.joseph import joseph_update, project
 from simnav.kernel_types import FlagVector, IntegerVector, Matrix, Stack, Vector
 
 from .features import LIMIT, MEMORY, PER_INSTRUMENT, PER_MEASUREMENT, WHITE
+from .reference import Linear
 
-__all__ = ["EVENTS", "MEMORY_COLUMNS", "STEPS", "Steps", "observe", "set_scales", "take"]
-
-#: Of each filter of a bank: whether it takes the step, and its events in it, from the first up to, not including, the
-#: last; all (b,).
-Steps: TypeAlias = tuple[Flags, Integers, Integers]
-#: Types of `simnav.estimators.learning.reference.Events`, and of `Steps`.
-EVENTS = (
-    "Tuple((f8[:, :, ::1], f8[:, :, ::1], b1[::1], i8[::1], f8[::1], i8[::1], f8[:, ::1], f8[:, :, ::1], "
-    "f8[:, :, ::1], f8[:, ::1]))"
-)
-STEPS = "Tuple((b1[::1], i8[::1], i8[::1]))"
+__all__ = ["MEMORY_COLUMNS", "Steps", "observe", "set_scales", "take"]
 
 #: Of each instrument: four fading means, time of the last measurement, logarithm of the scale over the largest.
 MEMORY_COLUMNS = 6
+
+
+class Steps(NamedTuple):
+    """The step of each of the b filters of a bank.
+
+    Attributes
+    ----------
+    active : (b,) bool array
+        Whether the filter takes a step.
+    first, last : (b,) int array
+        Its events in the step: number of the first one, and number after the last one.
+    """
+
+    active: FlagVector
+    first: IntegerVector
+    last: IntegerVector
 
 
 @kernel
@@ -70,8 +77,8 @@ def _clipped(value: float) -> float:
 
 @kernel
 def observe(
-    steps: tuple[FlagVector, IntegerVector, IntegerVector],
-    events: tuple[Stack, Stack, FlagVector, IntegerVector, Vector, IntegerVector, Matrix, Stack, Stack, Matrix],
+    steps: Steps,
+    linear: Linear,
     end: Vector,
     context: Matrix,
     layout: tuple[IntegerVector, Matrix, int],
@@ -84,8 +91,10 @@ def observe(
 
     Parameters
     ----------
-    steps, events : tuples of arrays
-        See `Steps` and `simnav.estimators.learning.reference.Events`.
+    steps : Steps
+        The steps.
+    linear : Linear
+        The events of all voyages.
     end : (b,) array
         End of each filter's step [s].
     context : (b, 11) array
@@ -99,7 +108,9 @@ def observe(
         Overwritten for the filters that are active.
     """
     active, first, last = steps
-    transition, _, moves, instrument, time, size, innovation, jacobian, noise, correction = events
+    transition, moves, correction = linear.transition, linear.moves, linear.correction
+    instrument, time, size = linear.instrument, linear.time, linear.size
+    innovation, jacobian, noise = linear.innovation, linear.jacobian, linear.noise
     place, period, most = layout
     covariance, delta, memory = filters
     n = delta.shape[1]
@@ -255,8 +266,8 @@ def _propagate(
 
 @kernel
 def take(
-    steps: tuple[FlagVector, IntegerVector, IntegerVector],
-    events: tuple[Stack, Stack, FlagVector, IntegerVector, Vector, IntegerVector, Matrix, Stack, Stack, Matrix],
+    steps: Steps,
+    linear: Linear,
     place: IntegerVector,
     scale: Stack,
     process_scale: Vector,
@@ -267,8 +278,10 @@ def take(
 
     Parameters
     ----------
-    steps, events : tuples of arrays
-        See `Steps` and `simnav.estimators.learning.reference.Events`.
+    steps : Steps
+        The steps.
+    linear : Linear
+        The events of all voyages.
     place : (k,) int array
         Place of each instrument in the observation; -1 for none.
     scale : (b, p, k) array
@@ -280,7 +293,9 @@ def take(
         Covariances P of the filters, and differences delta from the plain filter; updated.
     """
     active, first, last = steps
-    transition, process_noise, moves, instrument, _, size, innovation, jacobian, noise, correction = events
+    transition, process_noise, moves = linear.transition, linear.process_noise, linear.moves
+    instrument, size, correction = linear.instrument, linear.size, linear.correction
+    innovation, jacobian, noise = linear.innovation, linear.jacobian, linear.noise
     n = delta.shape[1]
     most = scale.shape[2]
     A, B, T, moved = np.empty((n, n)), np.empty((n, n)), np.empty((n, n)), np.empty(n)

@@ -12,7 +12,7 @@ from simnav.estimator import UnsuitableScenario
 from simnav.scenario import Scenario
 from simnav.types import Array, InitialState, Instruments
 
-from .bank import MEMORY_COLUMNS, observe, take
+from .bank import MEMORY_COLUMNS, Steps, observe, take
 from .features import observation_size
 from .reference import Linear, ReferenceFilter
 from .rewards import REWARDS, reward
@@ -170,8 +170,8 @@ class Filters:
     ) -> None:
         """Fill `observation` for the active filters; the arguments as of `simnav.estimators.learning.bank.observe`."""
         layout = self.layout.place, self.period, self.layout.most
-        observe(
-            (active, first, last), linear.events, end, context, layout, (self.covariance, self.delta, self.memory),
+        observe.unchecked(
+            Steps(active, first, last), linear, end, context, layout, (self.covariance, self.delta, self.memory),
             self.observation,
         )  # fmt: skip
 
@@ -184,8 +184,8 @@ class Filters:
     ) -> None:
         """Take the active filters through a step, with what was decided."""
         decision = self.decision
-        take(
-            (active, first, last), linear.events, self.layout.place, decision.scale, decision.process_scale,
+        take.unchecked(
+            Steps(active, first, last), linear, self.layout.place, decision.scale, decision.process_scale,
             self.covariance, self.delta,
         )  # fmt: skip
         self.memory[active, :, 5] = decision.setting[active]
@@ -202,8 +202,8 @@ class Filters:
     ) -> Array:
         """(b,) array: what the step was worth; the arguments as of `simnav.estimators.learning.rewards.reward`."""
         decision = self.decision
-        reward(
-            self._code, (active, first, last), linear.events, faulty, (error, oracle),
+        reward.unchecked(
+            self._code, Steps(active, first, last), linear, faulty, (error, oracle),
             (self.layout.place, decision.scale, decision.correction), (self.covariance, self.delta), self.rewards,
         )  # fmt: skip
         return self.rewards.copy()

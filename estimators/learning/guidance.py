@@ -54,7 +54,7 @@ from simnav.world import KinematicVessel, motion
 from .environment import check_counts, run_seed
 from .features import LIMIT, Numbers
 from .filters import checked_actions
-from .guidance_kernels import ASIDE, LARGEST_TURN, SIZE, judge, look, steer
+from .guidance_kernels import ASIDE, LARGEST_TURN, SIZE, Commands, judge, look, steer
 from .navigators import Navigators
 from .routes import Routes
 
@@ -170,7 +170,7 @@ class GuidedVoyages:
         self._steps, self._dt = np.zeros(n, np.int64), np.zeros(n)
         self._notes, self._start, self._tally = np.zeros((n, 3)), np.zeros((n, 2)), np.zeros((n, 4))
         self._fix = np.zeros((n, 1), np.bool_)
-        self._planned, self._wrong, self._heading, self._speed = (np.zeros(n) for _ in range(4))
+        self._commands = Commands(*(np.zeros(n) for _ in range(4)))
         self.aside, self._rewards, self._aground = np.zeros(n), np.zeros(n), np.zeros(n, np.bool_)
         self.observation = np.zeros((n, SIZE), np.float32)
 
@@ -204,9 +204,9 @@ class GuidedVoyages:
         runs, spread = self.runs, self.navigators.spread
         variance = np.stack([spread[:, 0] + spread[:, 2], spread[:, 3]], axis=1)
         o = self.options
-        look(
+        look.unchecked(
             active, (runs.step, self.time, self._dt), (self.navigators.estimate, variance),
-            (runs.count, runs.who, runs.when, self._fix), self._routes.tracks,
+            runs.delivered, self._fix, self._routes.tracks,
             o.half_width if o.route == "channel" else ASIDE, (self._at, self._notes, self._start), self.observation,
         )  # fmt: skip
 
@@ -221,17 +221,18 @@ class GuidedVoyages:
         runs, tracks, o = self.runs, self._routes.tracks, self.options
         steer(
             active, actions, self._at, self._ahead, tracks, runs.truth, self.navigators.estimate,
-            (self._planned, self._wrong, self._heading, self._speed),
+            self._commands,
         )  # fmt: skip
-        motion.command(active, runs.x, self._wrong, self._heading, self._speed)
+        motion.command(active, runs.x, self._commands.wrong, self._commands.heading, self._commands.speed)
         dive = self._routes.dive(self._at)
         for j, place in enumerate(motion.DIVE):
             runs.x[active, place] = dive[active, j]
         runs.advance(active)
         self.navigators.update(active)
         last = runs.step >= self._steps
-        judge(
-            (active, last), (self._dt, self._planned, np.ascontiguousarray(runs.x[:, motion.U])), runs.truth, tracks,
+        paces = self._dt, self._commands.planned, np.ascontiguousarray(runs.x[:, motion.U])
+        judge.unchecked(
+            (active, last), paces, runs.truth, tracks,
             (ROUTES.index(o.route), o.half_width), self._true_at, self._tally,
             (self.aside, self._rewards, self._aground),
         )  # fmt: skip

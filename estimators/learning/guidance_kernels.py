@@ -7,23 +7,19 @@ voyage and the vector form call the same kernels, so that they agree bit for bit
 from __future__ import annotations
 
 from math import atan2, cos, exp, hypot, inf, log1p, log10, pi, radians, sin
-from typing import Annotated, TypeAlias
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from simnav.compiled import Array, Integers, helper, kernel
+from simnav.compiled import Array, helper, kernel
 from simnav.geometry.rotation import wrap_scalar
-from simnav.kernel_types import FlagMatrix, FlagVector, IntegerMatrix, IntegerVector, Matrix, Stack, Vector
+from simnav.kernel_types import FlagMatrix, FlagVector, IntegerVector, Matrix, Stack, Vector
+from simnav.sensors.stepwise import Delivered
 
 from .features import GUIDANCE, LIMIT, SPEED, TURN_RATE
 
-__all__ = ["AGROUND", "ASIDE", "BERTH", "FUEL", "LARGEST_TURN", "SIZE", "Tracks", "judge", "look", "steer"]
-
-#: The tracks of many voyages: which track is each voyage's (b,); the points of each track (r,); north, east, heading,
-#: speed of each point (r, p, 4); its latitude, longitude [rad] and metres per radian of both (r, p, 4); the course
-#: there [rad], and the distance from the start [m] (r, p).
-Tracks: TypeAlias = tuple[Integers, Integers, Array, Array, Array, Array]
+__all__ = ["AGROUND", "ASIDE", "BERTH", "FUEL", "LARGEST_TURN", "SIZE", "Commands", "Tracks", "judge", "look", "steer"]
 
 #: Unit of the distance from the track [m], and largest change of heading [rad].
 ASIDE, LARGEST_TURN = 20.0, radians(60.0)
@@ -35,8 +31,48 @@ SIZE = len(GUIDANCE)
 BEHIND, AHEAD = 20, 120
 
 
-#: Types of `Tracks`.
-_TRACKS = "Tuple((i8[::1], i8[::1], f8[:, :, ::1], f8[:, :, ::1], f8[:, ::1], f8[:, ::1]))"
+class Tracks(NamedTuple):
+    """The r planned tracks of b voyages, as lines of at most p points.
+
+    Attributes
+    ----------
+    of : (b,) int array
+        Number of each voyage's track.
+    length : (r,) int array
+        Number of points of each track.
+    points : (r, p, 4) array
+        North and east of the start [m], heading [rad], speed through the water [m/s].
+    geodetic : (r, p, 4) array
+        Latitude, longitude [rad], and metres per radian of both.
+    course, along : (r, p) array
+        Course of the track [rad], and the distance from its start [m].
+    """
+
+    of: IntegerVector
+    length: IntegerVector
+    points: Stack
+    geodetic: Stack
+    course: Matrix
+    along: Matrix
+
+
+class Commands(NamedTuple):
+    """The commands of b vessels, for `simnav.world.motion.command`.
+
+    Attributes
+    ----------
+    planned : (b,) array
+        Planned speed [m/s].
+    wrong : (b,) array
+        Error of the estimated heading [rad].
+    heading, speed : (b,) array
+        Commanded heading [rad] and speed through the water [m/s].
+    """
+
+    planned: Vector
+    wrong: Vector
+    heading: Vector
+    speed: Vector
 
 
 @kernel
@@ -45,10 +81,10 @@ def steer(
     actions: Matrix,
     at: IntegerVector,
     ahead: IntegerVector,
-    tracks: tuple[IntegerVector, IntegerVector, Stack, Stack, Matrix, Matrix],
+    tracks: Tracks,
     truth: Matrix,
     estimate: Matrix,
-    commands: tuple[Vector, Vector, Vector, Vector],
+    commands: Commands,
 ) -> None:
     """Convert the actions of the agents to commands of the vessels.
 
@@ -61,25 +97,24 @@ def steer(
     at, ahead : (b,) int arrays
         Index of the track's point nearest to the estimated position, and number of points by which the planned heading
         is taken ahead of it.
-    tracks : tuple of arrays
-        The planned tracks, see `Tracks`.
+    tracks : Tracks
+        The planned tracks.
     truth, estimate : (b, 9) arrays
         Position, velocity, roll, pitch and yaw; NaN for components that are not estimated.
-    commands : four (b,) arrays
-        Overwritten with the planned speed, and the arguments of `simnav.world.motion.command`: error of the heading,
-        heading and speed.
+    commands : Commands
+        Overwritten.
     """
-    route, length, points, _, _, _ = tracks
-    planned, wrong, heading, speed = commands
+    points, planned = tracks.points, commands.planned
     for b in range(active.size):
         if not active[b]:
             continue
-        r = route[b]
+        r = tracks.of[b]
         turn, haste = min(max(actions[b, 0], -1.0), 1.0), min(max(actions[b, 1], -1.0), 1.0)
         planned[b] = points[r, at[b], 3]
-        wrong[b] = wrap_scalar(estimate[b, 8] - truth[b, 8])
-        heading[b] = points[r, min(at[b] + ahead[b], length[r] - 1), 2] + LARGEST_TURN * turn
-        speed[b] = planned[b] * (1.0 + 0.5 * haste)
+        commands.wrong[b] = wrap_scalar(estimate[b, 8] - truth[b, 8])
+        last = tracks.length[r] - 1
+        commands.heading[b] = points[r, min(at[b] + ahead[b], last), 2] + LARGEST_TURN * turn
+        commands.speed[b] = planned[b] * (1.0 + 0.5 * haste)
 
 
 @helper
@@ -104,7 +139,7 @@ def judge(
     which: tuple[FlagVector, FlagVector],
     paces: tuple[Vector, Vector, Vector],
     truth: Matrix,
-    tracks: tuple[IntegerVector, IntegerVector, Stack, Stack, Matrix, Matrix],
+    tracks: Tracks,
     task: tuple[int, float],
     at: IntegerVector,
     tally: Matrix,
@@ -120,8 +155,8 @@ def judge(
         Length of a step [s], planned speed, and true speed through the water [m/s].
     truth : (b, 9) array
         True position, velocity, roll, pitch and yaw.
-    tracks : tuple of arrays
-        The planned tracks, see `Tracks`.
+    tracks : Tracks
+        The planned tracks.
     task : (int, float)
         0 track, 1 channel, 2 dock; half the width of the channel [m].
     at : (b,) int array
@@ -134,15 +169,17 @@ def judge(
     """
     active, last = which
     step, planned, speed = paces
-    route, length, _, geodetic, course, along = tracks
+    length, geodetic = tracks.length, tracks.geodetic
     code, half_width = task
     aside, rewards, aground = outcome
     for b in range(active.size):
         rewards[b], aground[b] = 0.0, False
         if not active[b]:
             continue
-        r, t = route[b], tally[b]
-        at[b], off, far = _place(truth[b, 0], truth[b, 1], at[b], length[r], geodetic[r], course[r], along[r])
+        r, t = tracks.of[b], tally[b]
+        at[b], off, far = _place(
+            truth[b, 0], truth[b, 1], at[b], length[r], geodetic[r], tracks.course[r], tracks.along[r]
+        )
         usual = max(planned[b], 0.1)
         progress = min((far - t[0]) / (usual * step[b]), 1.0)
         burnt = speed[b] / usual
@@ -181,8 +218,9 @@ def look(
     active: FlagVector,
     clock: tuple[IntegerVector, Vector, Vector],
     estimated: tuple[Matrix, Matrix],
-    delivered: tuple[IntegerVector, IntegerMatrix, Matrix, FlagMatrix],
-    tracks: tuple[IntegerVector, IntegerVector, Stack, Stack, Matrix, Matrix],
+    delivered: Delivered,
+    fix: FlagMatrix,
+    tracks: Tracks,
     half_width: float,
     memory: tuple[IntegerVector, Matrix, Matrix],
     observation: Annotated[NDArray[np.float32], "float32[:, ::1]"],
@@ -199,11 +237,12 @@ def look(
     estimated : (b, 9) and (b, 2) arrays
         Estimated position, velocity and attitude; variances of the horizontal position [m^2] and of the heading
         [rad^2].
-    delivered : tuple of arrays
-        ``count``, ``who`` and ``when`` of `simnav.simulation.steps.SteppedRuns`; mask of instruments that give a
-        position (b, i).
-    tracks : tuple of arrays
-        The planned tracks, see `Tracks`.
+    delivered : Delivered
+        Measurements of the step.
+    fix : (b, i) bool array
+        True for each instrument that gives a position.
+    tracks : Tracks
+        The planned tracks.
     half_width : float
         Half the width of the channel [m]; `ASIDE` without a channel.
     memory : (b,) int, (b, 3) and (b, 2) arrays
@@ -214,18 +253,18 @@ def look(
     """
     steps, now, step = clock
     estimate, variance = estimated
-    count, who, when, fix = delivered
-    route, length, points, geodetic, course, along = tracks
+    who, when = delivered.who, delivered.when
+    length, geodetic, course, along = tracks.length, tracks.geodetic, tracks.course, tracks.along
     at, notes, start = memory
     for b in range(active.size):
         if not active[b]:
             continue
-        r, e, row = route[b], estimate[b], observation[b]
+        r, e, row = tracks.of[b], estimate[b], observation[b]
         if steps[b] > 0:
             turned = wrap_scalar(e[8] - notes[b, 0])
             if turned == turned:
                 notes[b, 1] = turned / step[b]
-            for j in range(count[b]):
+            for j in range(delivered.number[b]):
                 if fix[b, who[b, j]]:
                     notes[b, 2] = when[b, j]
         notes[b, 0] = e[8]
@@ -240,7 +279,7 @@ def look(
         row[3] = wrap_scalar(course[r, min(k + 10, end)] - course[r, k])
         row[4] = wrap_scalar(course[r, min(k + 30, end)] - course[r, k])
         row[5] = wrap_scalar(course[r, min(k + 60, end)] - course[r, k])
-        row[6], row[7] = _number(hypot(north, east) / SPEED), _number(points[r, k, 3] / SPEED)
+        row[6], row[7] = _number(hypot(north, east) / SPEED), _number(tracks.points[r, k, 3] / SPEED)
         row[8] = _number(notes[b, 1] / TURN_RATE)
         row[9], row[10] = _number(_sigma(variance[b, 0], 1.0)), _number(_sigma(variance[b, 1], pi / 180.0))
         row[11] = _number(log1p(max(now[b] - notes[b, 2], 0.0)))

@@ -6,8 +6,9 @@ kernels, and gives the same numbers, bit for bit.
 
 from __future__ import annotations
 
+from functools import cached_property
 from math import atan2, hypot
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,15 +30,66 @@ from simnav.estimators.models.propagation import (
 from simnav.estimators.models.suitable import Suitable
 from simnav.estimators.solvers.admission import LATE
 from simnav.estimators.solvers.kalman import KalmanEstimator
-from simnav.kernel_types import FlagVector, IntegerMatrix, IntegerStack, IntegerVector, Matrix, Stack, Vector
+from simnav.kernel_types import FlagVector, IntegerStack, IntegerVector, Matrix, Stack, Vector
+from simnav.sensors.stepwise import Delivered, ImuSteps
 from simnav.simulation.steps import SteppedRuns
 from simnav.types import Array, Estimate, InitialState, Instruments
 
 __all__ = ["Navigators", "navigate"]
 
-_INSTRUMENTS = ("codes", "arms", "noises", "limits", "used")
 _PROCESS = ("sensors", "decay", "density")
-_STATE = ("position", "velocity", "dcm", "memory", "bias", "turn", "clock", "calibration", "covariance")
+
+
+class AidTables(NamedTuple):
+    """The instruments of b filters, at most i each (`simnav.estimators.models.inertial.InertialModel.arrays`).
+
+    Attributes
+    ----------
+    codes : (b, i, 4) int array
+        Measurement equation, number of components, and the first states of bias and scale factor.
+    arms : (b, i, 3) array
+        Lever arms [m].
+    noises, limits : (b, i, ...) array
+        Covariances of the noise, flattened, and largest plausible values.
+    used : (b, i) array
+        Time of the last measurement that was used [s].
+    """
+
+    codes: IntegerStack
+    arms: Stack
+    noises: Stack
+    limits: Stack
+    used: Matrix
+
+
+class FilterStates(NamedTuple):
+    """The states of b filters (`simnav.estimators.models.inertial.InertialModel.arrays`).
+
+    Attributes
+    ----------
+    size : (b,) int array
+        Number of states.
+    time : (b,) array
+        Time of the state [s].
+    position, velocity, dcm, memory, bias, turn, clock : (b, ...) array
+        As of `simnav.estimators.models.propagation.Motion`, where the memory is called increments.
+    calibration : (b, ...) array
+        States of the instruments.
+    covariance : (b, ...) array
+        The covariance, flattened, in a row that may be longer.
+    """
+
+    size: IntegerVector
+    time: Vector
+    position: Matrix
+    velocity: Matrix
+    dcm: Stack
+    memory: Matrix
+    bias: Matrix
+    turn: Matrix
+    clock: Matrix
+    calibration: Matrix
+    covariance: Matrix
 
 
 class Navigators:
@@ -100,15 +152,19 @@ class Navigators:
             return
         for b in np.flatnonzero(banked).tolist():
             self._until[b] = runs.interval_of(b)[1]
-        a = self._arrays
-        instruments: Any = tuple(a[name] for name in _INSTRUMENTS)
-        state: Any = (self._size, self._now, *(a[name] for name in _STATE))
-        process: Any = tuple(a[name] for name in _PROCESS)
-        navigate(
-            banked, self._until, (runs.count, runs.who, runs.when, runs.value),
-            (runs.samples, runs.imu_time, runs.imu_interval, runs.rate, runs.force), instruments, process, state,
-            (self.estimate, self.spread),
-        )  # fmt: skip
+        instruments, process, state = self._bank
+        result = self.estimate, self.spread
+        navigate.unchecked(banked, self._until, runs.delivered, runs.imu_steps, instruments, process, state, result)
+
+    @cached_property
+    def _bank(self) -> tuple[AidTables, Any, FilterStates]:
+        """The arrays as `navigate` takes them; `_put` forgets them where it replaces one."""
+        known = self._arrays | {"size": self._size, "time": self._now}
+        return (
+            AidTables(**{name: known[name] for name in AidTables._fields}),
+            tuple(known[name] for name in _PROCESS),
+            FilterStates(**{name: known[name] for name in FilterStates._fields}),
+        )
 
     def _put(self, name: str, b: int, array: NDArray[Any]) -> None:
         """Store an array of voyage b; where there is no room for it, all get more."""
@@ -119,6 +175,7 @@ class Navigators:
             if old is not None:
                 new[tuple(slice(0, m) for m in old.shape)] = old
             old = self._arrays[name] = new
+            self.__dict__.pop("_bank", None)
         place: Any = (b, *(slice(0, m) for m in array.shape))
         old[place] = array
 
@@ -140,11 +197,11 @@ class Navigators:
 def navigate(
     active: FlagVector,
     until: Vector,
-    delivered: tuple[IntegerVector, IntegerMatrix, Matrix, Stack],
-    imu: tuple[IntegerVector, Matrix, Matrix, Stack, Stack],
-    instruments: tuple[IntegerStack, Stack, Stack, Stack, Matrix],
+    delivered: Delivered,
+    imu: ImuSteps,
+    instruments: AidTables,
     process: tuple[Matrix, Matrix, Matrix],
-    state: tuple[IntegerVector, Vector, Matrix, Matrix, Stack, Matrix, Matrix, Matrix, Matrix, Matrix, Matrix],
+    state: FilterStates,
     result: tuple[Matrix, Matrix],
 ) -> None:
     """One step of many inertial filters: each propagated to its measurements, and corrected by them.
@@ -155,26 +212,24 @@ def navigate(
         True for each filter that is advanced.
     until : (b,) array
         End of each step [s].
-    delivered : tuple of arrays
-        ``count``, ``who``, ``when`` and ``value`` of `simnav.simulation.steps.SteppedRuns`.
-    imu : tuple of arrays
-        Number of IMU samples, their times, intervals, angular rates and specific forces.
-    instruments : tuple of (b, i, ...) arrays
-        Codes, lever arms, noises and limits of `simnav.estimators.models.inertial.InertialModel.arrays`; the time of
-        the last used measurement of each instrument [s], updated.
+    delivered : Delivered
+        Measurements of the step.
+    imu : ImuSteps
+        IMU samples of the step.
+    instruments : AidTables
+        The instruments of each filter; the times of their last used measurements are updated.
     process : tuple of (b, ...) arrays
         ``sensors``, ``decay`` and ``density`` of `InertialModel.arrays`.
-    state : tuple of (b, ...) arrays
-        Updated: number of states of each filter, and their time [s]; position, velocity, attitude matrix, memory,
-        biases, turn, clock and calibration of `InertialModel.arrays`; the covariance, flattened, in a longer row.
+    state : FilterStates
+        Updated.
     result : (b, 9) and (b, 4) arrays
         Overwritten with ``estimate`` and ``spread`` of `Navigators`.
     """
-    count, who, when, value = delivered
-    samples, imu_time, imu_interval, rate, force = imu
-    codes, arms, noises, limits, used = instruments
+    who, when, value = delivered.who, delivered.when, delivered.value
+    codes, limits, used = instruments.codes, instruments.limits, instruments.used
     sensors, decay, density = process
-    size, now, position, velocity, dcm, memory, bias, turn, clock, calibration, covariance = state
+    position, velocity, dcm, bias, clock = state.position, state.velocity, state.dcm, state.bias, state.clock
+    calibration, now = state.calibration, state.time
     estimate, spread = result
     longest = 0.0
     for b in range(active.size):
@@ -185,13 +240,13 @@ def navigate(
     for b in range(active.size):
         if not active[b]:
             continue
-        n, first, since = size[b], 0, now[b]
-        P = covariance[b, : n * n].reshape((n, n))
+        n, first, since = state.size[b], 0, now[b]
+        P = state.covariance[b, : n * n].reshape((n, n))
         correction = np.empty(n)
-        for j in range(count[b] + 1):
+        for j in range(delivered.number[b] + 1):
             i, code, d = -1, 0, 0
             stop = until[b]
-            if j < count[b]:
+            if j < delivered.number[b]:
                 i = who[b, j]
                 code, d, t = codes[b, i, 0], codes[b, i, 1], when[b, j]
                 if d == 0:  # it is none of those that the filter uses
@@ -205,12 +260,12 @@ def navigate(
                 stop = min(t, until[b])
             elapsed = stop - now[b]
             if elapsed > 0.0:
-                s = samples[b]
-                first, blocks_used = advance_inertial(
-                    Motion(position[b], velocity[b], dcm[b], bias[b], memory[b], turn[b], clock[b]),
-                    Samples(imu_time[b, :s], imu_interval[b, :s], rate[b, :s], force[b, :s]), first, stop, sensors[b],
-                    blocks,
-                )  # fmt: skip
+                s = imu.number[b]
+                moved = Motion(position[b], velocity[b], dcm[b], bias[b], state.memory[b], state.turn[b], clock[b])
+                samples = Samples(
+                    imu.time[b, :s], imu.interval[b, :s], imu.angular_rate[b, :s], imu.specific_force[b, :s]
+                )
+                first, blocks_used = advance_inertial(moved, samples, first, stop, sensors[b], blocks)
                 accumulate_error(blocks, blocks_used, sensors[b], transition, process_noise)
                 now[b] = stop
                 more = n - 15
@@ -218,11 +273,10 @@ def navigate(
                     P, transition, process_noise, calibration[b, :more], decay[b, :more], density[b, :more], elapsed
                 )
             if i >= 0:
-                use_reading(
-                    Aid(code, arms[b, i], codes[b, i, 2], codes[b, i, 3]), value[b, j, :d],
-                    State(position[b], velocity[b], dcm[b], clock[b, 12:15], bias[b], calibration[b, : n - 15]), P,
-                    noises[b, i, : d * d].reshape((d, d)), correction,
-                )  # fmt: skip
+                aid = Aid(code, instruments.arms[b, i], codes[b, i, 2], codes[b, i, 3])
+                here = State(position[b], velocity[b], dcm[b], clock[b, 12:15], bias[b], calibration[b, : n - 15])
+                noise = instruments.noises[b, i, : d * d].reshape((d, d))
+                use_reading(aid, value[b, j, :d], here, P, noise, correction)
         for k in range(3):
             estimate[b, k], estimate[b, 3 + k] = position[b, k], velocity[b, k]
         c = dcm[b]

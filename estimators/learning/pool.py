@@ -135,7 +135,7 @@ def _most(options: TaskOptions) -> tuple[int, int]:
     return longest, int(longest * (2.0 + options.layout.events)) + 64
 
 
-def capacity_within(options: TaskOptions, least: int, wanted: int, given: bool, memory_gb: float) -> int:
+def capacity_within(options: TaskOptions, least: int, wanted: int, fixed: bool, memory_gb: float) -> int:
     """The number of prepared voyages that are kept, so that they take no more memory than is allowed.
 
     Parameters
@@ -144,7 +144,7 @@ def capacity_within(options: TaskOptions, least: int, wanted: int, given: bool, 
         Scenario and task.
     least, wanted : int
         Number of voyages without which the vector form cannot work, and that would be kept if there were room.
-    given : bool
+    fixed : bool
         Whether the user asked for the wanted number: it is then not lowered.
     memory_gb : float
         Most memory of all of them [GB].
@@ -162,7 +162,7 @@ def capacity_within(options: TaskOptions, least: int, wanted: int, given: bool, 
     if not memory_gb > 0.0:
         raise ValueError(f"memory_gb = {memory_gb!r} should be positive")
     each = Pool.cost(options)
-    needed = wanted if given else least
+    needed = wanted if fixed else least
     making = 2  # the voyage that is being prepared is there twice
     fit = int(memory_gb * 1e9 / each) - making
     what = f"{options.scenario.id}: a prepared voyage takes up to {each / 1e6:.0f} MB"

@@ -15,7 +15,7 @@ the square of the difference in heading times the velocity.
 
 from __future__ import annotations
 
-from typing import NamedTuple, TypeAlias
+from typing import NamedTuple
 
 import numpy as np
 
@@ -24,14 +24,13 @@ from simnav.estimators.models.filtering import Dynamics, Prediction, Readings
 from simnav.estimators.models.propagation import Samples
 from simnav.estimators.models.suitable import Suitable
 from simnav.estimators.solvers.kalman import FilterFunctions, KalmanEstimator
-from simnav.types import Array, Estimate, Flags, InitialState, Instruments, Integers, Measurements
+from simnav.kernel_types import FlagVector, IntegerVector, Matrix, Stack, Vector
+from simnav.types import Array, Estimate, InitialState, Instruments, Measurements
 
-__all__ = ["LARGEST_MEASUREMENT", "Events", "Linear", "ReferenceFilter"]
+__all__ = ["LARGEST_MEASUREMENT", "Linear", "ReferenceFilter"]
 
 #: Components of the largest measurement.
 LARGEST_MEASUREMENT = 3
-#: The events of all voyages, as kernels take them: the fields of `Linear`, in their order.
-Events: TypeAlias = tuple[Array, Array, Flags, Integers, Array, Integers, Array, Array, Array, Array]
 
 
 class Linear(NamedTuple):
@@ -59,21 +58,16 @@ class Linear(NamedTuple):
         d, what the plain filter added to its state.
     """
 
-    transition: Array
-    process_noise: Array
-    moves: Flags
-    instrument: Integers
-    time: Array
-    size: Integers
-    innovation: Array
-    jacobian: Array
-    noise: Array
-    correction: Array
-
-    @property
-    def events(self) -> Events:
-        """The same as the kernels take it: a plain tuple."""
-        return self[:]
+    transition: Stack
+    process_noise: Stack
+    moves: FlagVector
+    instrument: IntegerVector
+    time: Vector
+    size: IntegerVector
+    innovation: Matrix
+    jacobian: Stack
+    noise: Stack
+    correction: Matrix
 
     @staticmethod
     def empty(events: int, n: int) -> Linear:

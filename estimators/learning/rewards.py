@@ -28,6 +28,9 @@ import numpy as np
 from simnav.compiled import kernel
 from simnav.kernel_types import FlagVector, IntegerVector, Matrix, Stack, Vector
 
+from .bank import Steps
+from .reference import Linear
+
 __all__ = ["NEED_ORACLE", "REWARDS", "reward"]
 
 #: Codes of the rewards (`reward`).
@@ -39,8 +42,8 @@ NEED_ORACLE = ("error", "gain")
 @kernel
 def reward(
     code: int,
-    steps: tuple[FlagVector, IntegerVector, IntegerVector],
-    events: tuple[Stack, Stack, FlagVector, IntegerVector, Vector, IntegerVector, Matrix, Stack, Stack, Matrix],
+    steps: Steps,
+    linear: Linear,
     faulty: FlagVector,
     errors: tuple[Matrix, Matrix],
     decision: tuple[IntegerVector, Stack, Matrix],
@@ -53,8 +56,10 @@ def reward(
     ----------
     code : int
         Code of the reward, from `REWARDS`.
-    steps, events : tuples of arrays
-        The steps and their events, see `simnav.estimators.learning.bank`.
+    steps : Steps
+        The steps.
+    linear : Linear
+        The events of all voyages.
     faulty : (e,) bool array
         True for each measurement that a fault affected.
     errors : (b, 9) and (b, 3) arrays
@@ -69,7 +74,7 @@ def reward(
         Overwritten with the rewards.
     """
     active, first, last = steps
-    _, _, _, instrument, _, size, _, _, _, _ = events
+    instrument, size = linear.instrument, linear.size
     error, oracle = errors
     place, scale, action = decision
     covariance, delta = filters

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -47,10 +49,10 @@ class Routes:
         self.course, self.along = np.zeros((0, 0)), np.zeros((0, 0))
         self.dives = np.zeros((0, 0, 2))
 
-    @property
+    @cached_property
     def tracks(self) -> Tracks:
-        """All of them, as the kernels take them."""
-        return self.of, self.length, self.points, self.geodetic, self.course, self.along
+        """All of them, as the kernels take them; `put` forgets them where it replaces an array."""
+        return Tracks(self.of, self.length, self.points, self.geodetic, self.course, self.along)
 
     def dive(self, at: NDArray[np.int64]) -> Array:
         """(n, 2) array: the values of `dives` at a point of each voyage's track."""
@@ -79,6 +81,7 @@ class Routes:
             self.points, self.geodetic = (_room(a, rows, p) for a in (self.points, self.geodetic))
             self.dives = _room(self.dives, rows, p)
             self.course, self.along = (_room(a, rows, p) for a in (self.course, self.along))
+            self.__dict__.pop("tracks", None)
         self.length[r], self.points[r, :k], self.course[r, :k] = k, points, course
         self.dives[r, :k] = track.dives[keep]
         self.geodetic[r, :k] = np.stack([position[:, 0], position[:, 1], north, east], axis=1)

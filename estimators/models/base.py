@@ -10,7 +10,7 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 
 from simnav.estimator.needs import Needs
-from simnav.estimators.algebra.inflation import inflate_motion
+from simnav.estimators.algebra.inflation import MotionStates, inflate_motion
 from simnav.geometry.rotation import left_jacobian
 from simnav.types import (
     NO_SIDE,
@@ -23,9 +23,9 @@ from simnav.types import (
     Measurement,
 )
 
+from .channel_readings import ChannelReadings
 from .filtering import AidTable, Dynamics, ModelFunctions
-from .many_readings import ManyReadings
-from .own_observation import OwnObservation
+from .measurement_functions import MeasurementFunction
 from .propagation import Samples
 
 __all__ = ["NO_SAMPLES", "ErrorModel", "Linearised", "Observation"]
@@ -66,16 +66,16 @@ class ErrorModel(ABC):
         Number n of components of the error.
     time : float
         Time of the state [s].
-    own : mapping of str to OwnObservation
+    own : mapping of str to MeasurementFunction
         The observed instruments whose kind has a measurement equation of its own.
-    many : sequence of ManyReadings
+    many : sequence of ChannelReadings
         Of these, the instruments with channels whose kind can predict many readings at one time.
     """
 
     size: int
     time: float
-    own: Mapping[str, OwnObservation] = MappingProxyType({})
-    many: Sequence[ManyReadings] = ()
+    own: Mapping[str, MeasurementFunction] = MappingProxyType({})
+    many: Sequence[ChannelReadings] = ()
     #: Whether `estimate` reports all states of instruments (`simnav.types.Estimate.states`), or only the blocks that
     #: instruments bring along.
     reports_all: bool = False
@@ -252,8 +252,8 @@ class ErrorModel(ABC):
             corrections stay in the linear range.
         """
         motion, attitude = self.moving
-        places = (*motion.indices(self.size)[:2], *attitude.indices(self.size)[:2])
-        inflate_motion(covariance, inflation, first, places)
+        states = MotionStates(*motion.indices(self.size)[:2], *attitude.indices(self.size)[:2])
+        inflate_motion(covariance, inflation, first, states)
 
     def by_correction(self, jacobian: Array, correction: Array) -> Array:
         """A (m, n) Jacobian at the corrected state, taken with respect to the correction that led there.

@@ -47,9 +47,9 @@ from simnav.types import (
 )
 
 from .base import ErrorModel, Linearised
+from .channel_readings import ChannelReadings
 from .columns import Columns, Made
 from .intermediate_states import IntermediateStates
-from .many_readings import ManyReadings
 from .marginalisation import Reference, keep_covariance, marginalise, subtract_step
 
 __all__ = ["Chain", "FactorFunctions", "MotionSinceNode", "attach_one", "begin_motion", "chain_of"]
@@ -476,7 +476,7 @@ class Chain(ABC):
 
     def _observe_many(
         self,
-        many: ManyReadings,
+        many: ChannelReadings,
         channel: NDArray[np.intp],
         first: int,
         found: Flags,

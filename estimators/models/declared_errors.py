@@ -2,7 +2,7 @@
 
 An error is a sum of processes, each of them a `simnav.blocks.StateBlock`: the bias of an aid is a constant turn-on bias
 plus an in-run bias. Filter, window, full graph, smoother, sigma points, bound and oracle take the rates of their states
-from here, in one of the two ways of `simnav.estimators.models.sum_of_processes`: merged into one state a component, or
+from here, in one of the two ways of `simnav.estimators.models.error_states`: merged into one state a component, or
 apart. One more process of an error is one more block here, and nothing else.
 
 - aid: ``bias``, with the processes that the datasheet names (`simnav.declared_process`); of a log also ``current``,
@@ -13,8 +13,8 @@ apart. One more process of an error is one more block here, and nothing else.
 - a lasting fault, for estimators that know the faults: its size (`error_of_fault`)
 
 What an instrument needs beyond that it brings along in its datasheet (`Datasheet.blocks`): the error of its lever arm
-if ``lever_arm_sigma`` says how well that was measured (`simnav.estimators.models.levered`), and whatever an instrument
-of somebody else depends on.
+if ``lever_arm_sigma`` says how well that was measured (`simnav.estimators.models.lever_arms`), and whatever an
+instrument of somebody else depends on.
 """
 
 from __future__ import annotations

@@ -93,8 +93,8 @@ def observation_at_delay(inner: Observation) -> Observation:
         found = inner(there, sheet)
         if found is None or isinstance(found, np.ndarray):
             return found
-        reading, given = found
-        blocks = dict(given) if isinstance(given, Mapping) else {NAVIGATION: given}
+        reading, derivatives = found
+        blocks = dict(derivatives) if isinstance(derivatives, Mapping) else {NAVIGATION: derivatives}
         navigation = blocks.get(NAVIGATION)
         if navigation is None:
             return reading, blocks

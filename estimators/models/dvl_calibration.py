@@ -47,9 +47,9 @@ from simnav.types import Array, Datasheet, InitialState, Instruments, Measuremen
 
 from .base import Linearised
 from .declared_errors import errors_of
+from .error_states import merged
 from .inertial import InertialModel
 from .measurements import DVL, Aid, observe
-from .sum_of_processes import merged
 
 __all__ = ["DELAY", "LEVER_ARM", "MISALIGNMENT", "SCALE", "DvlCalibrationModel"]
 

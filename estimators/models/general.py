@@ -13,7 +13,7 @@ A subclass says in plain NumPy
 From these come the transition matrix, the Jacobian of each measurement, sigma points, and the chain for windows and
 full graphs (`GeneralChain`). Derivatives are central differences. A subclass may override `transition` or `read` with
 faster forms. After its own states come the errors of its instruments
-(`simnav.estimators.models.sum_of_processes.merged_states`) and the blocks that instruments bring along
+(`simnav.estimators.models.error_states.merged_states`) and the blocks that instruments bring along
 (`simnav.blocks`).
 
 `simnav.estimators.models.inertial` and `simnav.estimators.models.ship` are compiled forms of such models. In the tests
@@ -39,12 +39,12 @@ from .chain import Chain, chain_of
 from .columns import Columns
 from .declared_errors import bias_of
 from .equations import EQUATIONS, equation_of
-from .levered import is_own, with_lever_arms
+from .error_states import merged_states
+from .lever_arms import has_measurement_function, with_lever_arms
+from .measurement_functions import MeasurementFunction
 from .moving_chain import MovingChain, MovingModel
-from .own_observation import OwnObservation
 from .points import PointModel
 from .state_blocks import StateBlocks
-from .sum_of_processes import merged_states
 
 __all__ = ["GeneralChain", "GeneralModel"]
 
@@ -124,7 +124,7 @@ class GeneralModel(PointModel, MovingModel):
             return reading
         return KINDS[sheet.kind].add_error(reading, errors["bias"])
 
-    def _point(self, own: OwnObservation, x: Array, time: float, extra: Array, side: Array) -> NavigationPoint:
+    def _point(self, own: MeasurementFunction, x: Array, time: float, extra: Array, side: Array) -> NavigationPoint:
         """The state at which a function predicts a reading."""
         point = self.navigation(x, time)
         return point._replace(blocks=own.blocks(extra), channel=own.channel, side=side)
@@ -150,9 +150,9 @@ class GeneralModel(PointModel, MovingModel):
                 if error in self.errors:
                     first = self.blocks.add(name, error, rates) - self.n_own
                     at[error] = slice(first, first + len(rates))
-        brought = [s for s in self.sheets.values() if is_own(s)]
+        brought = [s for s in self.sheets.values() if has_measurement_function(s)]
         self.blocks.bring(brought)
-        self.own = {s.name: OwnObservation(s, self.blocks.places(s.name, self.n_own), start.time) for s in brought}
+        self.own = {s.name: MeasurementFunction(s, self.blocks.places(s.name, self.n_own), start.time) for s in brought}
         self.size = self.blocks.size
         self.extra = np.zeros(self.size - self.n_own)
         variance, _, _ = self.blocks.columns(self.n_own)

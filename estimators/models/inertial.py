@@ -58,13 +58,15 @@ from simnav.types import (
 )
 
 from .base import NO_SAMPLES, ErrorModel, Linearised
+from .channel_readings import channel_readings_of
 from .declared_errors import CURRENT, bias_of, bias_of_triad
 from .delayed import is_delayed
 from .equations import EQUATIONS, equation_of
+from .error_states import merged, merged_states
 from .filtering import AidTable, Dynamics, ModelFunctions
 from .inertial_functions import INERTIAL_FUNCTIONS
-from .levered import is_own, with_lever_arms
-from .many_readings import of_instruments
+from .lever_arms import has_measurement_function, with_lever_arms
+from .measurement_functions import MeasurementFunction
 from .measurements import (
     HEADING,
     Aid,
@@ -72,7 +74,6 @@ from .measurements import (
     has_heading,
     observe,
 )
-from .own_observation import OwnObservation
 from .propagation import (
     MOTION_NUMBERS,
     TURN_TIME,
@@ -83,7 +84,6 @@ from .propagation import (
     propagate_inertial,
 )
 from .state_blocks import StateBlocks
-from .sum_of_processes import merged, merged_states
 
 __all__ = ["InertialModel", "roll_pitch_yaw"]
 
@@ -115,7 +115,7 @@ class InertialModel(ErrorModel):
     aid_parameters : dict of str to Aid
         Parameters of each instrument for `simnav.estimators.models.measurements.observe_inertial`: code, lever arm, and
         the indices of its first bias and of its scale factor (-1: none).
-    own : dict of str to OwnObservation
+    own : dict of str to MeasurementFunction
         The instruments whose kind has a measurement equation of its own; their code is `OWN`.
     noise : dict of str to (d, d) array
         Covariance of the white noise of each instrument.
@@ -241,7 +241,7 @@ class InertialModel(ErrorModel):
         self.noise: dict[str, Array] = {}
         self.uncalibrated: set[str] = set()
         self.aid_parameters: dict[str, Aid] = {}
-        self.own: dict[str, OwnObservation] = {}
+        self.own: dict[str, MeasurementFunction] = {}
         observed = [sheet for sheet in self.instruments.values() if self.observes(sheet)]
         for sheet in observed:
             bias, equation, states = bias_of(sheet), equation_of(sheet), merged_states(sheet)
@@ -262,13 +262,13 @@ class InertialModel(ErrorModel):
                 self.bias_at.get(sheet.name, -1), self.scale_at.get(sheet.name, -1),
             )  # fmt: skip
         self._more_blocks()
-        own = [sheet for sheet in observed if is_own(sheet)]
+        own = [sheet for sheet in observed if has_measurement_function(sheet)]
         if self.calibrate:
             self.blocks.bring(own)
         for sheet in own:
-            self.own[sheet.name] = OwnObservation(sheet, self.blocks.places(sheet.name, _NAV), self._since)
+            self.own[sheet.name] = MeasurementFunction(sheet, self.blocks.places(sheet.name, _NAV), self._since)
         self.delayed = any(is_delayed(sheet) for sheet in own)
-        self.many = of_instruments(self.own, self.bias_at)
+        self.many = channel_readings_of(self.own, self.bias_at)
         self._many_of = {name: many for many in self.many for name in many.sources}
         #: Of these: the noise without that of the datasheet, and a unit matrix.
         self._beyond: dict[str, tuple[Array, Array]] = {}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from simnav.compiled import helper, kernel
-from simnav.estimators.algebra.inflation import inflate_motion
+from simnav.estimators.algebra.inflation import MotionStates, inflate_motion
 from simnav.estimators.algebra.joseph import joseph_update, project
 from simnav.types import Array
 
@@ -16,7 +16,7 @@ from .propagation import MOTION_NUMBERS, Samples, correct_inertial, motion_of, p
 __all__ = ["INERTIAL_FUNCTIONS", "use_reading"]
 
 #: Places of position and velocity, and of the attitude, in the error.
-_MOVING = (0, 6, 6, 9)
+_MOVING = MotionStates(linear=0, linear_end=6, attitude=6, attitude_end=9)
 
 
 @kernel(passed=True)

@@ -25,7 +25,7 @@ import numpy as np
 from simnav.compiled import helper, kernel
 from simnav.geometry.earth import radii_scalar
 from simnav.geometry.rotation import rotate_left, rotation_coefficients
-from simnav.inverse_strapdown import sample_from_motion
+from simnav.inverse_strapdown import sample_from_motion, small_matrix
 from simnav.kernel_types import Matrix, Vector
 from simnav.strapdown import mechanize_step
 from simnav.types import Array, Measurement
@@ -92,14 +92,15 @@ def propagate_points(
         position[2],
         (velocity[0], velocity[1], velocity[2]),
         (next_velocity[0], next_velocity[1], next_velocity[2]),
-        (c[0, 0], c[0, 1], c[0, 2], c[1, 0], c[1, 1], c[1, 2], c[2, 0], c[2, 1], c[2, 2]),
-        (d[0, 0], d[0, 1], d[0, 2], d[1, 0], d[1, 1], d[1, 2], d[2, 0], d[2, 1], d[2, 2]),
+        small_matrix(c),
+        small_matrix(d),
         memory,
         interval,
     )
-    end_latitude = position[0] + sample[6]
-    end_longitude = position[1] + sample[7]
-    end_height = position[2] + sample[8]
+    rate, force = sample.angular_rate, sample.specific_force
+    end_latitude = position[0] + sample.displacement[0]
+    end_longitude = position[1] + sample.displacement[1]
+    end_height = position[2] + sample.displacement[2]
     meridian, prime = radii_scalar(sin(position[0]))
     north, east = meridian + position[2], (prime + position[2]) * cos(position[0])
     meridian, prime = radii_scalar(sin(end_latitude))
@@ -121,8 +122,8 @@ def propagate_points(
         memory[:] = 0.0
         mechanize_step(
             p, v, m, memory,
-            (sample[0] - errors[k, 9], sample[1] - errors[k, 10], sample[2] - errors[k, 11]),
-            (sample[3] - errors[k, 12], sample[4] - errors[k, 13], sample[5] - errors[k, 14]),
+            (rate[0] - errors[k, 9], rate[1] - errors[k, 10], rate[2] - errors[k, 11]),
+            (force[0] - errors[k, 12], force[1] - errors[k, 13], force[2] - errors[k, 14]),
             interval,
         )  # fmt: skip
         errors[k, 0] = (p[0] - end_latitude) * next_north

@@ -18,8 +18,8 @@ from simnav.types import Array, Datasheet, Estimate, InitialState, Instruments, 
 from .base import ErrorModel, Linearised
 from .declared_errors import bias_of
 from .equations import equation_of
+from .error_states import with_variance
 from .measurements import radii, wrap
-from .sum_of_processes import with_variance
 
 __all__ = ["KinematicModel"]
 

@@ -37,13 +37,14 @@ __all__ = [
     "MOTION_NUMBERS",
     "TURN_TIME",
     "Motion",
+    "SampleInterval",
     "Samples",
     "accumulate_error",
     "advance_inertial",
     "carry_errors",
     "correct_inertial",
     "motion_of",
-    "next_stretch",
+    "next_interval",
     "propagate_covariance",
     "propagate_inertial",
 ]
@@ -268,10 +269,29 @@ def accumulate_error(blocks: Matrix, count: int, noise: Vector, transition: Matr
             process_noise[i, j] = Q[i, j]
 
 
+class SampleInterval(NamedTuple):
+    """An interval that is covered by one sample, or by none.
+
+    Attributes
+    ----------
+    sample : int
+        Index of the sample.
+    stop : float
+        End of the interval [s].
+    whole : float
+        Length of the sample if it is used up then, else 0 [s].
+    hold : bool
+        Whether there is no sample for it.
+    """
+
+    sample: int
+    stop: float
+    whole: float
+    hold: bool
+
+
 @helper
-def next_stretch(
-    clock: Array, samples: Samples, i: int, t: float, until: float, nominal: float
-) -> tuple[int, float, float, bool]:
+def next_interval(clock: Array, samples: Samples, i: int, t: float, until: float, nominal: float) -> SampleInterval:
     """Find the next interval that is covered by one sample, or by none.
 
     Parameters
@@ -287,14 +307,7 @@ def next_stretch(
 
     Returns
     -------
-    i : int
-        Index of the sample that covers the stretch.
-    stop : float
-        End of the stretch.
-    whole : float
-        Interval of the sample if it is used up then, else 0.
-    hold : bool
-        Whether there is no sample for it.
+    SampleInterval
     """
     time, interval, rate, force = samples.time, samples.interval, samples.angular_rate, samples.specific_force
     eps = 1e-7
@@ -324,7 +337,7 @@ def next_stretch(
         stop = min(clock[1] + 2.0 * nominal, until)  # the step ends between samples: the last sample is extrapolated
     else:
         hold = True
-    return i, stop, whole, hold
+    return SampleInterval(i, stop, whole, hold)
 
 
 @kernel
@@ -377,9 +390,10 @@ def advance_inertial(
             block[7 + r] = 0.0
         held, s0, s1, s2 = 0.0, 0.0, 0.0, 0.0
         while t < end - eps:
-            i, stop, whole, hold = next_stretch(clock, samples, i, t, end, nominal)
+            covered = next_interval(clock, samples, i, t, end, nominal)
+            i, stop, whole = covered.sample, covered.stop, covered.whole
             dt = stop - t
-            if hold:
+            if covered.hold:
                 meridian, prime = radii_scalar(sin(position[0]))
                 position[0] += dt * velocity[0] / (meridian + position[2])
                 position[1] += dt * velocity[1] / ((prime + position[2]) * cos(position[0]))

@@ -7,7 +7,7 @@ time T of a state, and ' for the time derivative:
 
 - p' = u (cos psi, sin psi) + c
 - u' = white noise; psi' = r; r' = -r/T + noise; c' = -c/T + noise; biases as in
-  `simnav.estimators.models.sum_of_processes.merged`
+  `simnav.estimators.models.error_states.merged`
 
 Speed and heading are states, and log and compass are measurements of them. So their biases are estimated while there is
 GNSS, and the position is propagated through an outage. Height, roll and pitch are not estimated. A lever arm is turned
@@ -34,11 +34,12 @@ from simnav.estimator.needs import Needs
 from simnav.types import KINDS, NO_SIDE, Array, Datasheet, Estimate, InitialState, Instruments, Measurement
 
 from .base import ErrorModel, Linearised
+from .channel_readings import channel_readings_of
 from .declared_errors import bias_of
 from .equations import equation_of
+from .error_states import merged_states, with_variance
 from .filtering import AidTable, Dynamics, ModelFunctions
-from .levered import is_own, with_lever_arms
-from .many_readings import of_instruments
+from .lever_arms import has_measurement_function, with_lever_arms
 from .measurements import wrap
 from .moving_chain import MovingModel
 from .ship_functions import SHIP_FUNCTIONS, SHIP_NUMBERS, ship_state
@@ -62,7 +63,6 @@ from .ship_kernels import (
 )
 from .ship_observation import HEEL, VERTICAL_SPEED, ShipObservation, ShipReadings
 from .state_blocks import StateBlocks
-from .sum_of_processes import merged_states, with_variance
 
 __all__ = ["OBSERVED", "POSITIONS", "E", "N", "ShipModel"]
 
@@ -194,7 +194,7 @@ class ShipModel(MovingModel):
         self.scale_at: dict[str, int] = {}
         for sheet in instruments.values():
             self._calibrate(sheet)
-        self.blocks.bring(s for s in instruments.values() if is_own(s) and self.observes(s))
+        self.blocks.bring(s for s in instruments.values() if has_measurement_function(s) and self.observes(s))
         self.size = n = self.blocks.size
         variance, decay, density = self.blocks.columns(U)
         self.decay, self.density = np.concatenate([[0.0, 0.0], decay]), np.concatenate([[0.0, 0.0], density])
@@ -237,7 +237,7 @@ class ShipModel(MovingModel):
 
     def _calibrate(self, sheet: Datasheet) -> None:
         """The states of an instrument where the compiled loops expect them: the bias of what it measures, and scale."""
-        equation, own = equation_of(sheet), is_own(sheet)
+        equation, own = equation_of(sheet), has_measurement_function(sheet)
         if own and not self.observes(sheet):
             return
         if not own and not (equation.is_heading or equation.is_position or equation.through_water):
@@ -256,14 +256,14 @@ class ShipModel(MovingModel):
         for name, sheet in self.instruments.items():
             if not self.observes(sheet):
                 continue
-            if is_own(sheet):
+            if has_measurement_function(sheet):
                 bias_at, white, places = self.bias_at.get(name, -1), _white(sheet), self.blocks.places(name, 0)
                 self.own[name] = ShipObservation(sheet, places, bias_at, white, self._height_variance, self.sway**2)
             else:
                 kind, numbers = _aid(sheet, self.sway)
                 code = np.array([kind, self.bias_at.get(name, -1), self.scale_at.get(name, -1)], dtype=np.int64)
                 self.aids[name] = code, np.array(numbers), 1 if kind in (HEADING, LOG) else 2
-        self.many = of_instruments(self.own, self.bias_at, ShipReadings)
+        self.many = channel_readings_of(self.own, self.bias_at, ShipReadings)
 
     def components(self, instrument: Datasheet) -> int:
         """Without the height and the velocity down."""

@@ -13,6 +13,7 @@ variance of the sideways velocity; squared scale factor and squared yaw misalign
 from __future__ import annotations
 
 from math import atan2, ceil, cos, exp, sin
+from typing import NamedTuple
 
 import numpy as np
 
@@ -53,7 +54,7 @@ STEP = 1.0
 
 @helper
 def steps_of(elapsed: float, turn_time: float) -> tuple[int, float, float]:
-    """Number of integration steps of a stretch, their length, and the integral of the decaying turn rate over one."""
+    """Number of integration steps of an interval, their length, and the integral of the decaying turn rate over one."""
     steps = max(1, ceil(elapsed / STEP - 1e-9))
     dt = elapsed / steps
     return steps, dt, turn_time * (1.0 - exp(-dt / turn_time))
@@ -75,9 +76,29 @@ def set_identity(M: Array) -> None:
         M[i, i] = 1.0
 
 
+class ShipStep(NamedTuple):
+    """A step of a ship.
+
+    Attributes
+    ----------
+    north, east : float
+        Distance over ground [m].
+    speed : float
+        Through the water [m/s].
+    cosine, sine : float
+        Of the mean heading.
+    """
+
+    north: float
+    east: float
+    speed: float
+    cosine: float
+    sine: float
+
+
 @helper
-def sail(x: Array, decay: Array, turning: float, dt: float) -> tuple[float, ...]:
-    """Move x on by a step; return metres north and east, the speed, and cosine and sine of the mean heading."""
+def sail(x: Array, decay: Array, turning: float, dt: float) -> ShipStep:
+    """Move x on by a step."""
     u, turn = x[U], turning * x[R]
     middle = x[PSI] + 0.5 * turn
     c, s = cos(middle), sin(middle)
@@ -85,7 +106,7 @@ def sail(x: Array, decay: Array, turning: float, dt: float) -> tuple[float, ...]
     for i in range(2, x.size):
         x[i] *= decay[i]
     x[PSI] += turn
-    return north, east, u, c, s
+    return ShipStep(north, east, u, c, s)
 
 
 @helper
@@ -117,10 +138,10 @@ def sail_step(
     position: Array, x: Array, transition: Array, decay: Array, turning: float, dt: float
 ) -> tuple[float, float, float]:
     """Move a state on by a step, and a transition matrix with it; return what `carry_rows` takes."""
-    north, east, u, c, s = sail(x, decay, turning, dt)
-    displace_ship(position, north, east)
-    carry_rows(transition, decay, turning, dt, u, c, s)
-    return u, c, s
+    step = sail(x, decay, turning, dt)
+    displace_ship(position, step.north, step.east)
+    carry_rows(transition, decay, turning, dt, step.speed, step.cosine, step.sine)
+    return step.speed, step.cosine, step.sine
 
 
 @kernel
@@ -184,9 +205,9 @@ def move_ships(states: Matrix, rate: Vector, turn_time: float, elapsed: float) -
     decay_of(rate, dt, decay)
     for k in range(states.shape[0]):
         for _ in range(steps):
-            north, east, _u, _c, _s = sail(states[k], decay, turning, dt)
-            states[k, N] += north
-            states[k, E] += east
+            step = sail(states[k], decay, turning, dt)
+            states[k, N] += step.north
+            states[k, E] += step.east
 
 
 @kernel

@@ -19,8 +19,8 @@ from simnav.types import NO_SIDE, Array, Datasheet
 
 from .ambiguity import innovation_of
 from .base import Linearised
-from .many_readings import ManyReadings
-from .own_observation import OwnObservation
+from .channel_readings import ChannelReadings
+from .measurement_functions import MeasurementFunction
 from .ship_kernels import CE, CN, PSI, E, N, R, U
 
 __all__ = ["HEEL", "VERTICAL_SPEED", "ShipObservation", "ShipReadings"]
@@ -31,7 +31,7 @@ HEEL = 0.03
 VERTICAL_SPEED = 1.0
 
 
-class ShipObservation(OwnObservation):
+class ShipObservation(MeasurementFunction):
     """The measurement equation of one instrument on a ship.
 
     Parameters
@@ -155,18 +155,18 @@ class ShipObservation(OwnObservation):
         return NavigationPoint(time, position, *_kinematics(x), self.blocks(x), self.channel, side)
 
 
-class ShipReadings(ManyReadings):
+class ShipReadings(ChannelReadings):
     """The readings of all channels of an instrument, at the states ``position, x`` of a ship."""
 
     def _navigation(self, states: Sequence[Array], row: NDArray[np.intp], own: Array) -> tuple[Array, ...]:
         return states[0].take(row, axis=0), *_kinematics(own)
 
-    def _by_navigation(self, given: Array, own: Array, jacobian: Array) -> None:
+    def _by_navigation(self, derivative: Array, own: Array, jacobian: Array) -> None:
         c, s, u = np.cos(own[:, PSI, None]), np.sin(own[:, PSI, None]), own[:, U, None]
-        jacobian[:, :, N], jacobian[:, :, E] = given[:, :, 0], given[:, :, 1]
-        jacobian[:, :, CN], jacobian[:, :, CE] = given[:, :, 3], given[:, :, 4]
-        jacobian[:, :, U] = given[:, :, 3] * c + given[:, :, 4] * s
-        jacobian[:, :, PSI] = given[:, :, 8] + (given[:, :, 4] * c - given[:, :, 3] * s) * u
+        jacobian[:, :, N], jacobian[:, :, E] = derivative[:, :, 0], derivative[:, :, 1]
+        jacobian[:, :, CN], jacobian[:, :, CE] = derivative[:, :, 3], derivative[:, :, 4]
+        jacobian[:, :, U] = derivative[:, :, 3] * c + derivative[:, :, 4] * s
+        jacobian[:, :, PSI] = derivative[:, :, 8] + (derivative[:, :, 4] * c - derivative[:, :, 3] * s) * u
 
 
 def _kinematics(x: Array) -> tuple[Array, Array, Array]:

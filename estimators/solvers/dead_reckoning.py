@@ -30,8 +30,8 @@ from simnav.estimator.needs import IMU, Needs
 from simnav.estimators.composition import Solver
 from simnav.estimators.models.declared_errors import bias_of, bias_of_triad
 from simnav.estimators.models.equations import equation_of
+from simnav.estimators.models.error_states import merged, with_variance
 from simnav.estimators.models.measurements import radii, wrap
-from simnav.estimators.models.sum_of_processes import merged, with_variance
 from simnav.geometry.earth import gravity
 from simnav.geometry.rotation import dcm_from_rotation_vector, dcm_from_rpy, rpy_from_dcm
 from simnav.kinds import BODY_VELOCITY, DEPTH, HEADING, WATER_SPEED, kinds_with

@@ -41,7 +41,7 @@ from simnav.types import Array, Estimate, InitialState, Instruments, Measurement
 from .gtsam_preintegration import Preintegration
 from .tangent_frame import TangentFrame, tangent_state
 
-__all__ = ["InertialGraph", "Observation", "observe_tangent"]
+__all__ = ["InertialGraph", "Observation", "TangentState", "observe_tangent"]
 
 #: Correlations of less than this between the groups of a prior are left out.
 LEAST_CORRELATION = 1e-2
@@ -51,13 +51,35 @@ LEAST_BIAS = 1e-10, 1e-8
 _BIAS_ORDER = [3, 4, 5, 0, 1, 2]
 
 
+class TangentState(NamedTuple):
+    """A state in a `TangentFrame`.
+
+    Attributes
+    ----------
+    rotation : (3, 3) array
+        From body to frame.
+    place, speed : (3,) array
+        Position [m] and velocity [m/s] in the frame.
+    rate : (3,) array
+        Body rate as measured [rad/s].
+    bias : (6,) array
+        Biases of the accelerometers [m/s^2], and of the gyroscopes [rad/s].
+    """
+
+    rotation: Matrix
+    place: Vector
+    speed: Vector
+    rate: Vector
+    bias: Vector
+
+
 @kernel
 def observe_tangent(
     aid: tuple[int, Vector],
     value: Vector,
     origin: Vector,
     axes: Matrix,
-    state: tuple[Matrix, Vector, Vector, Vector, Vector],
+    state: TangentState,
     error: Vector,
     jacobian: Matrix,
 ) -> int:
@@ -69,9 +91,8 @@ def observe_tangent(
         Code and lever arm, and measured value, as in `simnav.estimators.models.measurements.observe_inertial`.
     origin, axes : arrays
         Origin and axes of the frame, see `TangentFrame`.
-    state : (3, 3), (3,), (3,), (3,) and (6,) arrays
-        Rotation from body to frame; position and velocity in the frame; body rate as measured; biases of the
-        accelerometers and of the gyroscopes.
+    state : TangentState
+        The state.
     error : (3,) array
         Overwritten with prediction minus measurement.
     jacobian : (3, 15) array
@@ -84,13 +105,14 @@ def observe_tangent(
         Number of components; 0 if there is no such measurement at this state.
     """
     code, arm = aid
-    rotation, place, speed, rate, bias = state
     position, velocity, dcm, error_map = np.empty(3), np.empty(3), np.empty((3, 3)), np.empty((9, 9))
-    tangent_state(origin, axes, (rotation, place, speed), (position, velocity, dcm), error_map, np.empty(3))
+    tangent_state(
+        origin, axes, (state.rotation, state.place, state.speed), (position, velocity, dcm), error_map, np.empty(3)
+    )
     gyroscope, nothing, ours = np.empty(3), np.empty(0), np.empty((3, 15))
     for r in range(3):
-        gyroscope[r] = bias[3 + r]
-    at = State(position, velocity, dcm, rate, gyroscope, nothing)
+        gyroscope[r] = state.bias[3 + r]
+    at = State(position, velocity, dcm, state.rate, gyroscope, nothing)
     d = observe_inertial(Aid(code, arm, -1, -1), value, at, error, ours)
     for i in range(d):
         error[i] = -error[i]
@@ -244,26 +266,26 @@ class InertialGraph:
         x, v, b = self.keys(node)
         origin, axes, m = self.frame.origin, self.frame.axes, len(noise)
         moving = code in (GNSS_VELOCITY, DVL, SPEED_LOG)
-        levered = moving and bool(np.any(arm))
+        with_rate = moving and bool(np.any(arm))
         still, unbiased = np.zeros(3), np.zeros(6)
 
         def error(_: Any, values: Any, jacobians: Any) -> Array:
             pose = values.atPose3(x)
             rotation = np.ascontiguousarray(pose.rotation().matrix())
             speed = values.atPoint3(v) if moving else still
-            bias = values.atConstantBias(b).vector() if levered else unbiased
+            bias = values.atConstantBias(b).vector() if with_rate else unbiased
             e, h = np.zeros(3), np.zeros((3, 15))
-            state = rotation, np.array(pose.translation()), speed, rate, bias
+            state = TangentState(rotation, np.array(pose.translation()), speed, rate, bias)
             observe_tangent((code, arm), value, origin, axes, state, e, h)
             if jacobians is not None:
                 jacobians[0] = h[:m, :6]
                 if moving:
                     jacobians[1] = h[:m, 6:9]
-                if levered:
+                if with_rate:
                     jacobians[2] = h[:m, 9:]
             return e[:m]
 
-        keys = [x, v, b] if levered else [x, v] if moving else [x]
+        keys = [x, v, b] if with_rate else [x, v] if moving else [x]
         return gtsam.CustomFactor(gtsam.noiseModel.Gaussian.Covariance(noise), keys, error)
 
     def read(self, values: Any, node: int) -> tuple[Any, Any]:

@@ -33,7 +33,7 @@ from simnav.estimators.models.propagation import (
     HELD_VELOCITY,
     TURN_TIME,
     Samples,
-    next_stretch,
+    next_interval,
 )
 from simnav.geometry.rotation import cross
 from simnav.kernel_types import Matrix, Vector
@@ -95,12 +95,13 @@ def imu_pieces(
     eps = 1e-7
     t, i, count = clock[0], first, 0
     while t < until - eps:
-        i, stop, whole, hold = next_stretch(clock, samples, i, t, until, nominal)
+        covered = next_interval(clock, samples, i, t, until, nominal)
+        i, stop, whole = covered.sample, covered.stop, covered.whole
         dt = stop - t
         piece = pieces[count]
         count += 1
         piece[0], piece[7] = dt, 0.0
-        if hold:
+        if covered.hold:
             piece[7] = 1.0
             memory[:] = 0.0
         else:

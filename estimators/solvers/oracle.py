@@ -11,11 +11,11 @@ import numpy as np
 from simnav.estimator import Needs, UnsuitableScenario
 from simnav.estimator.needs import AID
 from simnav.estimators.adaptations.truth import NominalNoise, TrueNoise, imu_faults
-from simnav.estimators.models.about_truth import AboutTruthModel
 from simnav.estimators.models.base import ErrorModel
 from simnav.estimators.models.fault_states import FaultStateModel
 from simnav.estimators.models.inertial import InertialModel
 from simnav.estimators.models.true_motion import levelled, true_motion, with_imu
+from simnav.estimators.models.truth_linearised import TruthLinearisedModel
 from simnav.recording import Recording
 from simnav.types import (
     Array,
@@ -43,8 +43,8 @@ class OracleEstimator(KalmanEstimator):
     It knows the labels and the statistics of the faults, not their values (`simnav.estimators.adaptations.truth`).
     Gross errors are rejected, and lasting errors such as multipath are states
     (`simnav.estimators.models.fault_states`). A disturbance of the IMU is subtracted from its samples. The filter is
-    linearised about the truth (`simnav.estimators.models.about_truth`), and knows the velocity of the water. Without an
-    IMU it knows the motion of the vessel (`simnav.estimators.models.true_motion`).
+    linearised about the truth (`simnav.estimators.models.truth_linearised`), and knows the velocity of the water.
+    Without an IMU it knows the motion of the vessel (`simnav.estimators.models.true_motion`).
 
     Parameters
     ----------
@@ -115,7 +115,7 @@ class OracleEstimator(KalmanEstimator):
         water = None
         if isinstance(then, TapStates):
             water = np.concatenate([then.water_velocity[:1], then.water_velocity])
-        inner: ErrorModel = AboutTruthModel(truth, water)
+        inner: ErrorModel = TruthLinearisedModel(truth, water)
         states = self.truth.states()
         return FaultStateModel(inner, states) if states else inner
 

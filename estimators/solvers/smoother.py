@@ -9,7 +9,7 @@ the filter's state and S_k is the smoothed covariance, with c = 0 and S = P at t
 - ``c_k = G_k (d_{k+1} + c_{k+1})``
 - ``S_k = (P_k - G_k M_{k+1} G_k') + G_k S_{k+1} G_k'``
 
-A filter with feedback starts each stretch with a predicted error of zero. So the difference between the smoothed and
+A filter with feedback starts each interval with a predicted error of zero. So the difference between the smoothed and
 the predicted state, which the usual form propagates, is d + c here, in the tangent space of the filter's own
 trajectory. Corrections at one time are added; that rotations do not commute is a second-order effect. c_k is applied to
 the state like any correction. Both terms of S are positive semi-definite, so S is.
@@ -34,9 +34,9 @@ from simnav.types import Array, Datasheet, NavigationStates
 
 from .looking_back import smoothed_rows
 
-__all__ = ["Smoother", "Stretches", "scale_of", "smoother_gains"]
+__all__ = ["FilteredIntervals", "Smoother", "scale_of", "smoother_gains"]
 
-#: Stretches are stored, and gains are solved for, this many at a time.
+#: FilteredIntervals are stored, and gains are solved for, this many at a time.
 _BATCH = 512
 #: Gains in units of sigmas from which on the correlations are looked at, and the smallest eigenvalue of these that is
 #: not rounding.
@@ -56,7 +56,7 @@ def smoother_gains(covariance: Array, transition: Array, predicted: Array) -> Ar
     Parameters
     ----------
     covariance, transition, predicted : (k, n, n) array
-        P, Phi and M of k stretches.
+        P, Phi and M of k intervals.
 
     Returns
     -------
@@ -94,15 +94,15 @@ def _repair(solved: Array, correlation: Array, right: Array, sigma: Array) -> No
         solved[wrong] = np.linalg.pinv(correlation[wrong], rcond=_RANK, hermitian=True) @ right[wrong]
 
 
-class Stretches:
-    """What the forward pass leaves of some successive stretches between stops.
+class FilteredIntervals:
+    """What the forward pass leaves of some successive intervals between stops.
 
     Attributes
     ----------
     count : int
-        Number of stretches, at most `_BATCH`.
+        Number of intervals, at most `_BATCH`.
     states : list
-        Snapshots of the model at the beginnings of the stretches.
+        Snapshots of the model at the beginnings of the intervals.
     covariance, transition, predicted : (k, n, n) array
         P at the beginning, Phi, and M at the end.
     correction : (k, n) array
@@ -119,7 +119,7 @@ class Stretches:
         self.correction = np.empty((_BATCH, size))
 
     def matrices(self) -> tuple[Array, Array, Array]:
-        """P, Phi and M of the stretches recorded so far."""
+        """P, Phi and M of the intervals recorded so far."""
         return self.covariance[: self.count], self.transition[: self.count], self.predicted[: self.count]
 
 
@@ -144,7 +144,7 @@ class Smoother:
 
     def begin(self, model: ErrorModel, observed: Sequence[Datasheet]) -> None:
         """Begin a run, with the instruments that the model observes."""
-        self._stretches = [Stretches(model.size)]
+        self._intervals = [FilteredIntervals(model.size)]
         self._here = np.zeros(model.size)
         self._identity = np.eye(model.size)
         self._ends: list[tuple[int, float]] = []
@@ -152,21 +152,21 @@ class Smoother:
 
     @property
     def stops(self) -> int:
-        """Number of recorded stretches, which is the index of the present stop."""
-        return (len(self._stretches) - 1) * _BATCH + self._stretches[-1].count
+        """Number of recorded intervals, which is the index of the present stop."""
+        return (len(self._intervals) - 1) * _BATCH + self._intervals[-1].count
 
     def depart(self, model: ErrorModel, covariance: Array) -> None:
         """Record the state and its covariance before a propagation."""
-        into = self._stretches[-1]
+        into = self._intervals[-1]
         if into.count == _BATCH:
-            into = Stretches(model.size)
-            self._stretches.append(into)
+            into = FilteredIntervals(model.size)
+            self._intervals.append(into)
         into.states.append(model.snapshot())
         into.covariance[into.count] = covariance
 
     def arrive(self, model: ErrorModel, covariance: Array, elapsed: float) -> None:
         """Record the transition matrix and the predicted covariance after a propagation."""
-        into = self._stretches[-1]
+        into = self._intervals[-1]
         k = into.count
         into.transition[k] = self._identity
         model.carry(into.transition[k], elapsed)
@@ -188,18 +188,18 @@ class Smoother:
         c, s = np.zeros(model.size), covariance
         yield self.stops, model.snapshot(), c, s
         ahead, stop = self._here, self.stops
-        for stretches in reversed(self._stretches):
-            p, phi, m = stretches.matrices()
+        for intervals in reversed(self._intervals):
+            p, phi, m = intervals.matrices()
             gains = smoother_gains(p, phi, m)
             lost = p - gains @ m @ gains.swapaxes(1, 2)
-            for k in range(stretches.count - 1, -1, -1):
+            for k in range(intervals.count - 1, -1, -1):
                 gain = gains[k]
                 c = gain @ (ahead + c)
                 s = lost[k] + gain @ s @ gain.T
                 s = 0.5 * (s + s.T)
-                ahead = stretches.correction[k]
+                ahead = intervals.correction[k]
                 stop -= 1
-                yield stop, stretches.states[k], c, s
+                yield stop, intervals.states[k], c, s
 
     def earlier(self, model: ErrorModel, lags: Sequence[float]) -> Array | None:
         """Smoothed states of earlier times, from the measurements so far (`simnav.estimator.Estimator.earlier`).
@@ -227,15 +227,15 @@ class Smoother:
         states, c, ahead = [model.snapshot()], np.zeros(model.size), self._here
         found = [c]
         for stop in range(self.stops - 1, first - 1, -1):
-            stretches, k = self._stretches[stop // _BATCH], stop % _BATCH
+            intervals, k = self._intervals[stop // _BATCH], stop % _BATCH
             if stop not in self._gains:
                 one = slice(k, k + 1)
                 self._gains[stop] = smoother_gains(
-                    stretches.covariance[one], stretches.transition[one], stretches.predicted[one]
+                    intervals.covariance[one], intervals.transition[one], intervals.predicted[one]
                 )[0]
             c = self._gains[stop] @ (ahead + c)
-            ahead = stretches.correction[k]
-            states.append(stretches.states[k])
+            ahead = intervals.correction[k]
+            states.append(intervals.states[k])
             found.append(c)
         return states[::-1], found[::-1]
 

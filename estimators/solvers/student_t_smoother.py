@@ -55,34 +55,68 @@ class _Used(NamedTuple):
     noise: Array
 
 
+class _Measurements(NamedTuple):
+    """All j measurements, in order of time, in the tangent space of the filter's trajectory.
+
+    Attributes
+    ----------
+    sizes : (j,) int array
+        Numbers of components; the other arrays are padded to the largest.
+    jacobians, known, noises : (j, 3, n), (j, 3), (j, 3, 3) array
+        H, ``v + H p`` and R.
+    weights : (j,) array
+        The weights that divide R.
+    """
+
+    sizes: IntegerVector
+    jacobians: Stack
+    known: Matrix
+    noises: Stack
+    weights: Vector
+
+
+class _Filtered(NamedTuple):
+    """What a pass of the filter leaves behind at k + 1 stops.
+
+    Attributes
+    ----------
+    before, predicted : (k + 1, n), (k + 1, n, n) array
+        delta before the corrections of a stop, and its covariance.
+    after, covariance : (k + 1, n), (k + 1, n, n) array
+        delta after them, minus d, and its covariance.
+    """
+
+    before: Matrix
+    predicted: Stack
+    after: Matrix
+    covariance: Stack
+
+
 @kernel
 def _forward(
     transition: Stack,
     process: Stack,
     moved: Matrix,
     first: IntegerVector,
-    used: tuple[IntegerVector, Stack, Matrix, Stack, Vector],
-    filtered: tuple[Matrix, Stack, Matrix, Stack],
+    used: _Measurements,
+    filtered: _Filtered,
 ) -> None:
     """Kalman filter over the stops; overwrites ``filtered`` but for the first stop.
 
     Parameters
     ----------
     transition, process : (k, n, n) array
-        Phi and process noise of the stretches.
+        Phi and process noise of the intervals.
     moved : (k + 1, n) array
         d: what the filter added to its state at each stop.
     first : (k + 2,) array of int
         Index of the first measurement of each stop.
-    used : (j,) int, (j, 3, n), (j, 3), (j, 3, 3) and (j,) arrays
-        Of the measurements, in order of time: components, the other arrays are padded to the largest; Jacobians;
-        ``v + H p``, in the tangent space of the filter's trajectory; covariances; and the weights that divide them.
-    filtered : (k + 1, n), (k + 1, n, n), (k + 1, n) and (k + 1, n, n) arrays
-        delta before the corrections of a stop, predicted, and its covariance; what it is after them, minus d, and its
-        covariance.
+    used : _Measurements
+        The measurements.
+    filtered : _Filtered
+        Overwritten.
     """
-    sizes, jacobians, known, noises, weights = used
-    before, predicted, after, covariance = filtered
+    before, after, covariance = filtered.before, filtered.after, filtered.covariance
     stops, n = moved.shape
     correction = np.empty(n)
     for k in range(1, stops):
@@ -92,19 +126,19 @@ def _forward(
         for r in range(n):
             for c in range(r):
                 P[r, c] = P[c, r] = 0.5 * (P[r, c] + P[c, r])
-        predicted[k] = P
+        filtered.predicted[k] = P
         x = before[k].copy()
         for j in range(first[k], first[k + 1]):
-            m = sizes[j]
-            H = jacobians[j, :m].copy()
+            m = used.sizes[j]
+            H = used.jacobians[j, :m].copy()
             cross, spread, residual = np.empty((n, m)), np.empty((m, m)), np.empty(m)
             project(P, H, cross, spread)
             for i in range(m):
-                residual[i] = known[j, i]
+                residual[i] = used.known[j, i]
                 for c in range(n):
                     residual[i] -= H[i, c] * x[c]
                 for c in range(m):
-                    spread[i, c] += noises[j, i, c] / weights[j]
+                    spread[i, c] += used.noises[j, i, c] / used.weights[j]
             if joseph_update(P, cross, spread, residual, correction) >= 0.0:
                 for c in range(n):
                     x[c] += correction[c]
@@ -156,16 +190,16 @@ class StudentTSmoother(Smoother):
         super().use(correction, linearised, noise)
 
     def _backward(self, model: ErrorModel, covariance: Array) -> Iterator[tuple[int, list[Array], Array, Array]]:
-        matrices = [s.matrices() for s in self._stretches]
+        matrices = [s.matrices() for s in self._intervals]
         p, phi, m = (np.concatenate(parts) for parts in zip(*matrices, strict=True))
         process = m - phi @ p @ phi.swapaxes(1, 2)
-        # `Stretches.correction` is that at the beginning of a stretch; those of the last stop are still here.
-        moved = np.concatenate([*(s.correction[: s.count] for s in self._stretches), self._here[None]])
+        # `FilteredIntervals.correction` is that at the beginning of an interval; those of the last stop are still here.
+        moved = np.concatenate([*(s.correction[: s.count] for s in self._intervals), self._here[None]])
         first = p[0] if len(p) else covariance
         shift, spread = self._smoothed(
             np.ascontiguousarray(phi), 0.5 * (process + process.swapaxes(1, 2)), moved, first
         )
-        states = [state for s in self._stretches for state in s.states] + [model.snapshot()]
+        states = [state for s in self._intervals for state in s.states] + [model.snapshot()]
         for stop in range(len(states) - 1, -1, -1):
             yield stop, states[stop], shift[stop], spread[stop]
 
@@ -186,10 +220,8 @@ class StudentTSmoother(Smoother):
         predicted, covariance = np.zeros((2, stops, n, n))
         predicted[0] = covariance[0] = first
         for _ in range(self.passes):
-            _forward(
-                phi, process, moved, begin, (sizes, jacobians, known, noises, weights),
-                (before, predicted, after, covariance),
-            )  # fmt: skip
+            measurements = _Measurements(sizes, jacobians, known, noises, weights)
+            _forward(phi, process, moved, begin, measurements, _Filtered(before, predicted, after, covariance))
             shift, spread = _smooth_back(phi, moved, before, predicted, after, covariance)
             new = np.ones(len(used))
             if np.isfinite(self.dof):

@@ -43,7 +43,7 @@ from simnav.estimators.models.base import Linearised
 from simnav.estimators.models.channels import whole
 from simnav.estimators.models.filtering import Dynamics, Prediction, Readings
 from simnav.estimators.models.inertial import InertialModel
-from simnav.estimators.models.own_observation import OwnObservation
+from simnav.estimators.models.measurement_functions import MeasurementFunction
 from simnav.estimators.models.propagation import Samples
 from simnav.geometry.earth import displace
 from simnav.kinds import KINDS, NavigationPoints
@@ -174,7 +174,7 @@ class TerrainPointMass(KalmanEstimator):
         """(k,) readings with the position moved by (k, 2) offsets [m], and their (k, 2) derivatives by it."""
         model, sheet, own = self.model, self._sheets[m.instrument], self.model.own[m.instrument]
         assert isinstance(model, InertialModel)
-        assert isinstance(own, OwnObservation)
+        assert isinstance(own, MeasurementFunction)
         observations = KINDS[sheet.kind].observations
         assert observations is not None
         point = own.point(m.time, *model.state_of_own(), m.side)

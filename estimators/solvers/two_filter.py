@@ -13,14 +13,14 @@ pass with the forward result. Every measurement then counts twice, and the stand
 sqrt(2). ``seed_backward`` does this.
 
 Both filters share one linearisation, the forward filter's: what it saw of each measurement (innovation, H, R) and of
-each stretch (Phi, and Q as what M has beyond Phi P Phi'). So the result equals the Rauch-Tung-Striebel smoother's
+each interval (Phi, and Q as what M has beyond Phi P Phi'). So the result equals the Rauch-Tung-Striebel smoother's
 (`simnav.estimators.solvers.smoother`) to rounding. The backward filter's state is delta, truth minus the forward
 filter's estimate, known as ``U delta = z + noise`` of unit covariance: the square root of its information, which need
 not be regular and loses no digits. Backward,
 
 - over a correction d of the forward filter, ``z += U d``: the estimate before it differs by d
 - a measurement adds the rows ``L^-1 H delta = L^-1 r``, with R = L L'
-- over a stretch, ``delta_{k+1} = Phi delta_k + G w`` with Q = G G' and w of unit covariance is put in, and w taken
+- over an interval, ``delta_{k+1} = Phi delta_k + G w`` with Q = G G' and w of unit covariance is put in, and w taken
   out by an orthogonal triangularisation of ``[I, 0 | 0; U G, U Phi | z]``. In terms of the information Y = U'U that is
   ``Phi' (Y - Y G (I + G'Y G)^-1 G'Y) Phi``, which is ``Phi' (Y^-1 + Q)^-1 Phi`` where there is an inverse.
 
@@ -43,7 +43,7 @@ from simnav.estimators.algebra.joseph import joseph_update
 from simnav.estimators.models.base import ErrorModel, Linearised
 from simnav.types import Array, Datasheet
 
-from .smoother import Smoother, Stretches, scale_of
+from .smoother import FilteredIntervals, Smoother, scale_of
 
 __all__ = ["TwoFilterSmoother"]
 
@@ -97,9 +97,9 @@ class TwoFilterSmoother(Smoother):
             root, known = _information_root(covariance), np.zeros(n)
         yield (stop, model.snapshot(), *_combine(covariance, root, known))
         array = np.zeros((0, 0))
-        for stretches in reversed(self._stretches):
-            noise = _noise_roots(stretches)
-            for k in range(stretches.count - 1, -1, -1):
+        for intervals in reversed(self._intervals):
+            noise = _noise_roots(intervals)
+            for k in range(intervals.count - 1, -1, -1):
                 for used in reversed(self._seen.get(stop, ())):
                     known = np.concatenate([known + root @ used.correction, used.residual])
                     root = np.vstack([root, used.jacobian])
@@ -109,17 +109,17 @@ class TwoFilterSmoother(Smoother):
                 array[:n] = 0.0
                 array[range(n), range(n)] = 1.0
                 array[n:, :n] = root @ noise[k]
-                array[n:, n : 2 * n] = root @ stretches.transition[k]
+                array[n:, n : 2 * n] = root @ intervals.transition[k]
                 array[n:, 2 * n] = known
                 triangle = np.asarray(np.linalg.qr(array, mode="r"))
                 root, known = triangle[n : 2 * n, n : 2 * n], triangle[n : 2 * n, 2 * n]
                 stop -= 1
-                yield (stop, stretches.states[k], *_combine(stretches.covariance[k], root, known))
+                yield (stop, intervals.states[k], *_combine(intervals.covariance[k], root, known))
 
 
-def _noise_roots(stretches: Stretches) -> Array:
+def _noise_roots(intervals: FilteredIntervals) -> Array:
     """(k, n, n) array: G with Q = M - Phi P Phi' = G G', each in units of the predicted sigmas."""
-    p, phi, m = stretches.matrices()
+    p, phi, m = intervals.matrices()
     scale = scale_of(m)
     noise = (m - phi @ p @ phi.swapaxes(1, 2)) / scale[:, :, None] / scale[:, None, :]
     values, vectors = np.linalg.eigh(0.5 * (noise + noise.swapaxes(1, 2)))

@@ -95,7 +95,7 @@ def coverage_map(tracks: Mapping[str, Array], times: Mapping[str, Array], title:
             parts[0].legend(loc="best")
         ax = parts[-1]
         for y, (name, time) in enumerate(times.items()):
-            for begin, end in _stretches(time):
+            for begin, end in _parts_without_gaps(time):
                 ax.plot(
                     [begin - first, max(end - first, begin - first + 1e-3)], [y, y], color=style.colour(name), lw=4.0
                 )
@@ -105,8 +105,8 @@ def coverage_map(tracks: Mapping[str, Array], times: Mapping[str, Array], title:
     return fig
 
 
-def _stretches(time: Array) -> list[tuple[float, float]]:
-    """Begin and end of each stretch without a gap."""
+def _parts_without_gaps(time: Array) -> list[tuple[float, float]]:
+    """Begin and end of each part without a gap."""
     if not len(time):
         return []
     between = np.diff(time)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from simnav.compiled import Integers, helper, kernel
 from simnav.geometry.earth import ECCENTRICITY_SQUARED, SEMI_MAJOR_AXIS
 from simnav.kernel_types import Hypermatrix, IntegerMatrix, IntegerVector, Matrix, Stack
+from simnav.sensors.stepwise import Delivered, ImuSteps
 from simnav.timing import TIME_TOLERANCE
 from simnav.types import KINDS, Array
 
@@ -20,7 +21,18 @@ if TYPE_CHECKING:
     from simnav.recording import AidStream, Block
     from simnav.simulation.steps import SteppedRuns
 
-__all__ = ["ClosedLoopSteps", "ObservedSteps", "crowded", "entries", "horizontal", "keep", "pack", "padded", "rows_of"]
+__all__ = [
+    "ClosedLoopSteps",
+    "ObservedSteps",
+    "crowded",
+    "entries",
+    "horizontal",
+    "keep",
+    "no_imu",
+    "pack",
+    "padded",
+    "rows_of",
+]
 
 
 @dataclass(eq=False)
@@ -77,14 +89,36 @@ def _row(latitude: float, longitude: float, height: float, heading: float, out: 
     out[5] = heading
 
 
+class PaddedImu(NamedTuple):
+    """At most K IMU samples in each of S rows.
+
+    Attributes
+    ----------
+    time : (S, K) array
+        Ends of the samples [s].
+    valid : (S, K) int8 array
+        Whether there is a sample (0 or 1).
+    length : (S, K) array
+        Lengths of the samples [s].
+    angular_rate, specific_force : (S, K, 3) array
+        Means over the intervals [rad/s], [m/s^2].
+    """
+
+    time: Matrix
+    valid: Annotated[NDArray[np.int8], "int8[:, ::1]"]
+    length: Matrix
+    angular_rate: Stack
+    specific_force: Stack
+
+
 @kernel
 def keep(
     which: tuple[IntegerVector, IntegerVector],
     truth: Matrix,
-    imu: tuple[IntegerVector, Matrix, Matrix, Stack, Stack],
-    delivered: tuple[IntegerVector, IntegerMatrix, Matrix, Stack],
+    imu: ImuSteps,
+    delivered: Delivered,
     slots: tuple[IntegerMatrix, IntegerMatrix],
-    samples: tuple[Matrix, Matrix, Annotated[NDArray[np.int8], "int8[:, ::1]"], Stack, Stack],
+    samples: PaddedImu,
     aids: tuple[Stack, Annotated[NDArray[np.int8], "int8[:, :, ::1]"], Hypermatrix],
     states: Stack,
     rows: Matrix,
@@ -100,16 +134,15 @@ def keep(
         Number of each run, and of its row.
     truth : (b, 9) array
         Position, velocity and attitude at the end of the step, of b runs.
-    imu : tuple
-        ``samples``, ``imu_time``, ``imu_interval``, ``rate`` and ``force`` of `simnav.simulation.steps.SteppedRuns`.
-    delivered : tuple
-        ``count``, ``who``, ``when`` and ``value`` of the same.
+    imu : ImuSteps
+        IMU samples of the step.
+    delivered : Delivered
+        Measurements of the step.
     slots : two (b, i) int arrays
         For each of i instruments: its number in the padded arrays, and its largest number of measurements in a step.
         No measurements are put there if i is zero.
-    samples : tuple of (S, K, ...) arrays
-        Times, intervals, validity, angular rates and specific forces of at most K IMU samples in S rows; overwritten.
-        No samples are put there if K is zero.
+    samples : PaddedImu
+        Overwritten with the IMU samples; no samples are put there if it has no room for any.
     aids : (S, A, K), (S, A, K), (S, A, K, 3) arrays
         Times [s], validity (0 or 1) and values of at most K measurements of A instruments in S rows; overwritten.
     states : (S, 3, 3) array
@@ -117,9 +150,7 @@ def keep(
     rows : (q, 6) array
         Overwritten with the row of `rows_of` of each run.
     """
-    number, imu_time, imu_interval, rate, force = imu
-    time, length, valid, angular_rate, specific_force = samples
-    count, who, when, value = delivered
+    time, length, valid = samples.time, samples.length, samples.valid
     times, there, values = aids
     place, most = slots
     for q in range(which[0].size):
@@ -129,12 +160,13 @@ def keep(
                 states[row, i, j] = truth[b, 3 * i + j]
         _row(truth[b, 0], truth[b, 1], truth[b, 2], truth[b, 8], rows[q])
         if time.shape[1] > 0:
-            for k in range(number[b]):
-                time[row, k], length[row, k], valid[row, k] = imu_time[b, k], imu_interval[b, k], 1
+            for k in range(imu.number[b]):
+                time[row, k], length[row, k], valid[row, k] = imu.time[b, k], imu.interval[b, k], 1
                 for j in range(3):
-                    angular_rate[row, k, j], specific_force[row, k, j] = rate[b, k, j], force[b, k, j]
-        for m in range(count[b] if place.shape[1] > 0 else 0):
-            n: int = who[b, m]
+                    samples.angular_rate[row, k, j] = imu.angular_rate[b, k, j]
+                    samples.specific_force[row, k, j] = imu.specific_force[b, k, j]
+        for m in range(delivered.number[b] if place.shape[1] > 0 else 0):
+            n: int = delivered.who[b, m]
             a = place[b, n]
             k = 0
             while k < most[b, n] and there[row, a, k]:
@@ -142,31 +174,39 @@ def keep(
             if k == most[b, n]:
                 found: int = b * place.shape[1] + n
                 return found
-            times[row, a, k], there[row, a, k] = when[b, m], 1
+            times[row, a, k], there[row, a, k] = delivered.when[b, m], 1
             for j in range(3):
-                values[row, a, k, j] = value[b, m, j]
+                values[row, a, k, j] = delivered.value[b, m, j]
     return -1
 
 
-def padded(steps: int, names: Sequence[str], most: Mapping[str, int]) -> tuple[Any, Any]:
+def padded(steps: int, names: Sequence[str], most: Mapping[str, int]) -> tuple[PaddedImu, Any]:
     """The arrays ``samples`` and ``aids`` of `keep` for so many rows, empty."""
     s, imu, room = steps, int(most.get("imu", 0)), max((most[name] for name in names), default=0)
-    samples = (
-        np.zeros((s, imu)), np.zeros((s, imu)), np.zeros((s, imu), np.int8), np.zeros((s, imu, 3)),
-        np.zeros((s, imu, 3)),
-    )  # fmt: skip
+    samples = PaddedImu(
+        time=np.zeros((s, imu)),
+        valid=np.zeros((s, imu), np.int8),
+        length=np.zeros((s, imu)),
+        angular_rate=np.zeros((s, imu, 3)),
+        specific_force=np.zeros((s, imu, 3)),
+    )
     aids = np.zeros((s, len(names), room)), np.zeros((s, len(names), room), np.int8), np.zeros((s, len(names), room, 3))
     return samples, aids
 
 
-def entries(samples: Any, aids: Any, widths: Sequence[tuple[str, int, int]]) -> dict[str, dict[str, NDArray[Any]]]:
+def no_imu(n: int) -> ImuSteps:
+    """The samples of n runs without an IMU."""
+    empty = np.zeros((n, 0))
+    return ImuSteps(np.zeros(n, np.int64), empty, empty, empty[..., None], empty[..., None])
+
+
+def entries(
+    samples: PaddedImu, aids: Any, widths: Sequence[tuple[str, int, int]]
+) -> dict[str, dict[str, NDArray[Any]]]:
     """The arrays of `padded` by instrument and name; ``widths``: name, most measurements and components of each."""
     columns: dict[str, dict[str, NDArray[Any]]] = {}
-    if samples[0].shape[1]:
-        when, length, there, rate, force = samples
-        columns["imu"] = {
-            "time": when, "valid": there, "length": length, "angular_rate": rate, "specific_force": force,
-        }  # fmt: skip
+    if samples.time.shape[1]:
+        columns["imu"] = samples._asdict()
     time, valid, values = aids
     for a, (name, k, d) in enumerate(widths):
         columns[name] = {"time": time[:, a, :k], "valid": valid[:, a, :k], "value": values[:, a, :k, :d]}
@@ -203,8 +243,7 @@ class ClosedLoopSteps(ObservedSteps):
         self._samples, self._arrays = padded(s, names, most)
         self._aids = [(name, most[name], widths[name]) for name in names]
         self._sides = {name: np.zeros((s, most[name], width)) for name, width in sides.items()}
-        self._one, nothing = np.zeros((1, 6)), np.zeros((1, 0))
-        self._none = np.zeros(b + 1, np.int64), nothing, nothing, nothing[..., None], nothing[..., None]
+        self._one, self._none = np.zeros((1, 6)), no_imu(b + 1)
         super().__init__(np.zeros((s, 2)), {}, np.zeros((s, 3, 3)), [], {}, {})
         self._share_columns()
         own = runs.names[b]
@@ -236,13 +275,10 @@ class ClosedLoopSteps(ObservedSteps):
         runs, b, i = self._runs, self._b, len(self.rows)
         runs.advance(self._on)
         self.intervals[i] = runs.interval_of(b)
-        imu: Any = self._none
-        if "imu" in self.columns:
-            imu = runs.samples, runs.imu_time, runs.imu_interval, runs.rate, runs.force
-        delivered = runs.count, runs.who, runs.when, runs.value
+        imu = runs.imu_steps if "imu" in self.columns else self._none
         self._which[1][0] = i
         slots, row, aids = (self._slots[0], self._slots[1]), self._one, self._arrays
-        many = keep(self._which, runs.truth, imu, delivered, slots, self._samples, aids, self.truth, row)
+        many = keep.unchecked(self._which, runs.truth, imu, runs.delivered, slots, self._samples, aids, self.truth, row)
         self.rows += row.tolist()
         if self._sides:  # a run with channels has only the block form
             self._place_slots(i)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simnav.environment.navigation import NavigationEnv, Observation
-from simnav.environment.observed_steps import crowded, entries, horizontal, keep, padded
+from simnav.environment.observed_steps import crowded, entries, horizontal, keep, no_imu, padded
 from simnav.simulation.steps import SteppedRuns
 
 __all__ = ["SteeredRuns"]
@@ -80,9 +80,8 @@ class SteeredRuns:
             runs.advance(going)
             self._left -= going
             rows = np.zeros((len(which), 6))
-            imu: Any = self._imu() if samples[0].shape[1] else self._no_imu()
-            delivered = runs.count, runs.who, runs.when, runs.value
-            many = keep((which, which), runs.truth, imu, delivered, self._slots, samples, aids, states, rows)
+            imu = runs.imu_steps if samples.time.shape[1] else no_imu(self.n)
+            many = keep((which, which), runs.truth, imu, runs.delivered, self._slots, samples, aids, states, rows)
             if many >= 0:
                 raise crowded(runs, self._slots, many)
             for i, row in zip(which.tolist(), rows.tolist(), strict=True):
@@ -92,14 +91,6 @@ class SteeredRuns:
             name: {key: np.ascontiguousarray(array) for key, array in entry.items()} for name, entry in columns.items()
         }}  # fmt: skip
         return going
-
-    def _imu(self) -> tuple[NDArray[Any], ...]:
-        runs = self._runs
-        return runs.samples, runs.imu_time, runs.imu_interval, runs.rate, runs.force
-
-    def _no_imu(self) -> tuple[NDArray[Any], ...]:
-        nothing = np.zeros((self.n, 0))
-        return np.zeros(self.n, np.int64), nothing, nothing, nothing[..., None], nothing[..., None]
 
     def last(self, i: int) -> Observation:
         """The observation that comes with the end of a run."""

@@ -61,7 +61,7 @@ _APART = 1e-6
 TrueTimes = Mapping[tuple[str, float], list[float]]
 
 
-def manner_of(given: Any) -> Manner:
+def manner_of(value: Any) -> Manner:
     """The value of a parameter ``late``.
 
     Raises
@@ -69,9 +69,9 @@ def manner_of(given: Any) -> Manner:
     EstimatorError
         If there is no such manner; one sentence.
     """
-    if given not in MANNERS:
-        raise EstimatorError(f"late = {given!r} should be one of: {', '.join(MANNERS)}")
-    manner: Manner = given
+    if value not in MANNERS:
+        raise EstimatorError(f"late = {value!r} should be one of: {', '.join(MANNERS)}")
+    manner: Manner = value
     return manner
 
 

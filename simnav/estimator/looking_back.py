@@ -38,12 +38,12 @@ _LONGEST = 3600.0  # s; each second takes memory
 _TOLERANCE = 1e-6
 
 
-def lags_of(given: Any) -> tuple[float, ...]:
+def lags_of(value: Any) -> tuple[float, ...]:
     """The lags of a parameter ``lags`` [s], ascending, each once.
 
     Parameters
     ----------
-    given : str, float or sequence of float
+    value : str, float or sequence of float
         A text has them with a slash or a comma between.
 
     Raises
@@ -56,13 +56,13 @@ def lags_of(given: Any) -> tuple[float, ...]:
     >>> lags_of("10/5/29.5"), lags_of(10)
     ((5.0, 10.0, 29.5), (10.0,))
     """
-    parts = re.split("[/,]", given) if isinstance(given, str) else [given] if isinstance(given, (int, float)) else given
+    parts = re.split("[/,]", value) if isinstance(value, str) else [value] if isinstance(value, (int, float)) else value
     try:
         found = sorted({float(part) for part in parts})
     except (TypeError, ValueError):
         found = []
     if not found or not all(0.0 <= lag <= _LONGEST for lag in found):
-        raise EstimatorError(f"lags = {given!r} should be times from 0 to {_LONGEST:g} s, like lags=5/10/30")
+        raise EstimatorError(f"lags = {value!r} should be times from 0 to {_LONGEST:g} s, like lags=5/10/30")
     return tuple(found)
 
 

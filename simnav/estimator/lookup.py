@@ -128,12 +128,12 @@ def former_names_of(name: str) -> Mapping[str, str]:
     return {} if cls is None else former_names(cls)
 
 
-def _is_loose(given: Any) -> bool:
+def _is_loose(value: Any) -> bool:
     """The value of a parameter ``loose``."""
-    value = converted(given, bool, False, f"parameter {LOOSE!r}")
-    if not isinstance(value, bool):
-        raise EstimatorError(f"parameter {LOOSE!r} is true or false, not {given!r}")
-    return value
+    loose = converted(value, bool, False, f"parameter {LOOSE!r}")
+    if not isinstance(loose, bool):
+        raise EstimatorError(f"parameter {LOOSE!r} is true or false, not {value!r}")
+    return loose
 
 
 #: Parameters of every row, which are set after it is made: what reads the value.

@@ -262,9 +262,9 @@ def _csv_estimate(line: str) -> Estimate:
     return Estimate(float(numbers[0]), **vectors, covariance=covariance, estimated=_of_errors(given))
 
 
-def _of_errors(given: Any) -> Any:
+def _of_errors(estimated: Any) -> Any:
     """Which error components are estimated: roll and pitch together are the attitude about north and east."""
-    return np.concatenate([given[:6], [given[6] and given[7]] * 2, given[8:]])
+    return np.concatenate([estimated[:6], [estimated[6] and estimated[7]] * 2, estimated[8:]])
 
 
 def _json_step(measurements: Measurements) -> list[str]:

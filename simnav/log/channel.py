@@ -149,17 +149,17 @@ def list_recordings(spec: RecordedSpec) -> tuple[str, ...]:
     )
 
 
-def _of_recording(spec: RecordedSpec, given: float | tuple[float, ...], recording: str, what: str) -> float:
+def _of_recording(spec: RecordedSpec, value: float | tuple[float, ...], recording: str, what: str) -> float:
     """The value for a recording of a key that has one, or one for each."""
-    if not isinstance(given, tuple):
-        return given
+    if not isinstance(value, tuple):
+        return value
     names = list_recordings(spec)
-    if len(given) != len(names):
+    if len(value) != len(names):
         raise LogError(
-            f"{what} has {len(given)} values for {len(names)} recordings ({', '.join(names)}); "
+            f"{what} has {len(value)} values for {len(names)} recordings ({', '.join(names)}); "
             f"give one, or one for each"
         )
-    return given[names.index(recording)]
+    return value[names.index(recording)]
 
 
 def skip_of(spec: RecordedSpec, recording: str) -> float:

@@ -83,12 +83,12 @@ def _read(path: Path, file: FileSpec, sentence: str | None, talker: str | None) 
     return Rows(table, time, file.clock, np.flatnonzero(np.isfinite(time)))
 
 
-def _checksum_ok(body: str, given: str) -> bool:
+def _checksum_ok(body: str, checksum: str) -> bool:
     total = 0
     for c in body:
         total ^= ord(c)
     try:
-        return total == int(given[:2], 16)
+        return total == int(checksum[:2], 16)
     except ValueError:
         return False
 

@@ -14,11 +14,19 @@ A. E. Niell, *Global mapping functions for the atmosphere delay at radio wavelen
 from __future__ import annotations
 
 from math import cos, exp, pi, sin
+from typing import NamedTuple
 
 from simnav.compiled import Array, helper
 from simnav.satellites.orbit import SPEED_OF_LIGHT
 
-__all__ = ["HUMIDITY", "ionosphere_scalar", "mapping_coefficients", "mapping_scalar", "zenith_delay_scalar"]
+__all__ = [
+    "HUMIDITY",
+    "MappingCoefficients",
+    "ionosphere_scalar",
+    "mapping_coefficients",
+    "mapping_scalar",
+    "zenith_delay_scalar",
+]
 
 #: Relative humidity of the standard atmosphere [-].
 HUMIDITY = 0.5
@@ -107,8 +115,27 @@ def _between(row: int, degrees: float) -> float:
     return first + share * (second - first)
 
 
+class MappingCoefficients(NamedTuple):
+    """Niell's coefficients of the mapping functions.
+
+    Attributes
+    ----------
+    dry_a, dry_b, dry_c : float
+        Of the hydrostatic mapping function.
+    wet_a, wet_b, wet_c : float
+        Of the wet mapping function.
+    """
+
+    dry_a: float
+    dry_b: float
+    dry_c: float
+    wet_a: float
+    wet_b: float
+    wet_c: float
+
+
 @helper
-def mapping_coefficients(day_of_year: float, latitude: float) -> tuple[float, float, float, float, float, float]:
+def mapping_coefficients(day_of_year: float, latitude: float) -> MappingCoefficients:
     """Niell's coefficients a, b, c of the hydrostatic and of the wet mapping function.
 
     Parameters
@@ -123,25 +150,23 @@ def mapping_coefficients(day_of_year: float, latitude: float) -> tuple[float, fl
     a = _between(0, degrees) - _between(3, degrees) * season
     b = _between(1, degrees) - _between(4, degrees) * season
     c = _between(2, degrees) - _between(5, degrees) * season
-    return a, b, c, _between(6, degrees), _between(7, degrees), _between(8, degrees)
+    return MappingCoefficients(a, b, c, _between(6, degrees), _between(7, degrees), _between(8, degrees))
 
 
 @helper
-def mapping_scalar(
-    coefficients: tuple[float, float, float, float, float, float], height: float, elevation: float
-) -> tuple[float, float]:
+def mapping_scalar(mapping: MappingCoefficients, height: float, elevation: float) -> tuple[float, float]:
     """Niell's hydrostatic and wet mapping function: the slant delay in units of the zenith delay.
 
     Parameters
     ----------
-    coefficients : tuple of float
-        Of `mapping_coefficients`.
+    mapping : MappingCoefficients
+        The coefficients.
     height : float
         Of the receiver [m].
     elevation : float
         Of the satellite, above 0 [rad].
     """
-    a, b, c, wet_a, wet_b, wet_c = coefficients
     s = sin(elevation)
     above = (1.0 / s - _fraction(s, _HEIGHT_A, _HEIGHT_B, _HEIGHT_C)) * height / 1000.0
-    return _fraction(s, a, b, c) + above, _fraction(s, wet_a, wet_b, wet_c)
+    dry = _fraction(s, mapping.dry_a, mapping.dry_b, mapping.dry_c) + above
+    return dry, _fraction(s, mapping.wet_a, mapping.wet_b, mapping.wet_c)

@@ -204,7 +204,7 @@ def _states(numbers: Matrix, begin: IntegerVector, reach: Vector, time: Vector, 
             if k < 0:
                 out[i, j, :] = float("nan")
             else:
-                x, y, z, vx, vy, vz, clock, drift = satellite_scalar(numbers[k], time[i])
-                out[i, j, 0], out[i, j, 1], out[i, j, 2] = x, y, z
-                out[i, j, 3], out[i, j, 4], out[i, j, 5] = vx, vy, vz
-                out[i, j, 6], out[i, j, 7] = clock, drift
+                at = satellite_scalar(numbers[k], time[i])
+                out[i, j, 0], out[i, j, 1], out[i, j, 2] = at.x, at.y, at.z
+                out[i, j, 3], out[i, j, 4], out[i, j, 5] = at.vx, at.vy, at.vz
+                out[i, j, 6], out[i, j, 7] = at.clock, at.drift

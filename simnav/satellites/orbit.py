@@ -21,10 +21,11 @@ Remondi, *Computing satellite velocity using the broadcast ephemeris*, GPS Solut
 from __future__ import annotations
 
 from math import atan2, cos, pi, sin, sqrt
+from typing import NamedTuple
 
 from simnav.compiled import Array, helper
 
-__all__ = ["ELEMENTS", "SPEED_OF_LIGHT", "satellite_scalar"]
+__all__ = ["ELEMENTS", "SPEED_OF_LIGHT", "SatelliteState", "satellite_scalar"]
 
 #: Speed of light in vacuum [m/s].
 SPEED_OF_LIGHT = 299792458.0
@@ -40,8 +41,31 @@ ELEMENTS = (
 _TILT = -5.0 / 180.0 * pi
 
 
+class SatelliteState(NamedTuple):
+    """A satellite at one time.
+
+    Attributes
+    ----------
+    x, y, z : float
+        Coordinates in the Earth-fixed frame at this time [m].
+    vx, vy, vz : float
+        Their derivatives [m/s].
+    clock, drift : float
+        Time of the satellite's clock minus GPS time [s], and its derivative [s/s].
+    """
+
+    x: float
+    y: float
+    z: float
+    vx: float
+    vy: float
+    vz: float
+    clock: float
+    drift: float
+
+
 @helper
-def satellite_scalar(q: Array, time: float) -> tuple[float, float, float, float, float, float, float, float]:
+def satellite_scalar(q: Array, time: float) -> SatelliteState:
     """Position, velocity and clock of a satellite at one time.
 
     Parameters
@@ -53,12 +77,7 @@ def satellite_scalar(q: Array, time: float) -> tuple[float, float, float, float,
 
     Returns
     -------
-    x, y, z : float
-        Coordinates in the Earth-fixed frame at this time [m].
-    vx, vy, vz : float
-        Their derivatives [m/s].
-    clock, drift : float
-        Time of the satellite's clock minus GPS time [s], and its derivative [s/s].
+    SatelliteState
     """
     toe, toc, a0, a1, a2 = q[0], q[1], q[2], q[3], q[4]
     root_a, e, i0, node0, perigee, anomaly0 = q[5], q[6], q[7], q[8], q[9], q[10]
@@ -112,4 +131,4 @@ def satellite_scalar(q: Array, time: float) -> tuple[float, float, float, float,
     relativity = -2.0 * sqrt(mu) * root_a * e / (SPEED_OF_LIGHT * SPEED_OF_LIGHT)
     clock = a0 + since * (a1 + since * a2) + relativity * sin_E
     drift = a1 + 2.0 * since * a2 + relativity * cos_E * E_rate
-    return x, y, z, vx, vy, vz, clock, drift
+    return SatelliteState(x, y, z, vx, vy, vz, clock, drift)

@@ -15,6 +15,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from math import asin, atan2, cos, sin, sqrt
+from typing import NamedTuple
 
 import numpy as np
 
@@ -116,7 +117,7 @@ class Sky:
         time, position, velocity = (np.ascontiguousarray(a, dtype=np.float64) for a in (time, position, velocity))
         out = np.empty((len(time), len(self.satellites), _COLUMNS))
         begin = np.array([self._begin, self._second_of_day, self._day_of_year])
-        _look((*self._table, self._klobuchar, begin), time, position, velocity, out)
+        _look(_Sky(*self._table, self._klobuchar, begin), time, position, velocity, out)
         if not self._has_ionosphere:
             out[..., 12] = np.where(np.isnan(out[..., 12]), np.nan, 0.0)
         return Sight(out[..., 0:3], out[..., 3:6], *(out[..., k] for k in range(6, _COLUMNS)))
@@ -130,36 +131,52 @@ def _apparent(q: Array, time: float, antenna: tuple[float, float, float], out: A
     orbit is exact to rounding.
     """
     tau = _TYPICAL_DELAY
-    x, y, z, vx, vy, vz, _, _ = satellite_scalar(q, time - tau)
+    at = satellite_scalar(q, time - tau)
     for _ in range(4):
         earlier = _TYPICAL_DELAY - tau
         s, c = sin(ROTATION_RATE * tau), cos(ROTATION_RATE * tau)
-        ax, ay, az = x + vx * earlier, y + vy * earlier, z + vz * earlier
+        ax, ay, az = at.x + at.vx * earlier, at.y + at.vy * earlier, at.z + at.vz * earlier
         dx, dy, dz = c * ax + s * ay - antenna[0], c * ay - s * ax - antenna[1], az - antenna[2]
         tau = sqrt(dx * dx + dy * dy + dz * dz) / SPEED_OF_LIGHT
-    x, y, z, vx, vy, vz, clock, drift = satellite_scalar(q, time - tau)
+    at = satellite_scalar(q, time - tau)
     s, c = sin(ROTATION_RATE * tau), cos(ROTATION_RATE * tau)
-    out[0], out[1], out[2] = c * x + s * y, c * y - s * x, z
-    out[3], out[4], out[5] = c * vx + s * vy, c * vy - s * vx, vz
-    out[10], out[11] = clock, drift
+    out[0], out[1], out[2] = c * at.x + s * at.y, c * at.y - s * at.x, at.z
+    out[3], out[4], out[5] = c * at.vx + s * at.vy, c * at.vy - s * at.vx, at.vz
+    out[10], out[11] = at.clock, at.drift
     dx, dy, dz = out[0] - antenna[0], out[1] - antenna[1], out[2] - antenna[2]
     return sqrt(dx * dx + dy * dy + dz * dz) / SPEED_OF_LIGHT
 
 
+class _Sky(NamedTuple):
+    """What decides on the signals of c satellites.
+
+    Attributes
+    ----------
+    numbers, first, reach : array
+        The table of `Ephemerides.table`.
+    klobuchar : (8,) array
+        Klobuchar's coefficients.
+    begin : (3,) array
+        Of the begin of the run: seconds since the begin of the table's week, second of the day, day of the year.
+    """
+
+    numbers: Matrix
+    first: IntegerVector
+    reach: Vector
+    klobuchar: Vector
+    begin: Vector
+
+
 @kernel
 def _look(
-    sky: tuple[Matrix, IntegerVector, Vector, Vector, Vector],
+    sky: _Sky,
     time: Vector,
     position: Matrix,
     velocity: Matrix,
     out: Stack,
 ) -> None:
-    """Overwrite ``out`` with the columns of `Sight`, in its order, for n times and c satellites.
-
-    ``sky`` holds the table of `Ephemerides.table`, Klobuchar's coefficients, and of the begin of the run: seconds since
-    the begin of the table's week, second of the day, day of the year.
-    """
-    numbers, first, reach, klobuchar, begin = sky
+    """Overwrite ``out`` with the columns of `Sight`, in its order, for n times and c satellites."""
+    numbers, first, begin = sky.numbers, sky.first, sky.begin
     for i in range(out.shape[0]):
         latitude, longitude, height = position[i, 0], position[i, 1], position[i, 2]
         antenna = ecef_from_geodetic_scalar(latitude, longitude, height)
@@ -171,7 +188,7 @@ def _look(
         mapping = mapping_coefficients(begin[2] + time[i] / 86400.0, latitude)
         for j in range(out.shape[1]):
             row = out[i, j]
-            k = nearest(numbers, first[j], first[j + 1], reach[j], begin[0] + time[i])
+            k = nearest(numbers, first[j], first[j + 1], sky.reach[j], begin[0] + time[i])
             if k < 0:
                 row[:] = float("nan")
                 continue
@@ -195,7 +212,7 @@ def _look(
             azimuth = atan2(east, north)
             row[8], row[9] = elevation, azimuth
             if elevation > 0.0:
-                row[12] = ionosphere_scalar(klobuchar, second, latitude, longitude, azimuth, elevation)
+                row[12] = ionosphere_scalar(sky.klobuchar, second, latitude, longitude, azimuth, elevation)
                 dry_mapping, wet_mapping = mapping_scalar(mapping, height, elevation)
                 row[13], row[14] = dry * dry_mapping + wet * wet_mapping, wet_mapping
             else:

@@ -8,7 +8,7 @@ import numpy as np
 
 from simnav.kinds import HEADING, Component, Kind
 from simnav.sensors.instrument import AidSpec, Instrument, register_instrument
-from simnav.sensors.observation import COMPASS, GYROCOMPASS, OWN, CompiledInstrument
+from simnav.sensors.observation import COMPASS, GYROCOMPASS, CompiledInstrument
 from simnav.spec import NonNegative, quantity
 
 __all__ = ["Gyrocompass", "MagneticCompass"]
@@ -52,7 +52,7 @@ class _MagneticCompass(CompiledInstrument):
     def __init__(self, spec: MagneticCompass, name: str, seed: int):
         super().__init__(spec, name, seed)
         self.deviation = self.drawn("deviation", np.full(2, spec.deviation)) + spec.fixed_deviation
-        self.numbers[OWN : OWN + 2], self.numbers[OWN + 2] = self.deviation, float(self.deviation.any())
+        self.parameters.own[:2], self.parameters.own[2] = self.deviation, float(self.deviation.any())
 
 
 @register_instrument(Kind("true heading", "heading", HEADING_COMPONENT, HEADING), example={"sigma_deg": 0.5})
@@ -87,4 +87,4 @@ class _Gyrocompass(CompiledInstrument):
 
     def __init__(self, spec: Gyrocompass, name: str, seed: int):
         super().__init__(spec, name, seed)
-        self.numbers[OWN] = float(spec.speed_error)
+        self.parameters.own[0] = float(spec.speed_error)

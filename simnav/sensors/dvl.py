@@ -22,11 +22,6 @@ from simnav.sensors.instrument import (
 )
 from simnav.sensors.observation import (
     BODY_VELOCITY,
-    DEPTH_OF_WATER,
-    HIGHEST,
-    LOWEST,
-    OWN,
-    SPEED_NOISE_SQUARED,
     CompiledInstrument,
 )
 from simnav.spec import NonNegative, Positive, Vector, quantity
@@ -96,9 +91,9 @@ class _Dvl(CompiledInstrument):
         super().__init__(spec, name, seed)
         turn = self.drawn("misalignment", np.asarray(spec.misalignment)) + spec.fixed_misalignment
         self.misalignment = turn
-        self.numbers[OWN : OWN + 9] = ((1.0 + self.scale) * dcm_from_rotation_vector(turn).T).ravel()
-        self.numbers[SPEED_NOISE_SQUARED] = spec.speed_noise**2
-        self.numbers[LOWEST], self.numbers[HIGHEST] = spec.minimum_altitude, spec.maximum_altitude
+        self.parameters.own[:] = ((1.0 + self.scale) * dcm_from_rotation_vector(turn).T).ravel()
+        self.parameters.speed_variance[0] = spec.speed_noise**2
+        self.parameters.altitude[:] = spec.minimum_altitude, spec.maximum_altitude
 
     def enter(self, surroundings: Surroundings) -> None:
         """See `Instrument.enter`. The kernel knows a flat bottom; any other bottom is asked here."""
@@ -106,7 +101,7 @@ class _Dvl(CompiledInstrument):
         bottom = surroundings.get("bottom")
         self.in_kernel = bottom is None or isinstance(bottom, FlatBottom)
         if isinstance(bottom, FlatBottom):
-            self.numbers[DEPTH_OF_WATER] = bottom.water_depth
+            self.parameters.water_depth[0] = bottom.water_depth
 
     def reading(self, tap: TapStates) -> tuple[Array, Array, NDArray[np.bool_] | None]:
         """See `Instrument.reading`."""
@@ -114,5 +109,6 @@ class _Dvl(CompiledInstrument):
         if not self.in_kernel:
             place = displace(tap.position, self.lever_displacement(tap))
             altitude = place[:, 2] + self.surroundings["bottom"].depth(place, tap.time)
-            there = (self.numbers[LOWEST] <= altitude) & (altitude <= self.numbers[HIGHEST])
+            lowest, highest = self.parameters.altitude.tolist()
+            there = (lowest <= altitude) & (altitude <= highest)
         return value, sigma, there

@@ -7,6 +7,8 @@ reading is all that is needed.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from simnav.compiled import helper, kernel, ready
@@ -101,23 +103,53 @@ def _equal(x: Array, y: Array) -> bool:
     return True
 
 
+class _States(NamedTuple):
+    """n states, as of `NavigationPoints`."""
+
+    position: Matrix
+    velocity: Matrix
+    dcm: Stack
+    rate: Matrix
+
+
+class _Blocks(NamedTuple):
+    """The states of the receiver at n readings: (n, 2), (n, 1), (n, channels) and (n, 1) arrays.
+
+    The last one has no columns with two frequencies.
+    """
+
+    clock: Matrix
+    troposphere: Matrix
+    signals: Matrix
+    ionosphere: Matrix
+
+
+class _Jacobians(NamedTuple):
+    """The derivatives of n readings by position, velocity and attitude (n, 2, 9), and by blocks (n, 2, ...)."""
+
+    navigation: Stack
+    troposphere: Stack
+    signals: Stack
+    ionosphere: Stack
+
+
 @kernel
 def _predict_all(
-    states: tuple[Matrix, Matrix, Stack, Matrix],
+    states: _States,
     arm: Vector,
     side: Matrix,
     channel: IntegerVector,
     sigma: Vector,
-    blocks: tuple[Matrix, Matrix, Matrix, Matrix],
+    blocks: _Blocks,
     reading: Matrix,
-    jacobians: tuple[Stack, Stack, Stack, Stack],
+    jacobians: _Jacobians,
 ) -> None:
     """Predict n readings, and their Jacobians.
 
     Parameters
     ----------
-    states : tuple of (n, ...) array
-        Position, velocity, DCM and angular rate, as of `NavigationPoints`.
+    states : _States
+        The states.
     arm : (3,) array
         Lever arm of the antenna [m].
     side : (n, 12) array
@@ -126,17 +158,15 @@ def _predict_all(
         Channels.
     sigma : (n,) array
         One sigma of the lasting error of each range [m].
-    blocks : (n, 2), (n, 1), (n, channels) and (n, 1) or (n, 0) array
-        Clock, troposphere, signals and ionosphere; the last one without columns with two frequencies.
+    blocks : _Blocks
+        The states of the receiver.
     reading : (n, 2) array
         Overwritten with range and its rate.
-    jacobians : (n, 2, 9) array, and (n, 2, ...) arrays of zeros
-        The first is overwritten with the derivative by navigation; into the others come those by troposphere, signals
-        and ionosphere.
+    jacobians : _Jacobians
+        Zeros, overwritten.
     """
-    position, velocity, dcm, rate = states
-    clock, troposphere, signals, ionosphere = blocks
-    navigation, by_troposphere, by_signals, by_ionosphere = jacobians
+    position, dcm, rate = states.position, states.dcm, states.rate
+    clock, ionosphere = blocks.clock, blocks.ionosphere
     antenna = np.empty(13)
     for i in range(len(position)):
         # Satellites at one state follow each other.
@@ -148,15 +178,15 @@ def _predict_all(
             and _equal(dcm[i, 2], dcm[i - 1, 2])
         ):
             _antenna(position[i], dcm[i], rate[i], arm, antenna)
-        _predict(antenna, velocity[i], side[i], reading[i], navigation[i])
+        _predict(antenna, states.velocity[i], side[i], reading[i], jacobians.navigation[i])
         c, mapping = channel[i], side[i, MAPPING]
         reading[i, 1] += clock[i, 1]
         x = reading[i, 0] + clock[i, 0]
-        x += side[i, TROPOSPHERE] + mapping * troposphere[i, 0] + sigma[i] * signals[i, c]
-        by_troposphere[i, 0, 0], by_signals[i, 0, c] = mapping, sigma[i]
+        x += side[i, TROPOSPHERE] + mapping * blocks.troposphere[i, 0] + sigma[i] * blocks.signals[i, c]
+        jacobians.troposphere[i, 0, 0], jacobians.signals[i, 0, c] = mapping, sigma[i]
         if ionosphere.shape[1] > 0:
             x += side[i, IONOSPHERE] * (1.0 + ionosphere[i, 0])
-            by_ionosphere[i, 0, 0] = side[i, IONOSPHERE]
+            jacobians.ionosphere[i, 0, 0] = side[i, IONOSPHERE]
         reading[i, 0] = x
 
 
@@ -172,18 +202,17 @@ def observe_all(points: NavigationPoints, sheet: Datasheet) -> tuple[Array, dict
     reading, navigation, signals = np.empty((n, 2)), np.empty((n, 2, 9)), np.zeros((n, 2, len(sheet.channels)))
     troposphere, ionosphere = np.zeros((n, 2, 1)), np.zeros((n, 2, 1))
     delay = blocks["ionosphere"] if frequencies == 1 else np.empty((n, 0))
-    _predict_all(
-        (ready(position), ready(velocity), ready(dcm), ready(rate)), sheet.lever_arm, ready(side), channel, sigma,
-        (ready(blocks["clock"]), ready(blocks["troposphere"]), ready(blocks["signals"]), ready(delay)), reading,
-        (navigation, troposphere, signals, ionosphere),
-    )  # fmt: skip
-    given = {
+    states = _States(ready(position), ready(velocity), ready(dcm), ready(rate))
+    receiver = _Blocks(ready(blocks["clock"]), ready(blocks["troposphere"]), ready(blocks["signals"]), ready(delay))
+    jacobians = _Jacobians(navigation, troposphere, signals, ionosphere)
+    _predict_all(states, sheet.lever_arm, ready(side), channel, sigma, receiver, reading, jacobians)
+    by_block = {
         "navigation": navigation, "clock": np.broadcast_to(_CLOCK, (n, 2, 2)), "troposphere": troposphere,
         "signals": signals,
     }  # fmt: skip
     if frequencies == 1:
-        given["ionosphere"] = ionosphere
-    return reading, given
+        by_block["ionosphere"] = ionosphere
+    return reading, by_block
 
 
 def _figures(sheet: Datasheet, elevation: Array) -> tuple[Array, int]:

@@ -21,7 +21,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from math import inf, sqrt
-from typing import Any, ClassVar, Literal, Self, TypeAlias
+from typing import Any, ClassVar, Literal, NamedTuple, Self
 
 import numpy as np
 from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
@@ -38,7 +38,16 @@ from simnav.spec import NonNegative, Positive, Spec, SpecError, Vector, closest,
 from simnav.streams import stream
 from simnav.types import Array, ImuDatasheet, ImuSamples, TriadDatasheet
 
-__all__ = ["AccelerometerSpec", "GyroscopeSpec", "Imu", "ImuSpec", "TriadSpec", "triad_errors"]
+__all__ = [
+    "AccelerometerSpec",
+    "GyroscopeSpec",
+    "HeldTable",
+    "Imu",
+    "ImuSpec",
+    "TriadErrors",
+    "TriadSpec",
+    "triad_errors",
+]
 
 _ZERO: Vector = (0.0, 0.0, 0.0)
 #: The error fields of a triad; each name also exists with the prefix ``fixed_``.
@@ -248,14 +257,46 @@ def _named(model: Any, grade: Any) -> ImuModel:
     return imu_model(name)
 
 
-#: A bias that is constant between the rows of a (k, 3) table: the table, the number of its first row, and the number of
-#: rows in a second.
-Held: TypeAlias = tuple[Array, int, float]
-#: The numbers of a triad: matrix I + S + M (3, 3), turn-on bias (3,), density of the white noise, range, and
-#: quantization step of the increment (0: none).
-Triad: TypeAlias = tuple[Array, Array, float, float, float]
+class HeldTable(NamedTuple):
+    """A bias that is constant between the rows of a table.
 
-_HELD = "Tuple((f8[:, ::1], i8, f8))"
+    Attributes
+    ----------
+    rows : (k, 3) array
+        The bias [rad/s or m/s^2].
+    first : int
+        Number of the first row.
+    per_second : float
+        Number of rows in a second.
+    """
+
+    rows: Matrix
+    first: int
+    per_second: float
+
+
+class TriadErrors(NamedTuple):
+    """The error parameters of a triad.
+
+    Attributes
+    ----------
+    matrix : (3, 3) array
+        I + S + M, with scale factor and misalignment.
+    bias : (3,) array
+        Turn-on bias [rad/s or m/s^2].
+    density : float
+        Density of the white noise.
+    range : float
+        Largest absolute value of a sample.
+    step : float
+        Quantization step of the increment; 0: none.
+    """
+
+    matrix: Matrix
+    bias: kernel_types.Vector
+    density: float
+    range: float
+    step: float
 
 
 @kernel
@@ -265,9 +306,9 @@ def triad_errors(
     out: Matrix,
     time: kernel_types.Vector,
     interval: kernel_types.Vector,
-    triad: tuple[Matrix, kernel_types.Vector, float, float, float],
-    in_run: tuple[Matrix, int, float],
-    walk: tuple[Matrix, int, float],
+    triad: TriadErrors,
+    in_run: HeldTable,
+    walk: HeldTable,
     residual: kernel_types.Vector,
 ) -> None:
     """Add the errors of one triad (see the module).
@@ -280,27 +321,25 @@ def triad_errors(
         Samples with errors, overwritten; it may be the same array as ``ideal``.
     time, interval : (n,) arrays
         Ends of the sample intervals, and their lengths [s].
-    triad : tuple
-        Error parameters of the triad, see `Triad`.
-    in_run, walk : tuple
-        In-run bias g and rate random walk r, see `Held`.
+    triad : TriadErrors
+        Error parameters of the triad.
+    in_run, walk : HeldTable
+        In-run bias g and rate random walk r.
     residual : (3,) array
         Quantization residual of the increments so far; updated.
     """
-    matrix, bias, density, limit, step = triad
-    instability, first_i, per_second_i = in_run
-    walked, first_w, per_second_w = walk
-    last_i = len(instability) - 1
-    last_w = len(walked) - 1
+    matrix, bias, density, limit, step = triad.matrix, triad.bias, triad.density, triad.range, triad.step
+    last_i = len(in_run.rows) - 1
+    last_w = len(walk.rows) - 1
     for i in range(len(time)):
         dt = interval[i]
         noise = density / sqrt(dt)
-        ki = min(max(int(time[i] * per_second_i + 1e-6) - first_i, 0), last_i)
-        kw = min(max(int(time[i] * per_second_w + 1e-6) - first_w, 0), last_w)
+        ki = min(max(int(time[i] * in_run.per_second + 1e-6) - in_run.first, 0), last_i)
+        kw = min(max(int(time[i] * walk.per_second + 1e-6) - walk.first, 0), last_w)
         x, y, z = ideal[i, 0], ideal[i, 1], ideal[i, 2]
         for j in range(3):
             value = matrix[j, 0] * x + matrix[j, 1] * y + matrix[j, 2] * z
-            value += bias[j] + instability[ki, j] + walked[kw, j] + noise * variates[i, j]
+            value += bias[j] + in_run.rows[ki, j] + walk.rows[kw, j] + noise * variates[i, j]
             value = min(max(value, -limit), limit)
             if step > 0.0:
                 increment, residual[j] = quantize_scalar(value * dt, step, residual[j])
@@ -353,14 +392,14 @@ class _Triad:
 
     def sense(self, ideal: Array, time: Array, interval: Array, out: Array) -> None:
         until = float(time[-1])
-        triad: Triad = (self.matrix, self.bias, self.density, self.range, self.step)
-        in_run = (*self.instability.table(until), self.instability.per_second)
-        walk = (*self.walk.table(until), self.walk.per_second)
+        triad = TriadErrors(self.matrix, self.bias, self.density, self.range, self.step)
+        in_run = HeldTable(*self.instability.table(until), self.instability.per_second)
+        walk = HeldTable(*self.walk.table(until), self.walk.per_second)
         for a in range(0, len(time), _CHUNK):
             part = slice(a, a + _CHUNK)
             if self.density > 0.0:
                 self._noise.fill(self._variates[: len(time[part])])
-            triad_errors(
+            triad_errors.unchecked(
                 ideal[part], self._variates, out[part], time[part], interval[part], triad, in_run, walk, self.residual
             )  # fmt: skip
 

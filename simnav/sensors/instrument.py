@@ -434,7 +434,7 @@ class Instrument(ABC):
         Scale-factor error of this run [-].
     lever_arm : (3,) array
         Vector from the IMU to the instrument in body axes (forward, starboard, down) [m].
-    levered : bool
+    has_lever_arm : bool
         True if the lever arm is not zero.
     surroundings : Surroundings
         Sea, current, bottom and other parts, which the instrument may ask at its places and times (`enter`).
@@ -466,7 +466,7 @@ class Instrument(ABC):
         self._blocks = {block.name: BlockValues(block, block.label(name), seed) for block in sheet.blocks}
         if LEVER_ARM in self._blocks:
             self.lever_arm = sheet.lever_arm + self.block(LEVER_ARM, np.zeros(1))[0]
-        self.levered = bool(self.lever_arm.any())
+        self.has_lever_arm = bool(self.lever_arm.any())
 
     def block(self, name: str, time: Array) -> Array:
         """The true values of a block of states at n times.

@@ -93,14 +93,14 @@ def observe(point: NavigationPoint, sheet: Datasheet) -> tuple[Array, dict[str, 
     earth = np.array(sheet.details["field"])
     if "anomaly" in blocks:
         earth = earth + blocks["anomaly"]
-    stretch = _soft(blocks["soft_iron"]) if "soft_iron" in blocks else np.eye(3)
-    into = stretch @ point.dcm.T
+    soft_iron = _soft(blocks["soft_iron"]) if "soft_iron" in blocks else np.eye(3)
+    into = soft_iron @ point.dcm.T
     body = point.dcm.T @ earth
     north, east, down = earth
     navigation = np.zeros((3, 9))
     navigation[:, 6:9] = into @ np.array([[0.0, -down, east], [down, 0.0, -north], [-east, north, 0.0]])
     jacobian = {"navigation": navigation}
-    reading = stretch @ body
+    reading = soft_iron @ body
     if "hard_iron" in blocks:
         reading = reading + blocks["hard_iron"]
         jacobian["hard_iron"] = np.eye(3)

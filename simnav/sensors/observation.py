@@ -7,7 +7,7 @@ agree bit for bit.
 from __future__ import annotations
 
 from math import atan2, cos, sin, sqrt
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +29,8 @@ __all__ = [
     "VELOCITY",
     "WATER_SPEED",
     "CompiledInstrument",
+    "InstrumentNumbers",
+    "instrument_numbers",
     "noise_scalar",
     "observe_one",
     "observe_rows",
@@ -37,13 +39,87 @@ __all__ = [
 #: Codes of the observed quantities.
 POSITION, HORIZONTAL_POSITION, VELOCITY, BODY_VELOCITY, WATER_SPEED, COMPASS, GYROCOMPASS, DEPTH = range(8)
 
-#: The parameters of an instrument as an array of numbers: scale-factor error; lever arm, and 1 if it is not zero; nine
-#: numbers that depend on the kind (for a DVL its matrix; for a compass the coefficients of deviation, and 1 if they are
-#: not zero; for a gyrocompass 1 if it has a speed error); water depth (NaN: unknown), and smallest and largest altitude
-#: with bottom lock; sigma of the white noise, and its square, by component; square of the speed-dependent noise.
-SCALE, LEVER, LEVERED, OWN, DEPTH_OF_WATER, LOWEST, HIGHEST = 0, 1, 4, 5, 14, 15, 16
-SIGMA, SIGMA_SQUARED, SPEED_NOISE_SQUARED = 17, 20, 23
+#: Length of the array that holds `InstrumentNumbers`.
 NUMBERS = 24
+
+
+class InstrumentNumbers(NamedTuple):
+    """The parameters of an instrument: parts of one array.
+
+    Attributes
+    ----------
+    scale : (1,) array
+        Scale-factor error [-].
+    lever_arm, has_lever_arm : (3,), (1,) array
+        Lever arm [m], and 1 if it is not zero.
+    own : (9,) array
+        What depends on the kind: for a DVL its matrix by rows; for a compass the two coefficients of its deviation
+        [rad], and 1 if they are not zero; for a gyrocompass 1 if it has a speed error.
+    water_depth : (1,) array
+        NaN: unknown [m].
+    altitude : (2,) array
+        Smallest and largest one with bottom lock [m].
+    sigma, variance : (3,) array
+        Of the white noise, by component.
+    speed_variance : (1,) array
+        Square of the speed-dependent noise.
+    """
+
+    scale: Array
+    lever_arm: Array
+    has_lever_arm: Array
+    own: Array
+    water_depth: Array
+    altitude: Array
+    sigma: Array
+    variance: Array
+    speed_variance: Array
+
+
+@helper
+def instrument_numbers(q: Array) -> InstrumentNumbers:
+    """The parts of an array of `NUMBERS` numbers."""
+    return InstrumentNumbers(
+        scale=q[0:1],
+        lever_arm=q[1:4],
+        has_lever_arm=q[4:5],
+        own=q[5:14],
+        water_depth=q[14:15],
+        altitude=q[15:17],
+        sigma=q[17:20],
+        variance=q[20:23],
+        speed_variance=q[23:24],
+    )
+
+
+class TrueState(NamedTuple):
+    """The true state at which an instrument measures: parts of one array of 15 numbers.
+
+    Attributes
+    ----------
+    position : (3,) array
+        Latitude, longitude [rad], height [m].
+    velocity : (3,) array
+        North, east, down [m/s].
+    attitude : (3,) array
+        Roll, pitch, yaw [rad].
+    angular_rate : (3,) array
+        In body axes [rad/s].
+    water : (3,) array
+        Velocity of the water, north, east, down [m/s].
+    """
+
+    position: Array
+    velocity: Array
+    attitude: Array
+    angular_rate: Array
+    water: Array
+
+
+@helper
+def true_state(tap: Array) -> TrueState:
+    """The parts of an array of 15 numbers."""
+    return TrueState(tap[0:3], tap[3:6], tap[6:9], tap[9:12], tap[12:15])
 
 
 @helper
@@ -73,10 +149,9 @@ def observe_one(code: int, q: Array, tap: Array, value: Array) -> bool:
     code : int
         Code of the observed quantity (the constants of this module).
     q : (24,) array
-        Parameters of the instrument, in the order of `NUMBERS`.
+        Parameters of the instrument, see `InstrumentNumbers`.
     tap : (15,) array
-        True state: position (latitude, longitude [rad], height [m]), velocity north-east-down [m/s], roll, pitch and
-        yaw [rad], angular rate in body axes [rad/s], velocity of the water north-east-down [m/s].
+        True state, see `TrueState`.
     value : (d,) array
         The reading, overwritten.
 
@@ -85,61 +160,64 @@ def observe_one(code: int, q: Array, tap: Array, value: Array) -> bool:
     bool
         True if the instrument delivers a measurement at this state.
     """
-    levered = q[LEVERED] > 0.0
+    own, at = instrument_numbers(q), true_state(tap)
+    position, velocity, water = at.position, at.velocity, at.water
+    roll, pitch, yaw = at.attitude[0], at.attitude[1], at.attitude[2]
+    arm, rate, water_depth = own.lever_arm, at.angular_rate, own.water_depth[0]
+    has_lever_arm = own.has_lever_arm[0] > 0.0
     n, e, d = 0.0, 0.0, 0.0
-    if levered and (code <= HORIZONTAL_POSITION or code == DEPTH or q[DEPTH_OF_WATER] == q[DEPTH_OF_WATER]):
-        n, e, d = _to_ned(tap[6], tap[7], tap[8], q[LEVER], q[LEVER + 1], q[LEVER + 2])
-    wx = tap[10] * q[LEVER + 2] - tap[11] * q[LEVER + 1]
-    wy = tap[11] * q[LEVER] - tap[9] * q[LEVER + 2]
-    wz = tap[9] * q[LEVER + 1] - tap[10] * q[LEVER]
+    if has_lever_arm and (code <= HORIZONTAL_POSITION or code == DEPTH or water_depth == water_depth):
+        n, e, d = _to_ned(roll, pitch, yaw, arm[0], arm[1], arm[2])
+    wx = rate[1] * arm[2] - rate[2] * arm[1]
+    wy = rate[2] * arm[0] - rate[0] * arm[2]
+    wz = rate[0] * arm[1] - rate[1] * arm[0]
     if code <= HORIZONTAL_POSITION:
-        latitude, longitude, height = tap[0], tap[1], tap[2]
-        if levered:
+        latitude, longitude, height = position[0], position[1], position[2]
+        if has_lever_arm:
             latitude, longitude, height = displace_scalar(latitude, longitude, height, n, e, d)
         value[0], value[1] = latitude, longitude
         if code == POSITION:
             value[2] = height
     elif code == VELOCITY:
-        value[0], value[1], value[2] = tap[3], tap[4], tap[5]
-        if levered:
-            n, e, d = _to_ned(tap[6], tap[7], tap[8], wx, wy, wz)
-            value[0], value[1], value[2] = tap[3] + n, tap[4] + e, tap[5] + d
+        value[0], value[1], value[2] = velocity[0], velocity[1], velocity[2]
+        if has_lever_arm:
+            n, e, d = _to_ned(roll, pitch, yaw, wx, wy, wz)
+            value[0], value[1], value[2] = velocity[0] + n, velocity[1] + e, velocity[2] + d
     elif code == BODY_VELOCITY:
-        x, y, z = _to_body(tap[6], tap[7], tap[8], tap[3], tap[4], tap[5])
-        if levered:
+        x, y, z = _to_body(roll, pitch, yaw, velocity[0], velocity[1], velocity[2])
+        if has_lever_arm:
             x, y, z = x + wx, y + wy, z + wz
         for j in range(3):
-            m = OWN + 3 * j
-            value[j] = x * q[m] + y * q[m + 1] + z * q[m + 2]
+            value[j] = x * own.own[3 * j] + y * own.own[3 * j + 1] + z * own.own[3 * j + 2]
     elif code == WATER_SPEED:
-        x, _, _ = _to_body(tap[6], tap[7], tap[8], tap[3] - tap[12], tap[4] - tap[13], tap[5] - tap[14])
-        if levered:
+        north, east, down = velocity[0] - water[0], velocity[1] - water[1], velocity[2] - water[2]
+        x, _, _ = _to_body(roll, pitch, yaw, north, east, down)
+        if has_lever_arm:
             x += wx
-        value[0] = (1.0 + q[SCALE]) * x
+        value[0] = (1.0 + own.scale[0]) * x
     elif code == COMPASS:
-        heading = tap[8]
-        value[0] = heading
-        if q[OWN + 2] > 0.0:
-            value[0] = heading + q[OWN] * sin(heading) + q[OWN + 1] * cos(heading)
+        value[0] = yaw
+        if own.own[2] > 0.0:
+            value[0] = yaw + own.own[0] * sin(yaw) + own.own[1] * cos(yaw)
     elif code == GYROCOMPASS:
-        value[0] = tap[8]
-        if q[OWN] > 0.0:
-            s = sin(tap[0])
+        value[0] = yaw
+        if own.own[0] > 0.0:
+            s = sin(position[0])
             x = 1.0 - ECCENTRICITY_SQUARED * (s * s)
             prime_vertical = SEMI_MAJOR_AXIS / sqrt(x)
             meridian = prime_vertical * (1.0 - ECCENTRICITY_SQUARED) / x
-            north = ROTATION_RATE * cos(tap[0]) + tap[4] / (prime_vertical + tap[2])
-            value[0] = tap[8] + atan2(tap[3] / (meridian + tap[2]), north)
+            north = ROTATION_RATE * cos(position[0]) + velocity[1] / (prime_vertical + position[2])
+            value[0] = yaw + atan2(velocity[0] / (meridian + position[2]), north)
     else:
-        depth = -tap[2]
-        if levered:
+        depth = -position[2]
+        if has_lever_arm:
             depth = depth + d
-        value[0] = (1.0 + q[SCALE]) * depth
-    if code == BODY_VELOCITY and q[DEPTH_OF_WATER] == q[DEPTH_OF_WATER]:
-        altitude = q[DEPTH_OF_WATER] + tap[2]
-        if levered:
+        value[0] = (1.0 + own.scale[0]) * depth
+    if code == BODY_VELOCITY and water_depth == water_depth:
+        altitude = water_depth + position[2]
+        if has_lever_arm:
             altitude -= d
-        within: bool = q[LOWEST] <= altitude <= q[HIGHEST]
+        within: bool = own.altitude[0] <= altitude <= own.altitude[1]
         return within
     return True
 
@@ -147,11 +225,12 @@ def observe_one(code: int, q: Array, tap: Array, value: Array) -> bool:
 @helper
 def noise_scalar(q: Array, value: Array, j: int) -> float:
     """Standard deviation of the white noise of component j of a reading, from the reading without bias and noise."""
-    if q[SPEED_NOISE_SQUARED] == 0.0:
-        sigma: float = q[SIGMA + j]
+    own = instrument_numbers(q)
+    if own.speed_variance[0] == 0.0:
+        sigma: float = own.sigma[j]
         return sigma
     x, y, z = value[0], value[1], value[2]
-    return sqrt(q[SIGMA_SQUARED + j] + q[SPEED_NOISE_SQUARED] * (x * x + y * y + z * z))
+    return sqrt(own.variance[j] + own.speed_variance[0] * (x * x + y * y + z * z))
 
 
 @kernel
@@ -174,7 +253,7 @@ class CompiledInstrument(Instrument):
     code : int
         Code of the observed quantity.
     numbers : (24,) array
-        Parameters of the instrument, in the order of `NUMBERS`.
+        Parameters of the instrument; `parameters` has their names.
     in_kernel : bool
         Whether the kernel alone computes the readings. False: the instrument also asks its surroundings, and runs step
         by step call it in the block form.
@@ -185,11 +264,16 @@ class CompiledInstrument(Instrument):
 
     def __init__(self, spec: AidSpec, name: str, seed: int):
         super().__init__(spec, name, seed)
-        self.numbers = q = np.zeros(NUMBERS)
-        q[SCALE], q[LEVER : LEVER + 3], q[LEVERED] = self.scale, self.lever_arm, float(self.levered)
-        q[DEPTH_OF_WATER] = np.nan
-        d = len(self.sigma)
-        q[SIGMA : SIGMA + d], q[SIGMA_SQUARED : SIGMA_SQUARED + d] = self.sigma, self.sigma**2
+        self.numbers, d = np.zeros(NUMBERS), len(self.sigma)
+        own = self.parameters
+        own.scale[0], own.lever_arm[:], own.has_lever_arm[0] = self.scale, self.lever_arm, float(self.has_lever_arm)
+        own.water_depth[0] = np.nan
+        own.sigma[:d], own.variance[:d] = self.sigma, self.sigma**2
+
+    @property
+    def parameters(self) -> InstrumentNumbers:
+        """The parts of ``numbers``; what is written into them is written there."""
+        return instrument_numbers(self.numbers)
 
     def _rows(self, tap: TapStates) -> tuple[Array, Array, NDArray[np.bool_]]:
         states = (tap.position, tap.velocity, tap.attitude, tap.angular_rate, tap.water_velocity)

@@ -80,8 +80,8 @@ def _second_order(
             return False
         if dt != step:
             step = dt
-            a, b, c, d = oscillation(dt, frequency, damping)
-            b, c = b * frequency, c / frequency
+            by = oscillation(dt, frequency, damping)
+            a, b, c, d = by.value_by_value, by.value_by_rate * frequency, by.rate_by_value / frequency, by.rate_by_rate
             l11 = sqrt(max(1.0 - a * a - b * b, 0.0))
             l21 = -(a * c + b * d) / l11 if l11 > 0.0 else 0.0
             l22 = sqrt(max(1.0 - c * c - d * d - l21 * l21, 0.0))

@@ -7,7 +7,7 @@ run are drawn together. Such steps are a *batch*. The kernels compute what depen
 from __future__ import annotations
 
 from math import sqrt
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,16 +16,31 @@ from simnav.compiled import Array, helper, kernel
 from simnav.kernel_types import FlagVector, Hypermatrix, IntegerMatrix, IntegerStack, IntegerVector, Matrix, Stack
 from simnav.kinds import add_error_scalar
 from simnav.sensors.faults.layer import ADDS, DROPS, HOLDS, STEPS_NOISE, ZEROES
-from simnav.sensors.imu import triad_errors
+from simnav.sensors.imu import HeldTable, TriadErrors, triad_errors
 from simnav.sensors.observation import noise_scalar, observe_one
 
 __all__ = [
-    "BLOCKS", "COMPILED", "DUE", "HELD", "INERTIAL", "UNTOUCHED", "begin_step", "sense", "sense_imu", "sort_out",
-]  # fmt: skip
+    "BLOCKS",
+    "COMPILED",
+    "DUE",
+    "HELD",
+    "INERTIAL",
+    "UNTOUCHED",
+    "AidDraws",
+    "BatchProgress",
+    "Delivered",
+    "FaultLayers",
+    "ImuDraws",
+    "ImuSteps",
+    "SampleTimes",
+    "TriadTables",
+    "begin_step",
+    "sense",
+    "sense_imu",
+    "sort_out",
+]
 
-#: State of a layer that repeats values: the last value, and 1 if there is one; number of the interval, and the repeated
-#: value.
-LAST, HAS_LAST, NUMBER, VALUE = 0, 3, 4, 5
+#: Length of the array that holds a `HeldReading`.
 HELD = 8
 #: Number of the interval of a measurement that a layer does not affect.
 UNTOUCHED = -2
@@ -33,10 +48,209 @@ UNTOUCHED = -2
 BLOCKS, COMPILED, INERTIAL, DUE = 1, 2, 4, 8
 
 
+class HeldReading(NamedTuple):
+    """The state of a layer that repeats values: parts of one array.
+
+    Attributes
+    ----------
+    last, has_last : (3,), (1,) array
+        The last value, and 1 if there is one.
+    number : (1,) array
+        Number of the interval, from 1 on.
+    value : (3,) array
+        The repeated value.
+    """
+
+    last: Array
+    has_last: Array
+    number: Array
+    value: Array
+
+
+@helper
+def held_reading(q: Array) -> HeldReading:
+    """The parts of an array of `HELD` numbers."""
+    return HeldReading(last=q[0:3], has_last=q[3:4], number=q[4:5], value=q[5:8])
+
+
+class BatchProgress(NamedTuple):
+    """What b runs are, and how far they are within their batches.
+
+    Attributes
+    ----------
+    compiled, has_imu : (b,) bool array
+        Whether a run is compiled, and whether it has an IMU.
+    at, end : (b,) int array
+        Number of its step within the batch, and number of steps in the batch.
+    """
+
+    compiled: FlagVector
+    has_imu: FlagVector
+    at: IntegerVector
+    end: IntegerVector
+
+
+class TriadTables(NamedTuple):
+    """The error parameters of the IMUs of b runs; the second axis is gyroscopes, accelerometers.
+
+    Attributes
+    ----------
+    matrix, bias : (b, 2, 3, 3), (b, 2, 3) array
+        As of `simnav.sensors.imu.TriadErrors`.
+    density, range, step : (b, 2) array
+        As of the same.
+    instability_per_second, walk_per_second : (b, 2) array
+        Rows a second of the tables of `ImuDraws`.
+    residual : (b, 2, 3) array
+        Residual of the quantization; updated.
+    """
+
+    matrix: Hypermatrix
+    bias: Stack
+    density: Matrix
+    range: Matrix
+    step: Matrix
+    instability_per_second: Matrix
+    walk_per_second: Matrix
+    residual: Stack
+
+
+class ImuDraws(NamedTuple):
+    """The random numbers of the IMUs of b runs for a batch of s samples.
+
+    Attributes
+    ----------
+    variates : (b, 2, s, 3) array
+        Unit variates of the samples.
+    instability, walk : (b, 2, k, 3) array
+        Tables of the in-run biases and of the random walks.
+    instability_rows, walk_rows : (b, 2) int array
+        Lengths of the tables.
+    instability_first, walk_first : (b, 2) int array
+        Numbers of their first rows.
+    """
+
+    variates: Hypermatrix
+    instability: Hypermatrix
+    walk: Hypermatrix
+    instability_rows: IntegerMatrix
+    instability_first: IntegerMatrix
+    walk_rows: IntegerMatrix
+    walk_first: IntegerMatrix
+
+
+class ImuSteps(NamedTuple):
+    """The IMU samples of a step of b runs.
+
+    Attributes
+    ----------
+    number : (b,) int array
+        Number of samples of each run.
+    time, interval : (b, k) array
+        Ends of the samples, and their lengths [s].
+    angular_rate, specific_force : (b, k, 3) array
+        Means over the intervals [rad/s], [m/s^2].
+    """
+
+    number: IntegerVector
+    time: Matrix
+    interval: Matrix
+    angular_rate: Stack
+    specific_force: Stack
+
+
+class SampleTimes(NamedTuple):
+    """When and where the aiding instruments of b runs measure; a batch has s samples.
+
+    Attributes
+    ----------
+    first, last : (b,) int array
+        Index of the first sample of the step within the batch, and index after the last one.
+    time : (b, s) array
+        Times of the samples of the batch [s].
+    states : (b, m, 14) array
+        True states at the samples of the step.
+    owner : (b, s) int array
+        Number of the instrument of each sample; -1: the end of a step.
+    """
+
+    first: IntegerVector
+    last: IntegerVector
+    time: Matrix
+    states: Stack
+    owner: IntegerMatrix
+
+
+class AidDraws(NamedTuple):
+    """The random numbers of the aiding instruments and faults of b runs, for a batch of s samples and k fault layers.
+
+    Attributes
+    ----------
+    error, white : (b, s, 3) array
+        Biases and unit variates of each sample.
+    interval : (b, s, k) int array
+        Number of the interval of a sample in each layer; -1: outside of all intervals; -2: the layer does not affect
+        the instrument.
+    fault : (b, s, k, 3) array
+        The error or noise that the layer has drawn for the sample.
+    """
+
+    error: Stack
+    white: Stack
+    interval: IntegerStack
+    fault: Hypermatrix
+
+
+class FaultLayers(NamedTuple):
+    """The fault layers of b runs, at most k for i instruments.
+
+    Attributes
+    ----------
+    number : (b,) int array
+        Number of layers.
+    operations : (b, k, 3) int array
+        Action of each layer (`simnav.sensors.faults.layer.ADDS`, ...), its first bit, and 1 if each interval has a bit
+        of its own.
+    sizes : (b, i, k, 4) array
+        For noise steps: the new sigma of an instrument, or the factor on its sigma if it is not 0.
+    held : (b, i, k, 8) array
+        State of layers that repeat values; updated.
+    """
+
+    number: IntegerVector
+    operations: IntegerStack
+    sizes: Hypermatrix
+    held: Hypermatrix
+
+
+class Delivered(NamedTuple):
+    """The measurements of a step of b runs.
+
+    Attributes
+    ----------
+    number : (b,) int array
+        Number of measurements of each run.
+    who : (b, m) int array
+        Number of the instrument of each measurement.
+    when : (b, m) array
+        Time of the measurement [s].
+    value : (b, m, 3) array
+        What was measured.
+    faults : (b, m) uint32 array
+        Label: a bit for each fault that affected it.
+    """
+
+    number: IntegerVector
+    who: IntegerMatrix
+    when: Matrix
+    value: Stack
+    faults: Annotated[NDArray[np.uint32], "uint32[:, ::1]"]
+
+
 @kernel
 def sort_out(
     active: FlagVector,
-    runs: tuple[FlagVector, FlagVector, IntegerVector, IntegerVector],
+    runs: BatchProgress,
     which: tuple[FlagVector, FlagVector, FlagVector],
 ) -> int:
     """Find what each of b runs needs in a step.
@@ -45,8 +259,8 @@ def sort_out(
     ----------
     active : (b,) bool array
         True for each run that is advanced.
-    runs : (b,) bool, (b,) bool, (b,) int and (b,) int arrays
-        Whether a run is compiled and has an IMU; number of its step within the batch, and number of steps in the batch.
+    runs : BatchProgress
+        The runs.
     which : three (b,) bool arrays
         Overwritten: the runs that are advanced and compiled; those of them with an IMU; those at the end of the batch.
 
@@ -55,15 +269,14 @@ def sort_out(
     int
         `BLOCKS`, `COMPILED`, `INERTIAL` and `DUE`, as far as there is such a run, added.
     """
-    known, imu, at, end = runs
     compiled, inertial, due = which
     found = 0
     for b in range(active.size):
-        compiled[b] = active[b] and known[b]
-        inertial[b] = compiled[b] and imu[b]
-        due[b] = compiled[b] and at[b] >= end[b]
+        compiled[b] = active[b] and runs.compiled[b]
+        inertial[b] = compiled[b] and runs.has_imu[b]
+        due[b] = compiled[b] and runs.at[b] >= runs.end[b]
         if active[b]:
-            found |= COMPILED if known[b] else BLOCKS
+            found |= COMPILED if runs.compiled[b] else BLOCKS
         if inertial[b]:
             found |= INERTIAL
         if due[b]:
@@ -110,12 +323,11 @@ def begin_step(
 def sense_imu(
     active: FlagVector,
     at: IntegerVector,
-    samples: IntegerVector,
-    triads: tuple[Hypermatrix, Stack, Stack, Stack],
-    drawn: tuple[Hypermatrix, Hypermatrix, Hypermatrix, IntegerStack],
+    triads: TriadTables,
+    drawn: ImuDraws,
     disturbances: tuple[Annotated[NDArray[np.bool_], "boolean[:, :, ::1]"], Hypermatrix],
     clock: Matrix,
-    imu: tuple[Matrix, Matrix, Stack, Stack],
+    imu: ImuSteps,
 ) -> None:
     """Add the errors and disturbances of the IMUs of b runs, for one step of each run.
 
@@ -125,42 +337,54 @@ def sense_imu(
     ----------
     active : (b,) bool array
         True for each run that is advanced.
-    at, samples : (b,) int arrays
-        Number of the step within the batch, and number of samples in a step.
-    triads : tuple of (b, 2, ...) arrays
-        Gyroscopes and accelerometers: matrix and bias, as `simnav.sensors.imu.triad_errors` takes them; density of the
-        white noise, range, quantization, and points a second of both tables; residual of the quantization.
-    drawn : (b, 2, s, 3), (b, 2, k, 3), (b, 2, k, 3) and (b, 2, 4) int arrays
-        Variates of the samples of the batch; tables of the in-run biases and of the random walks; length and first
-        grid point of both tables.
+    at : (b,) int array
+        Number of the step within the batch.
+    triads : TriadTables
+        Error parameters of the IMUs.
+    drawn : ImuDraws
+        Random numbers of the batch.
     disturbances : (b, d, s) bool and (b, d, s, 6) arrays
         True for each sample of the batch that each of d disturbances affects, and the errors that they add.
     clock : (b, 2) array
         Number of the sample before the batch, and number of samples in a second.
-    imu : tuple of (b, ...) arrays
-        Times and intervals, overwritten; angular rates and specific forces: ideal samples, to which the errors are
-        added.
+    imu : ImuSteps
+        Times and intervals are overwritten; the errors are added to angular rates and specific forces, which are ideal.
     """
-    matrix, bias, numbers, residual = triads
-    variates, instability, walk, tables = drawn
+    variates, instability, walk = drawn.variates, drawn.instability, drawn.walk
     disturbed, disturbance = disturbances
-    imu_time, imu_interval, rate, force = imu
+    time, interval, rate, force = imu.time, imu.interval, imu.angular_rate, imu.specific_force
     for b in range(active.size):
         if not active[b]:
             continue
-        n = samples[b]
+        n = imu.number[b]
         begin = at[b] * n
         for i in range(n):
-            imu_time[b, i] = (clock[b, 0] + begin + i + 1) / clock[b, 1]
-            imu_interval[b, i] = 1.0 / clock[b, 1]
+            time[b, i] = (clock[b, 0] + begin + i + 1) / clock[b, 1]
+            interval[b, i] = 1.0 / clock[b, 1]
         for t in range(2):
             out = rate[b, :n] if t == 0 else force[b, :n]
-            q, table = numbers[b, t], tables[b, t]
+            triad = TriadErrors(
+                triads.matrix[b, t], triads.bias[b, t], triads.density[b, t], triads.range[b, t], triads.step[b, t]
+            )
+            in_run = HeldTable(
+                instability[b, t, : drawn.instability_rows[b, t]],
+                drawn.instability_first[b, t],
+                triads.instability_per_second[b, t],
+            )
+            walked = HeldTable(
+                walk[b, t, : drawn.walk_rows[b, t]], drawn.walk_first[b, t], triads.walk_per_second[b, t]
+            )
             triad_errors(
-                out, variates[b, t, begin : begin + n], out, imu_time[b, :n], imu_interval[b, :n],
-                (matrix[b, t], bias[b, t], q[0], q[1], q[2]), (instability[b, t, : table[0]], table[1], q[3]),
-                (walk[b, t, : table[2]], table[3], q[4]), residual[b, t],
-            )  # fmt: skip
+                out,
+                variates[b, t, begin : begin + n],
+                out,
+                time[b, :n],
+                interval[b, :n],
+                triad,
+                in_run,
+                walked,
+                triads.residual[b, t],
+            )
         for d in range(disturbed.shape[1]):
             for i in range(n):
                 if disturbed[b, d, begin + i]:
@@ -172,11 +396,11 @@ def sense_imu(
 @kernel
 def sense(
     active: FlagVector,
-    samples: tuple[IntegerVector, IntegerVector, Matrix, Stack, IntegerMatrix],
-    drawn: tuple[Stack, Stack, IntegerStack, Hypermatrix],
+    samples: SampleTimes,
+    drawn: AidDraws,
     instruments: tuple[IntegerStack, Stack],
-    layers: tuple[IntegerVector, IntegerStack, Hypermatrix, Hypermatrix],
-    delivered: tuple[IntegerVector, IntegerMatrix, Matrix, Stack, Annotated[NDArray[np.uint32], "uint32[:, ::1]"]],
+    layers: FaultLayers,
+    delivered: Delivered,
     truth: Matrix,
 ) -> None:
     """Compute the measurements of the aiding instruments of b runs, with faults, for one step of each run.
@@ -187,31 +411,24 @@ def sense(
     ----------
     active : (b,) bool array
         True for each run that is advanced.
-    samples : (b,) int, (b,) int, (b, s), (b, m, 14) and (b, s) int arrays
-        For each run: index of the first sample of the step within the batch, and index after the last one; times of
-        the samples of the batch [s]; true states at the samples of the step; number of the instrument of each sample
-        (-1: the end of a step).
-    drawn : (b, s, 3), (b, s, 3), (b, s, k) int and (b, s, k, 3) arrays
-        Biases and unit variates of each sample; for each of k fault layers, the number of the interval of a sample (-1:
-        outside of all intervals, -2: the layer does not affect the instrument), and the error or noise that the layer
-        has drawn for the sample.
+    samples : SampleTimes
+        Times of the samples, and the true states there.
+    drawn : AidDraws
+        Random numbers of the batch.
     instruments : (b, i, 4) int and (b, i, 24) arrays
         For each of i instruments: code of the observed quantity, number of components, and the two numbers of
         `simnav.kinds.Kind.layout`; its parameters, as in `simnav.sensors.observation.observe_one`.
-    layers : (b,) int, (b, k, 3) int, (b, i, k, 4) and (b, i, k, 8) arrays
-        Number of fault layers; action of each (`simnav.sensors.faults.layer.ADDS`, ...), its first bit, and 1 if each
-        interval has a bit of its own; for noise steps the new sigma of an instrument, or the factor on its sigma if it
-        is not 0; state of layers that repeat values.
-    delivered : tuple of (b, ...) arrays
-        Overwritten: ``count``, ``who``, ``when``, ``value`` and ``faults`` of `simnav.simulation.steps.SteppedRuns`.
+    layers : FaultLayers
+        The faults.
+    delivered : Delivered
+        Overwritten with the measurements.
     truth : (b, 9) array
         Overwritten: position, velocity and attitude at the end of the step.
     """
-    first, last, tap_time, taps, owner = samples
-    error, white, interval, fault = drawn
+    first, last = samples.first, samples.last
     layout, numbers = instruments
-    number_of_layers, operations, sizes, held = layers
-    count, who, when, value, faults = delivered
+    operations, sizes = layers.operations, layers.sizes
+    who, when, value, faults = delivered.who, delivered.when, delivered.value, delivered.faults
     state = np.zeros(15)
     reading, wrong, sigma = np.empty(3), np.empty(3), np.empty(3)
     for b in range(active.size):
@@ -219,8 +436,8 @@ def sense(
             continue
         known = 0
         for t in range(first[b], last[b]):
-            tap = taps[b, t - first[b]]
-            i = owner[b, t]
+            tap = samples.states[b, t - first[b]]
+            i = samples.owner[b, t]
             if i < 0:
                 for j in range(9):
                     truth[b, j] = tap[j]
@@ -231,18 +448,18 @@ def sense(
             there = observe_one(layout[b, i, 0], numbers[b, i], state, reading)
             for j in range(d):
                 sigma[j] = noise_scalar(numbers[b, i], reading, j)
-                wrong[j] = error[b, t, j] + sigma[j] * white[b, t, j]
+                wrong[j] = drawn.error[b, t, j] + sigma[j] * drawn.white[b, t, j]
             if not there:
                 continue
             add_error_scalar(positions, cyclic, reading[:d], wrong[:d])
             label = 0
-            for k in range(number_of_layers[b]):
-                number, what = interval[b, t, k], operations[b, k, 0]
+            for k in range(layers.number[b]):
+                number, what = drawn.interval[b, t, k], operations[b, k, 0]
                 if number == UNTOUCHED:
                     continue
                 touched = number >= 0
                 if what == HOLDS:
-                    touched = _hold(held[b, i, k], number, reading, d)
+                    touched = _hold(held_reading(layers.held[b, i, k]), number, reading, d)
                 elif what == DROPS:
                     if touched:
                         there = False
@@ -254,7 +471,7 @@ def sense(
                 elif touched:
                     touched = False
                     for j in range(d):
-                        wrong[j] = fault[b, t, k, j]
+                        wrong[j] = drawn.fault[b, t, k, j]
                         touched = touched or wrong[j] != 0.0
                     if touched and what == STEPS_NOISE:
                         for j in range(d):
@@ -268,23 +485,23 @@ def sense(
                 if touched:
                     label |= 1 << (operations[b, k, 1] + (number if operations[b, k, 2] else 0))
             if there:
-                who[b, known], when[b, known], faults[b, known] = i, tap_time[b, t], label
+                who[b, known], when[b, known], faults[b, known] = i, samples.time[b, t], label
                 for j in range(3):
                     value[b, known, j] = reading[j] if j < d else 0.0
                 known += 1
-        count[b] = known
+        delivered.number[b] = known
 
 
 @helper
-def _hold(held: Array, number: int, reading: Array, d: int) -> bool:
+def _hold(held: HeldReading, number: int, reading: Array, d: int) -> bool:
     """Replace a reading within an interval by the last one before it (or the first within). Return whether it did."""
-    if number >= 0 and held[NUMBER] != number + 1.0:
-        held[NUMBER] = number + 1.0
+    if number >= 0 and held.number[0] != number + 1.0:
+        held.number[0] = number + 1.0
         for j in range(d):
-            held[VALUE + j] = held[LAST + j] if held[HAS_LAST] > 0.0 else reading[j]
+            held.value[j] = held.last[j] if held.has_last[0] > 0.0 else reading[j]
     for j in range(d):
-        held[LAST + j] = reading[j]
+        held.last[j] = reading[j]
         if number >= 0:
-            reading[j] = held[VALUE + j]
-    held[HAS_LAST] = 1.0
+            reading[j] = held.value[j]
+    held.has_last[0] = 1.0
     return number >= 0

@@ -11,6 +11,7 @@ named error processes. A run with one of them is advanced in blocks of one step.
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -27,6 +28,14 @@ from simnav.sensors.stepwise import (
     HELD,
     INERTIAL,
     UNTOUCHED,
+    AidDraws,
+    BatchProgress,
+    Delivered,
+    FaultLayers,
+    ImuDraws,
+    ImuSteps,
+    SampleTimes,
+    TriadTables,
     begin_step,
     sense,
     sense_imu,
@@ -41,6 +50,17 @@ __all__ = ["SteppedRuns"]
 
 #: Number of steps that are drawn in advance the first time. The number is doubled each time.
 FIRST_BATCH, LONGEST_BATCH = 4, 64
+#: Attributes that hold shared arrays in records.
+_RECORDS = (
+    "delivered",
+    "imu_steps",
+    "_requested",
+    "_times",
+    "_triads",
+    "_imu_draws",
+    "_aid_draws",
+    "_fault_layers",
+)
 
 
 class SteppedRuns:
@@ -82,10 +102,7 @@ class SteppedRuns:
         self._streams: list[dict[str, AidStream]] = [{} for _ in range(n)]
         self._arrivals = [Arrivals() for _ in range(n)]
         self._compiled, self._batch = np.zeros(n, np.bool_), np.zeros(n, np.int64)
-        self._at, self._end = (
-            np.zeros(n, np.int64),
-            np.zeros(n, np.int64),
-        )  # step in the batch, and its length
+        self._at, self._end = np.zeros(n, np.int64), np.zeros(n, np.int64)  # step in the batch, and its length
         self._imu = np.zeros(n, np.bool_)
         # Of one step: see `simnav.sensors.stepwise.sort_out` and `begin_step`.
         self._which = (np.zeros(n, np.bool_), np.zeros(n, np.bool_), np.zeros(n, np.bool_))
@@ -154,7 +171,13 @@ class SteppedRuns:
             new = np.zeros((self.n, *most), old.dtype)
             new[tuple(slice(0, m) for m in old.shape)] = old
             old = arrays[name] = new
+            self._forget()
         return old
+
+    def _forget(self) -> None:
+        """Forget the records, which hold an array that was replaced."""
+        for name in _RECORDS:
+            self.__dict__.pop(name, None)
 
     def _put_instruments(self, b: int, simulator: Simulator, layers: list[FaultLayer]) -> None:
         aids = list(simulator.aids.values())
@@ -183,17 +206,17 @@ class SteppedRuns:
             self._put("matrix", b, np.stack([t.matrix for t in triads]))
             self._put("bias", b, np.stack([t.bias for t in triads]))
             self._put("residual", b, np.stack([t.residual for t in triads]))
-            self._put("triads", b, np.array([
-                [t.density, t.range, t.step, t.instability.per_second, t.walk.per_second, 0.0, 0.0, 0.0] for t in triads
-            ]))  # fmt: skip
+            for name in ("density", "range", "step"):
+                self._put(name + "_of_triad", b, np.array([getattr(t, name) for t in triads], np.float64))
+            self._put("instability_per_second", b, np.array([t.instability.per_second for t in triads], np.float64))
+            self._put("walk_per_second", b, np.array([t.walk.per_second for t in triads], np.float64))
 
     # ------------------------------------------------------------------------------------------- steps
 
     def advance(self, active: NDArray[np.bool_]) -> None:
         """Advance some runs by one step each."""
-        which = self._compiled, self._imu, self._at, self._end
         compiled, inertial, due = self._which
-        found = sort_out(active, which, self._which)
+        found = sort_out(active, self._progress, self._which)
         if found & BLOCKS:
             for b in np.flatnonzero(active & ~self._compiled).tolist():
                 self._block(b)
@@ -202,28 +225,92 @@ class SteppedRuns:
         if found & DUE:
             for b in np.flatnonzero(due).tolist():
                 self._draw(b)
-        place, first, last = self._limits
+        place = self._limits[0]
         drawn = self.edge, self.samples_a_step
-        most = begin_step(compiled, drawn, (self._at, self.step, self.samples), self._limits)
+        most = begin_step.unchecked(compiled, drawn, (self._at, self.step, self.samples), self._limits)
         if most > self._taps.shape[1]:
             self._taps = np.zeros((self.n, most, motion.TAP_COLUMNS))
-        motion.advance(
-            compiled, (self.x, self.index), self.p, self.sizes, (self.rows, self.points),
-            (self.phase, self.table, self.eddies), (self.tap_time, first, last, self._taps),
+            self._forget()
+        # Their arrays are made here, of the right types.
+        motion.advance.unchecked(
+            compiled,
+            (self.x, self.index),
+            self.p,
+            self.sizes,
+            (self.rows, self.points),
+            (self.phase, self.table, self.eddies),
+            self._requested,
             (self.samples, self.rate, self.force),
-        )  # fmt: skip
+        )
         if found & INERTIAL:
-            sense_imu(
-                inertial, place, self.samples, (self.matrix, self.bias, self.triads, self.residual),
-                (self.variates, self.instability, self.walk, self.tables), (self.disturbed, self.disturbance),
-                self.clock, (self.imu_time, self.imu_interval, self.rate, self.force),
-            )  # fmt: skip
-        sense(
-            compiled, (first, last, self.tap_time, self._taps, self.owner),
-            (self.error, self.white, self.interval, self.fault), (self.layout, self.numbers),
-            (self._layers, self.operations, self.sizes_of_noise, self.held),
-            (self.count, self.who, self.when, self.value, self.faults), self.truth,
-        )  # fmt: skip
+            disturbances = self.disturbed, self.disturbance
+            sense_imu.unchecked(
+                inertial, place, self._triads, self._imu_draws, disturbances, self.clock, self.imu_steps
+            )
+        instruments = self.layout, self.numbers
+        sense.unchecked(
+            compiled, self._times, self._aid_draws, instruments, self._fault_layers, self.delivered, self.truth
+        )
+
+    # The arrays by their names; `_grown` forgets a record where it replaces an array. Only the first ``number`` of a
+    # run's measurements and IMU samples are those of its last step.
+
+    @cached_property
+    def delivered(self) -> Delivered:
+        """The measurements of the last step of all runs."""
+        return Delivered(self.count, self.who, self.when, self.value, self.faults)
+
+    @cached_property
+    def imu_steps(self) -> ImuSteps:
+        """The IMU samples of the last step of all runs."""
+        return ImuSteps(self.samples, self.imu_time, self.imu_interval, self.rate, self.force)
+
+    @cached_property
+    def _progress(self) -> BatchProgress:
+        return BatchProgress(self._compiled, self._imu, self._at, self._end)
+
+    @cached_property
+    def _requested(self) -> motion.RequestedStates:
+        _, first, last = self._limits
+        return motion.RequestedStates(self.tap_time, first, last, self._taps)
+
+    @cached_property
+    def _times(self) -> SampleTimes:
+        _, first, last = self._limits
+        return SampleTimes(first, last, self.tap_time, self._taps, self.owner)
+
+    @cached_property
+    def _triads(self) -> TriadTables:
+        return TriadTables(
+            self.matrix,
+            self.bias,
+            self.density_of_triad,
+            self.range_of_triad,
+            self.step_of_triad,
+            self.instability_per_second,
+            self.walk_per_second,
+            self.residual,
+        )
+
+    @cached_property
+    def _imu_draws(self) -> ImuDraws:
+        return ImuDraws(
+            self.variates,
+            self.instability,
+            self.walk,
+            self.instability_rows,
+            self.instability_first,
+            self.walk_rows,
+            self.walk_first,
+        )
+
+    @cached_property
+    def _aid_draws(self) -> AidDraws:
+        return AidDraws(self.error, self.white, self.interval, self.fault)
+
+    @cached_property
+    def _fault_layers(self) -> FaultLayers:
+        return FaultLayers(self._layers, self.operations, self.sizes_of_noise, self.held)
 
     def interval_of(self, b: int) -> tuple[float, float]:
         """Beginning and end of the last step of a run [s]."""
@@ -316,13 +403,14 @@ class SteppedRuns:
         variates = self._grown("variates", (2, n, 3), np.float64)
         both = (imu.gyroscope, imu.accelerometer)
         triads: list[Any] = [t.ahead(variates[b, i, :n], float(time[-1])) for i, t in enumerate(both)]
-        self._put("clock", b, np.array([first, rate]))
+        self._put("clock", b, np.array([first, rate], np.float64))
         for k, name in ((0, "instability"), (2, "walk")):
             table = np.zeros((2, max(len(t[k]) for t in triads), 3))
             for i in range(2):
                 table[i, : len(triads[i][k])] = triads[i][k]
             self._put(name, b, table)
-        self._put("tables", b, np.array([[len(t[0]), t[1], len(t[2]), t[3]] for t in triads]))
+            self._put(name + "_rows", b, np.array([len(t[k]) for t in triads], np.int64))
+            self._put(name + "_first", b, np.array([t[k + 1] for t in triads], np.int64))
         found = [layer.ahead_imu(time) for layer in simulator.layers if layer.operation == DISTURBS_IMU]
         active = np.stack([f[0] for f in found]) if found else np.zeros((0, n), np.bool_)
         errors = np.stack([f[1] for f in found]) if found else np.zeros((0, n, 6))

@@ -181,11 +181,11 @@ def grid_of(chart: Mapping[str, Any]) -> DepthGrid:
 @helper
 def _between(place: float, spacing: float, last: int) -> tuple[int, float, float]:
     """The node before a place, the part of the way to the next one, and the derivative of that: zero beyond an edge."""
-    way = place / spacing + 0.5 * last
-    slope = 1.0 / spacing if 0.0 <= way <= last else 0.0
-    way = min(max(way, 0.0), float(last))
-    first = min(int(way), max(last - 1, 0))
-    return first, way - first, slope
+    node = place / spacing + 0.5 * last
+    slope = 1.0 / spacing if 0.0 <= node <= last else 0.0
+    node = min(max(node, 0.0), float(last))
+    first = min(int(node), max(last - 1, 0))
+    return first, node - first, slope
 
 
 @helper
@@ -249,18 +249,18 @@ def _distances(
     for i in range(offset.shape[0]):
         north, east, down = ray[i, 0], ray[i, 1], ray[i, 2]
         found, slope_n, slope_e = _depth(nodes, spacing_n, spacing_e, offset[i, 0], offset[i, 1])
-        way = (found - depth[i]) / max(down, _GRAZING)
+        along_ray = (found - depth[i]) / max(down, _GRAZING)
         met[i] = True
         if north != 0.0 or east != 0.0:
             above, closing = inf, 0.0
             for _ in range(_STEPS):
                 found, slope_n, slope_e = _depth(
-                    nodes, spacing_n, spacing_e, offset[i, 0] + way * north, offset[i, 1] + way * east
+                    nodes, spacing_n, spacing_e, offset[i, 0] + along_ray * north, offset[i, 1] + along_ray * east
                 )
-                above = found - depth[i] - way * down
+                above = found - depth[i] - along_ray * down
                 closing = down - (slope_n * north + slope_e * east)
                 if not abs(above) > _ARRIVED:
                     break
-                way += above / max(closing, _GRAZING)
+                along_ray += above / max(closing, _GRAZING)
             met[i] = abs(above) < _NEAR and closing > _GRAZING
-        distance[i], gradient[i, 0], gradient[i, 1] = way, slope_n, slope_e
+        distance[i], gradient[i, 0], gradient[i, 1] = along_ray, slope_n, slope_e

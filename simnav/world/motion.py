@@ -10,6 +10,7 @@ loop, whose iterations the processor overlaps, or a loop of vector instructions.
 from __future__ import annotations
 
 from math import atan2, cos, exp, inf, sin
+from typing import NamedTuple
 
 import numpy as np
 
@@ -24,13 +25,14 @@ from simnav.world.motion_block import (
     ANGLES,
     BLOCK_ROWS,
     BOW,
-    COURSE,
-    DEPTHS,
     FLOW,
+    Course,
     body_rate,
     cosine_sine,
+    course_at,
     matrix,
     orient,
+    put_course,
     tap_at,
     wrapped,
 )
@@ -45,6 +47,7 @@ __all__ = [
     "PARAMETERS",
     "STATE",
     "TAP_COLUMNS",
+    "RequestedStates",
     "advance",
     "command",
     "initialise",
@@ -88,11 +91,25 @@ TAP_COLUMNS = 14
 #: Rows of the phases of waves, and columns of an eddy.
 PHASES, EDDY_COLUMNS = 3, 6
 
-#: Without waves and current: speed, yaw rate, heading, its cosine and sine, path angle, its cosine and sine, depth,
-#: sway velocity.
-Course = tuple[float, float, float, float, float, float, float, float, float, float]
-#: Velocity north-east-down [m/s], roll, pitch [rad], cosine and sine of the heading of the bow.
-Composed = tuple[Triple, float, float, float, float]
+
+class Composed(NamedTuple):
+    """The motion with waves and current.
+
+    Attributes
+    ----------
+    velocity : three floats
+        North, east, down [m/s].
+    roll, pitch : float
+        [rad].
+    cos_bow, sin_bow : float
+        Cosine and sine of the heading of the bow.
+    """
+
+    velocity: Triple
+    roll: float
+    pitch: float
+    cos_bow: float
+    sin_bow: float
 
 
 @helper(borrows=True)
@@ -214,8 +231,8 @@ def _guide(x: Array, index: Integers, p: Array, rows: Array, points: Array, time
 @helper(borrows=True)
 def _compose(course: Course, water: tuple[float, float], yaw_answer: float, p: Array, waves: Responses) -> Composed:
     """Velocity, roll, pitch, and cosine and sine of the heading of the bow, with current and waves added."""
-    w0, w1, w2, w3, w4, w5, w6 = waves
-    u, r, psi, cp, sp, gamma, cg, sg, depth, sway = course
+    u, cp, sp, cg = course.speed, course.cos_heading, course.sin_heading, course.cos_path
+    depth, sway = course.depth, course.sway
     shade, flow = 1.0, 1.0
     # The bow yaws about the course that the vessel keeps.
     ch, sh = cp, sp
@@ -223,45 +240,43 @@ def _compose(course: Course, water: tuple[float, float], yaw_answer: float, p: A
         shade = exp(-p[ATTENUATION] * depth)
         flow = max(0.0, 1.0 - p[SHEAR] * depth)
     if p[OSCILLATORS] > 0.0:
-        yaw = psi + shade * yaw_answer
+        yaw = course.heading + shade * yaw_answer
         ch, sh = cos(yaw), sin(yaw)
-    v0 = u * cg * cp + flow * water[0] + shade * w0
-    v1 = u * cg * sp + flow * water[1] + shade * w1
-    v2 = -u * sg + shade * w2
-    roll = shade * (w3 * sp - w4 * cp) - p[HEEL] * u * r * (1.0 / 9.81)
-    pitch = gamma + shade * (w5 * cp + w6 * sp)
+    v0 = u * cg * cp + flow * water[0] + shade * waves.north
+    v1 = u * cg * sp + flow * water[1] + shade * waves.east
+    v2 = -u * course.sin_path + shade * waves.down
+    roll = shade * (waves.roll_north * sp - waves.roll_east * cp) - p[HEEL] * u * course.yaw_rate * (1.0 / 9.81)
+    pitch = course.path + shade * (waves.pitch_north * cp + waves.pitch_east * sp)
     if p[HAS_HULL] > 0.0:
         v0, v1 = v0 - sway * sp, v1 + sway * cp
-    return (v0, v1, v2), roll, pitch, ch, sh
+    return Composed((v0, v1, v2), roll, pitch, ch, sh)
 
 
 @helper(borrows=True)
 def _course(x: Array) -> Course:
     """The course of a state."""
-    return (
-        x[U], x[R], x[PSI], x[COS_PSI], x[SIN_PSI], x[GAMMA], x[COS_GAMMA], x[SIN_GAMMA], x[DEPTH_CALM],
-        x[HULL_STATE + SWAY],
-    )  # fmt: skip
-
-
-@helper(borrows=True)
-def _course_at(block: Array, k: int) -> Course:
-    """The course at the end of interval k."""
-    return (
-        block[COURSE, k], block[COURSE + 1, k], block[COURSE + 2, k], block[COURSE + 3, k], block[COURSE + 4, k],
-        block[COURSE + 5, k], block[COURSE + 6, k], block[COURSE + 7, k], block[DEPTHS, k], block[DEPTHS + 1, k],
-    )  # fmt: skip
+    return Course(
+        speed=x[U],
+        yaw_rate=x[R],
+        heading=x[PSI],
+        cos_heading=x[COS_PSI],
+        sin_heading=x[SIN_PSI],
+        path=x[GAMMA],
+        cos_path=x[COS_GAMMA],
+        sin_path=x[SIN_GAMMA],
+        depth=x[DEPTH_CALM],
+        sway=x[HULL_STATE + SWAY],
+    )
 
 
 @helper(borrows=True)
 def _through_water(p: Array, course: Course) -> tuple[float, float]:
     """Velocity through the water, north and east [m/s], without the waves."""
-    u, _, _, cp, sp, _, cg, _, _, sway = course
-    ahead = u * cg
-    north, east = ahead * cp, ahead * sp
+    ahead = course.speed * course.cos_path
+    north, east = ahead * course.cos_heading, ahead * course.sin_heading
     if p[HAS_HULL] > 0.0:
-        north -= sway * sp
-        east += sway * cp
+        north -= course.sway * course.sin_heading
+        east += course.sway * course.cos_heading
     return north, east
 
 
@@ -283,10 +298,9 @@ def _sail(x: Array, p: Array, rate_command: float, time: float, decay: tuple[flo
     h[SPEED], h[SPEED_CHANGE] = _lag(h[SPEED], h[SPEED_CHANGE], x[SPEED_COMMAND], dt, p[TAU_U], decay[0])
     h[RATE], h[RATE_CHANGE] = _lag(h[RATE], h[RATE_CHANGE], rate_command, dt, p[TAU_R], decay[1])
     flow = max(0.0, 1.0 - p[SHEAR] * max(0.0, x[DEPTH_CALM]))
-    x[U], x[DU], x[R], x[DR], x[PSI] = sail(
-        p[HULL_NUMBERS:PARAMETERS], h, (x[U], x[R], x[PSI]), (p[TAU_U], p[TAU_R]),
-        (flow * x[WATER_NORTH], flow * x[WATER_EAST]), time, dt,
-    )  # fmt: skip
+    water = flow * x[WATER_NORTH], flow * x[WATER_EAST]
+    at = sail(p[HULL_NUMBERS:PARAMETERS], h, (x[U], x[R], x[PSI]), (p[TAU_U], p[TAU_R]), water, time, dt)
+    x[U], x[DU], x[R], x[DR], x[PSI] = at.surge, at.surge_change, at.yaw_rate, at.yaw_rate_change, at.heading
 
 
 @kernel
@@ -299,15 +313,26 @@ def initialise(x: Vector, p: Vector, phase: Matrix, table: Matrix, eddies: Matri
     w = wave_responses(phase, table, north, east, 0.0)
     if p[OSCILLATORS] > 0.0:
         own = p[OSCILLATORS:HAS_HULL]
-        w = answers(x[ANSWERS:HULL_STATE], own, w, course[3], course[4], phase, table, 0.0, transitions(own, 0.0))
-    v, roll, pitch, ch, sh = _compose(course, (x[WATER_NORTH], x[WATER_EAST]), x[YAW_ANSWER], p, w)
-    x[V], x[V + 1], x[V + 2] = v
-    cr, sr = cosine_sine(roll)
-    ct, st = cosine_sine(pitch)
-    c = matrix(cr, sr, ct, st, ch, sh)
-    for i in range(9):
-        x[C + i] = c[i]
-    x[ROLL], x[PITCH] = roll, pitch
+        w = answers(
+            x[ANSWERS:HULL_STATE],
+            own,
+            w,
+            course.cos_heading,
+            course.sin_heading,
+            phase,
+            table,
+            0.0,
+            transitions(own, 0.0),
+        )
+    now = _compose(course, (x[WATER_NORTH], x[WATER_EAST]), x[YAW_ANSWER], p, w)
+    x[V], x[V + 1], x[V + 2] = now.velocity
+    cr, sr = cosine_sine(now.roll)
+    ct, st = cosine_sine(now.pitch)
+    c = matrix(cr, sr, ct, st, now.cos_bow, now.sin_bow)
+    x[C], x[C + 1], x[C + 2] = c.c00, c.c01, c.c02
+    x[C + 3], x[C + 4], x[C + 5] = c.c10, c.c11, c.c12
+    x[C + 6], x[C + 7], x[C + 8] = c.c20, c.c21, c.c22
+    x[ROLL], x[PITCH] = now.roll, now.pitch
 
 
 @helper(borrows=True)
@@ -345,10 +370,7 @@ def _steer(x: Array, index: Integers, p: Array, plan: tuple[Array, Array], block
         if x[PSI] != psi:
             psi = x[PSI]
             x[COS_PSI], x[SIN_PSI] = cos(psi), sin(psi)
-        (
-            block[COURSE, k], block[COURSE + 1, k], block[COURSE + 2, k], block[COURSE + 3, k], block[COURSE + 4, k],
-            block[COURSE + 5, k], block[COURSE + 6, k], block[COURSE + 7, k], block[DEPTHS, k], block[DEPTHS + 1, k],
-        ) = _course(x)  # fmt: skip
+        put_course(block, k, _course(x))
 
 
 @helper(borrows=True)
@@ -371,17 +393,18 @@ def _drift(
     dt = p[DT]
     swell, own = x[ANSWERS:HULL_STATE], p[OSCILLATORS:HAS_HULL]
     for k in range(first, last):
-        course = _course_at(block, k)
+        course = course_at(block, k)
         # The encounter frequency is that of the speed through the water.
         north, east = _through_water(p, course)
         waves = wave_responses(phase, table, north, east, dt)
         if p[OSCILLATORS] > 0.0:
-            waves = answers(swell, own, waves, course[3], course[4], phase, table, dt, by)
+            waves = answers(swell, own, waves, course.cos_heading, course.sin_heading, phase, table, dt, by)
         _water(x, p, eddies, (time + k + 1) * dt)
-        v, roll, pitch, ch, sh = _compose(course, (x[WATER_NORTH], x[WATER_EAST]), x[YAW_ANSWER], p, waves)
+        now = _compose(course, (x[WATER_NORTH], x[WATER_EAST]), x[YAW_ANSWER], p, waves)
+        v = now.velocity
         block[VELOCITY, k + 1], block[VELOCITY + 1, k + 1], block[VELOCITY + 2, k + 1] = v
-        block[ANGLES, k + 1], block[ANGLES + 1, k + 1] = roll, pitch
-        block[BOW, k], block[BOW + 1, k] = ch, sh
+        block[ANGLES, k + 1], block[ANGLES + 1, k + 1] = now.roll, now.pitch
+        block[BOW, k], block[BOW + 1, k] = now.cos_bow, now.sin_bow
         block[FLOW, k], block[FLOW + 1, k] = x[WATER_NORTH], x[WATER_EAST]
         x[NORTH] += 0.5 * dt * (block[VELOCITY, k] + v[0])
         x[EAST] += 0.5 * dt * (block[VELOCITY + 1, k] + v[1])
@@ -445,6 +468,25 @@ def _advance_one(
         x[ROLL], x[PITCH] = block[ANGLES, n], block[ANGLES + 1, n]
 
 
+class RequestedStates(NamedTuple):
+    """The times at which the states of w worlds are required.
+
+    Attributes
+    ----------
+    time : (w, k) array
+        The times, ascending [s].
+    first, last : (w,) int array
+        Index of the first of these times within the block, and index after the last one.
+    states : (w, m, 14) array
+        Overwritten with the states at these times.
+    """
+
+    time: Matrix
+    first: IntegerVector
+    last: IntegerVector
+    states: Stack
+
+
 @kernel
 def advance(
     active: FlagVector,
@@ -453,7 +495,7 @@ def advance(
     sizes: IntegerMatrix,
     plan: tuple[Matrix, Matrix],
     water: tuple[Matrix, Matrix, Matrix],
-    wanted: tuple[Matrix, IntegerVector, IntegerVector, Stack],
+    requested: RequestedStates,
     imu: tuple[IntegerVector, Stack, Stack],
 ) -> None:
     """Advance w worlds, each by its own number of samples.
@@ -478,9 +520,8 @@ def advance(
     water : three (w, ...) arrays
         Phases (updated) and table of the wave components (`simnav.world.sea.components`); the variable part of the
         current (`simnav.world.current.eddies`).
-    wanted : (w, ...), (w,) int, (w,) int and (w, ..., 14) arrays
-        Ascending times at which the state is required [s]; index of the first of these times within the block, and
-        index after the last one; the states at these times, overwritten.
+    requested : RequestedStates
+        The times at which the state is required, and the states there.
     imu : (w,) int, (w, ..., 3) and (w, ..., 3) arrays
         Number of samples by which each world is advanced; ideal mean angular rate [rad/s] and specific force [m/s^2],
         overwritten.
@@ -488,7 +529,7 @@ def advance(
     x, index = state
     rows, points = plan
     phase, table, eddies = water
-    tap_time, first, last, taps = wanted
+    first, last = requested.first, requested.last
     samples, rate, force = imu
     block = np.empty((BLOCK_ROWS, BLOCK_COLUMNS))
     for w in range(active.size):
@@ -503,7 +544,7 @@ def advance(
                 phase[w, : PHASES * c].reshape((PHASES, c)), table[w, : ROWS * c].reshape((ROWS, c)),
                 eddies[w, : EDDY_COLUMNS * e].reshape((e, EDDY_COLUMNS)),
             ),
-            tap_time[w, first[w] : last[w]], taps[w, :m], (rate[w, :n], force[w, :n]), block,
+            requested.time[w, first[w] : last[w]], requested.states[w, :m], (rate[w, :n], force[w, :n]), block,
         )  # fmt: skip
 
 

@@ -7,6 +7,7 @@ in a loop of vector instructions, and the states between the samples that somebo
 from __future__ import annotations
 
 from math import atan2, cos, sin
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,7 +21,7 @@ from simnav.inverse_strapdown import (
     POSITION,
     SAMPLE_ROWS,
     VELOCITY,
-    Nine,
+    SmallMatrix,
 )
 from simnav.strapdown import Triple
 
@@ -28,21 +29,77 @@ __all__ = [
     "ANGLES",
     "BLOCK_ROWS",
     "BOW",
-    "COURSE",
-    "DEPTHS",
     "FLOW",
+    "Course",
     "body_rate",
     "cosine_sine",
+    "course_at",
     "matrix",
     "orient",
+    "put_course",
     "tap_at",
     "wrapped",
 ]
 
 # At each end of an interval: roll, pitch. At its later end: cosine and sine of the heading of the bow; the course
-# (`simnav.world.motion.Course`), whose last two rows are depth and sway velocity; current at the surface, north, east.
+# (`Course`), whose last two rows are depth and sway velocity; current at the surface, north, east.
 ANGLES, BOW, COURSE, DEPTHS, FLOW = (SAMPLE_ROWS + k for k in (0, 2, 4, 12, 14))
 BLOCK_ROWS = SAMPLE_ROWS + 16
+
+
+class Course(NamedTuple):
+    """The motion without waves and current.
+
+    Attributes
+    ----------
+    speed, yaw_rate : float
+        Surge velocity through the water [m/s], and [rad/s].
+    heading, cos_heading, sin_heading : float
+        [rad], and its cosine and sine.
+    path, cos_path, sin_path : float
+        Flight-path angle [rad], and its cosine and sine.
+    depth : float
+        [m].
+    sway : float
+        Sway velocity [m/s].
+    """
+
+    speed: float
+    yaw_rate: float
+    heading: float
+    cos_heading: float
+    sin_heading: float
+    path: float
+    cos_path: float
+    sin_path: float
+    depth: float
+    sway: float
+
+
+@helper(borrows=True)
+def course_at(block: Array, k: int) -> Course:
+    """The course at the end of interval k."""
+    return Course(
+        speed=block[COURSE, k],
+        yaw_rate=block[COURSE + 1, k],
+        heading=block[COURSE + 2, k],
+        cos_heading=block[COURSE + 3, k],
+        sin_heading=block[COURSE + 4, k],
+        path=block[COURSE + 5, k],
+        cos_path=block[COURSE + 6, k],
+        sin_path=block[COURSE + 7, k],
+        depth=block[DEPTHS, k],
+        sway=block[DEPTHS + 1, k],
+    )
+
+
+@helper(borrows=True)
+def put_course(block: Array, k: int, course: Course) -> None:
+    """Store the course at the end of interval k."""
+    block[COURSE, k], block[COURSE + 1, k], block[COURSE + 2, k] = course.speed, course.yaw_rate, course.heading
+    block[COURSE + 3, k], block[COURSE + 4, k] = course.cos_heading, course.sin_heading
+    block[COURSE + 5, k], block[COURSE + 6, k], block[COURSE + 7, k] = course.path, course.cos_path, course.sin_path
+    block[DEPTHS, k], block[DEPTHS + 1, k] = course.depth, course.sway
 
 
 @helper(borrows=True)
@@ -72,9 +129,9 @@ def cosine_sine(angle: float) -> tuple[float, float]:
 
 
 @helper(borrows=True)
-def matrix(cr: float, sr: float, ct: float, st: float, ch: float, sh: float) -> Nine:
+def matrix(cr: float, sr: float, ct: float, st: float, ch: float, sh: float) -> SmallMatrix:
     """Direction cosine matrix of the body axes by rows, from cosines and sines of roll, pitch and heading."""
-    return (
+    return SmallMatrix(
         ct * ch, sr * st * ch - cr * sh, cr * st * ch + sr * sh,
         ct * sh, sr * st * sh + cr * ch, cr * st * sh - sr * ch,
         -st, sr * ct, cr * ct,
@@ -82,10 +139,10 @@ def matrix(cr: float, sr: float, ct: float, st: float, ch: float, sh: float) -> 
 
 
 @helper(borrows=True)
-def _put_matrix(block: Array, k: int, c: Nine) -> None:
-    block[AXES, k], block[AXES + 1, k], block[AXES + 2, k] = c[0], c[1], c[2]
-    block[AXES + 3, k], block[AXES + 4, k], block[AXES + 5, k] = c[3], c[4], c[5]
-    block[AXES + 6, k], block[AXES + 7, k], block[AXES + 8, k] = c[6], c[7], c[8]
+def _put_matrix(block: Array, k: int, c: SmallMatrix) -> None:
+    block[AXES, k], block[AXES + 1, k], block[AXES + 2, k] = c.c00, c.c01, c.c02
+    block[AXES + 3, k], block[AXES + 4, k], block[AXES + 5, k] = c.c10, c.c11, c.c12
+    block[AXES + 6, k], block[AXES + 7, k], block[AXES + 8, k] = c.c20, c.c21, c.c22
 
 
 @helper(borrows=True)

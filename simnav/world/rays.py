@@ -145,28 +145,28 @@ def _turning(
         passed = np.maximum.accumulate(np.concatenate([[between], speed[:-1]]))
         turns = speed > passed
         begins = np.concatenate([[end], depths[:-1]])
-        short = np.where(turns, _way(profile, upper, lower, end, depths)[0] - distance, np.nan)
+        short = np.where(turns, _rays_between(profile, upper, lower, end, depths)[0] - distance, np.nan)
         # Rays turn from the depth on at which the speed is the largest so far.
         slower = profile.at(begins)
         share = np.clip((passed - slower) / np.where(turns, speed - slower, 1.0), 0.0, 1.0)
         begins = begins + share * (depths - begins)
-        before = np.where(turns, _way(profile, upper, lower, end, begins)[0] - distance, np.nan)
+        before = np.where(turns, _rays_between(profile, upper, lower, end, begins)[0] - distance, np.nan)
         for k in np.flatnonzero(turns & (before * short <= 0.0)).tolist():
             low, high, rising = begins[k], depths[k], short[k] > before[k]
             for _ in range(_HALVINGS):
                 middle = 0.5 * (low + high)
-                if (_way(profile, upper, lower, end, np.array([middle]))[0][0] < distance) == rising:
+                if (_rays_between(profile, upper, lower, end, np.array([middle]))[0][0] < distance) == rising:
                     low = middle
                 else:
                     high = middle
-            covered, time, slowness = (float(a[0]) for a in _way(profile, upper, lower, end, np.array([low])))
+            covered, time, slowness = (float(a[0]) for a in _rays_between(profile, upper, lower, end, np.array([low])))
             time += slowness * (distance - covered)
             if not time >= best[0]:
                 best = (time, slowness, sign)
     return best
 
 
-def _way(profile: Profile, upper: float, lower: float, end: float, turn: Array) -> tuple[Array, Array, Array]:
+def _rays_between(profile: Profile, upper: float, lower: float, end: float, turn: Array) -> tuple[Array, Array, Array]:
     """Distances, times and p of rays between two depths that turn at m depths beyond one end."""
     slowness, m = 1.0 / profile.at(turn), len(turn)
     total = []

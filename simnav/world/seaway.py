@@ -5,19 +5,46 @@ See `simnav.world.sea` for the model and for the arrays of components. `simnav.w
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 from simnav.compiled import Array, helper
-from simnav.declared_process import oscillation
+from simnav.declared_process import Oscillation, oscillation
 from simnav.world.sea import YAW
 
 __all__ = ["Responses", "Transitions", "answers", "transitions", "wave_responses"]
 
-#: What waves cause at the surface: velocity north, east, down [m/s]; slopes that roll and pitch follow from [rad].
-Responses = tuple[float, float, float, float, float, float, float]
-Transition = tuple[float, float, float, float]
-#: Of heave, roll, pitch and yaw.
-Transitions = tuple[Transition, Transition, Transition, Transition]
-_UNCHANGED: Transition = (1.0, 0.0, 0.0, 1.0)
-_STILL: Transitions = (_UNCHANGED, _UNCHANGED, _UNCHANGED, _UNCHANGED)
+
+class Responses(NamedTuple):
+    """What waves cause at the surface.
+
+    Attributes
+    ----------
+    north, east, down : float
+        Velocity [m/s].
+    roll_north, roll_east, pitch_north, pitch_east : float
+        Slopes that roll and pitch follow from, by the direction of the bow [rad].
+    """
+
+    north: float
+    east: float
+    down: float
+    roll_north: float
+    roll_east: float
+    pitch_north: float
+    pitch_east: float
+
+
+class Transitions(NamedTuple):
+    """The transition matrices of the oscillators of a vessel."""
+
+    heave: Oscillation
+    roll: Oscillation
+    pitch: Oscillation
+    yaw: Oscillation
+
+
+_UNCHANGED = Oscillation(1.0, 0.0, 0.0, 1.0)
+_STILL = Transitions(_UNCHANGED, _UNCHANGED, _UNCHANGED, _UNCHANGED)
 
 
 @helper(borrows=True, fastmath={"reassoc", "contract", "nsz", "arcp"})
@@ -49,7 +76,7 @@ def wave_responses(phase: Array, table: Array, north: float, east: float, dt: fl
         s4 += table[11, i] * c + table[12, i] * s
         s5 += table[13, i] * c + table[14, i] * s
         s6 += table[15, i] * c + table[16, i] * s
-    return s0, s1, s2, s3, s4, s5, s6
+    return Responses(s0, s1, s2, s3, s4, s5, s6)
 
 
 @helper(borrows=True)
@@ -65,14 +92,16 @@ def transitions(p: Array, dt: float) -> Transitions:
     """
     if p[0] == 0.0:
         return _STILL
-    return (
-        oscillation(dt, p[0], p[1]), oscillation(dt, p[2], p[3]), oscillation(dt, p[4], p[5]),
-        oscillation(dt, p[6], p[7]),
-    )  # fmt: skip
+    return Transitions(
+        heave=oscillation(dt, p[0], p[1]),
+        roll=oscillation(dt, p[2], p[3]),
+        pitch=oscillation(dt, p[4], p[5]),
+        yaw=oscillation(dt, p[6], p[7]),
+    )
 
 
 @helper(borrows=True)
-def _oscillate(x: Array, p: Array, force: float, dt: float, transition: Transition) -> float:
+def _oscillate(x: Array, p: Array, force: float, dt: float, transition: Oscillation) -> float:
     """Exact step of an oscillator under a force that is linear within the step. Return its new value.
 
     With the force a + b t the equation y'' + 2 z w y' + w^2 y = w^2 (a + b t) has the solution a + b t - 2 z b / w, to
@@ -81,8 +110,9 @@ def _oscillate(x: Array, p: Array, force: float, dt: float, transition: Transiti
     slope = (force - x[2]) / dt if dt > 0.0 else 0.0
     lag = 2.0 * p[1] * slope / p[0]
     y, rate = x[0] - (x[2] - lag), x[1] - slope
-    a, b, c, d = transition
-    x[0], x[1], x[2] = a * y + b * rate + force - lag, c * y + d * rate + slope, force
+    moved = transition.value_by_value * y + transition.value_by_rate * rate + force - lag
+    changed = transition.rate_by_value * y + transition.rate_by_rate * rate + slope
+    x[0], x[1], x[2] = moved, changed, force
     value: float = x[0]
     return value
 
@@ -115,13 +145,12 @@ def answers(
     Responses
         In the form of ``waves``.
     """
-    w0, w1, w2, w3, w4, w5, w6 = waves
     first = second = 0.0
     for i in range(phase.shape[1]):
         first += table[YAW, i] * phase[0, i]
         second += table[YAW + 1, i] * phase[0, i]
-    heave = _oscillate(x[0:3], p[0:2], w2, dt, by[0])
-    roll = _oscillate(x[3:6], p[2:4], w3 * sp - w4 * cp, dt, by[1])
-    pitch = _oscillate(x[6:9], p[4:6], w5 * cp + w6 * sp, dt, by[2])
-    _oscillate(x[9:12], p[6:8], first * (cp * cp - sp * sp) - second * 2.0 * cp * sp, dt, by[3])
-    return w0, w1, heave, roll * sp, -roll * cp, pitch * cp, pitch * sp
+    heave = _oscillate(x[0:3], p[0:2], waves.down, dt, by.heave)
+    roll = _oscillate(x[3:6], p[2:4], waves.roll_north * sp - waves.roll_east * cp, dt, by.roll)
+    pitch = _oscillate(x[6:9], p[4:6], waves.pitch_north * cp + waves.pitch_east * sp, dt, by.pitch)
+    _oscillate(x[9:12], p[6:8], first * (cp * cp - sp * sp) - second * 2.0 * cp * sp, dt, by.yaw)
+    return Responses(waves.north, waves.east, heave, roll * sp, -roll * cp, pitch * cp, pitch * sp)

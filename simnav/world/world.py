@@ -214,11 +214,12 @@ class World:
         n = round(self.rate)
         room = np.empty((1, n, 3))
         none, states = np.zeros(1, np.int64), np.empty((1, 0, motion.TAP_COLUMNS))
-        nowhere, imu = (np.empty((1, 0)), none, none, states), (np.array([n]), room, room.copy())
+        nowhere = motion.RequestedStates(np.empty((1, 0)), none, none, states)
+        imu = np.array([n]), room, room.copy()
         arguments: Any = (*self._one(), nowhere, imu)
         track, position, dive = np.empty((seconds, 4)), np.empty((seconds, 3)), np.empty((seconds, 2))
         for i in range(seconds):
-            motion.advance(*arguments)
+            motion.advance.unchecked(*arguments)
             track[i] = self._x[_TRACK]
             position[i] = self._x[motion.LATITUDE : motion.HEIGHT + 1]
             dive[i] = self._x[motion.DIVE]
@@ -277,9 +278,11 @@ class World:
         times = np.concatenate([np.empty(0), *taps.values()])
         order = np.argsort(times, kind="stable")
         sorted_states = np.empty((1, len(times), motion.TAP_COLUMNS))
-        within = times[None, order], np.zeros(1, np.int64), np.array([len(times)]), sorted_states
-        arguments: Any = (*self._one(), within, (np.array([n]), rate, force))
-        motion.advance(*arguments)
+        requested = motion.RequestedStates(
+            times[None, order], np.zeros(1, np.int64), np.array([len(times)]), sorted_states
+        )
+        arguments: Any = (*self._one(), requested, (np.array([n]), rate, force))
+        motion.advance.unchecked(*arguments)
         states = np.empty_like(sorted_states[0])
         states[order] = sorted_states[0]
         out, i = {}, 0

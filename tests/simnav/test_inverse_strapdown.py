@@ -7,7 +7,7 @@ import pytest
 
 from simnav.compiled import Array, kernel
 from simnav.geometry.rotation import dcm_from_rpy
-from simnav.inverse_strapdown import BLOCK, increments, sample_from_motion
+from simnav.inverse_strapdown import BLOCK, increments, sample_from_motion, small_matrix
 from simnav.kernel_types import Matrix, Stack, Vector
 
 
@@ -21,15 +21,14 @@ def one_by_one(time: Vector, velocity: Matrix, dcm: Stack, memory: Vector, posit
             position[k, 2],
             (v[0], v[1], v[2]),
             (w[0], w[1], w[2]),
-            (c[0, 0], c[0, 1], c[0, 2], c[1, 0], c[1, 1], c[1, 2], c[2, 0], c[2, 1], c[2, 2]),
-            (d[0, 0], d[0, 1], d[0, 2], d[1, 0], d[1, 1], d[1, 2], d[2, 0], d[2, 1], d[2, 2]),
+            small_matrix(c),
+            small_matrix(d),
             memory,
             time[k + 1] - time[k],
         )
-        for i in range(6):
-            samples[k, i] = out[i]
         for i in range(3):
-            position[k + 1, i] = position[k, i] + out[6 + i]
+            samples[k, i], samples[k, 3 + i] = out.angular_rate[i], out.specific_force[i]
+            position[k + 1, i] = position[k, i] + out.displacement[i]
 
 
 def voyage(n: int, interval: float, turning: float) -> tuple[Array, Array, Array]:

@@ -12,7 +12,7 @@ from math import pi
 
 import numpy as np
 
-from simnav.declared_process import Factor, oscillation
+from simnav.declared_process import Factor, Oscillation, oscillation
 from simnav.plugins import PluginError
 from simnav.spec import UNITS
 from simnav.types import Array, TapStates
@@ -209,14 +209,14 @@ class _Ballistic:
         north = tap.velocity[:, 0] / np.cos(tap.position[:, 0])
         out = np.empty(len(north))
         x, rate = self._state
-        steps: Mapping[float, tuple[float, float, float, float]] = {}
+        steps: Mapping[float, Oscillation] = {}
         for k, (t, v) in enumerate(zip(tap.time.tolist(), north.tolist(), strict=True)):
             if self._last is not None:
                 elapsed = t - self._last[0]
                 if elapsed not in steps:
                     steps = {elapsed: oscillation(elapsed, self._frequency, self._damping)}
-                a, b, c, d = steps[elapsed]
-                x, rate = a * x + b * rate, c * x + d * rate
+                by = steps[elapsed]
+                x, rate = by.value_by_value * x + by.value_by_rate * rate, by.rate_by_value * x + by.rate_by_rate * rate
                 x += v - self._last[1]
             self._last = t, v
             out[k] = x

@@ -99,5 +99,5 @@ class _Settling:
         self._value, self._frequency, self._damping = value, 2.0 * pi / period, damping
 
     def sample(self, time: Array) -> Array:
-        share = [oscillation(max(t, 0.0), self._frequency, self._damping)[0] for t in time.tolist()]
+        share = [oscillation(max(t, 0.0), self._frequency, self._damping).value_by_value for t in time.tolist()]
         return np.outer(share, self._value)

@@ -27,11 +27,12 @@ Industrial Aerodynamics 51, 1994.
 from __future__ import annotations
 
 from math import atan2, cos, exp, sin, sqrt
+from typing import NamedTuple
 
 from simnav.compiled import Array, helper, kernel
 from simnav.kernel_types import Matrix, Vector
 
-__all__ = ["GUSTS", "HULL", "SAIL", "TERMS", "integrate_hull", "propeller_for", "sail", "trial"]
+__all__ = ["GUSTS", "HULL", "SAIL", "TERMS", "HullMotion", "Sailed", "integrate_hull", "propeller_for", "sail", "trial"]
 
 #: Products of velocities that K multiplies. ``fading`` ones are multiplied by exp(-decay U).
 TERMS = (
@@ -63,7 +64,49 @@ _WEIGHT = (0.17132449237917036, 0.3607615730481386, 0.46791393457269104)
 _LONGEST = 0.1
 
 Three = tuple[float, float, float]
-Six = tuple[float, float, float, float, float, float]
+
+
+class HullMotion(NamedTuple):
+    """The state of a hull, or its rates of change.
+
+    Attributes
+    ----------
+    surge, sway : float
+        Velocity through the water [m/s].
+    yaw_rate : float
+        [rad/s].
+    heading : float
+        [rad].
+    propeller, steering : float
+        Shares of what the actuators can give.
+    """
+
+    surge: float
+    sway: float
+    yaw_rate: float
+    heading: float
+    propeller: float
+    steering: float
+
+
+class Sailed(NamedTuple):
+    """What a step of the autopilot leads to.
+
+    Attributes
+    ----------
+    surge, surge_change : float
+        Velocity through the water [m/s], and its change [m/s^2].
+    yaw_rate, yaw_rate_change : float
+        [rad/s], and its change [rad/s^2].
+    heading : float
+        [rad].
+    """
+
+    surge: float
+    surge_change: float
+    yaw_rate: float
+    yaw_rate_change: float
+    heading: float
 
 
 @helper(borrows=True)
@@ -126,9 +169,12 @@ def _thrust(h: Array, n: float, u: float) -> float:
 
 
 @helper(borrows=True)
-def _change(h: Array, water: tuple[float, float], time: float, command: tuple[float, float], s: Six) -> Six:
+def _change(
+    h: Array, water: tuple[float, float], time: float, command: tuple[float, float], s: HullMotion
+) -> HullMotion:
     """Rates of change of u, v, r, heading, propeller and steering."""
-    u, v, r, psi, n, steer = s
+    u, v, r = s.surge, s.sway, s.yaw_rate
+    psi, n, steer = s.heading, s.propeller, s.steering
     c, d = cos(psi), sin(psi)
     x, y, z = _hull_force(h, u, v, r)
     if h[A_SIDE] > 0.0 and (h[WIND] != 0.0 or h[WIND + 1] != 0.0):
@@ -139,7 +185,7 @@ def _change(h: Array, water: tuple[float, float], time: float, command: tuple[fl
     x += _thrust(h, n, u) - h[S_DRAG] * square * steer * steer
     y += moment * h[S_SWAY]
     z += moment
-    return (
+    return HullMotion(
         h[0] * x + h[1] * y + h[2] * z,
         h[3] * x + h[4] * y + h[5] * z,
         h[6] * x + h[7] * y + h[8] * z,
@@ -150,11 +196,15 @@ def _change(h: Array, water: tuple[float, float], time: float, command: tuple[fl
 
 
 @helper(borrows=True)
-def _ahead(s: Six, change: Six, dt: float) -> Six:
-    return (
-        s[0] + dt * change[0], s[1] + dt * change[1], s[2] + dt * change[2],
-        s[3] + dt * change[3], s[4] + dt * change[4], s[5] + dt * change[5],
-    )  # fmt: skip
+def _ahead(s: HullMotion, change: HullMotion, dt: float) -> HullMotion:
+    return HullMotion(
+        s.surge + dt * change.surge,
+        s.sway + dt * change.sway,
+        s.yaw_rate + dt * change.yaw_rate,
+        s.heading + dt * change.heading,
+        s.propeller + dt * change.propeller,
+        s.steering + dt * change.steering,
+    )
 
 
 @helper(borrows=True)
@@ -174,16 +224,16 @@ def propeller_for(h: Array, thrust: float, u: float) -> float:
 
 @helper(borrows=True)
 def integrate_hull(
-    h: Array, s: Six, command: tuple[float, float], water: tuple[float, float], time: float, dt: float
-) -> Six:
+    h: Array, s: HullMotion, command: tuple[float, float], water: tuple[float, float], time: float, dt: float
+) -> HullMotion:
     """Integrate the equations over dt seconds under constant commands.
 
     Parameters
     ----------
     h : (HULL,) array
         The hull (`simnav.world.manoeuvring.hull.Hull.vector`).
-    s : tuple of 6 floats
-        Surge and sway velocity through the water [m/s], yaw rate [rad/s], heading [rad], propeller, steering.
+    s : HullMotion
+        The state at the start.
     command : (float, float)
         Commanded propeller and steering.
     water : (float, float)
@@ -213,7 +263,7 @@ def sail(
     water: tuple[float, float],
     time: float,
     dt: float,
-) -> tuple[float, float, float, float, float]:
+) -> Sailed:
     """Advance a hull by one step of its autopilot.
 
     Parameters
@@ -234,8 +284,7 @@ def sail(
 
     Returns
     -------
-    tuple of 5 floats
-        Surge velocity, its change [m/s^2], yaw rate, its change [rad/s^2], heading.
+    Sailed
     """
     u, r, psi = state
     slow, quick = constants
@@ -248,13 +297,13 @@ def sail(
     if (n < 1.0 or off < 0.0) and (n > h[N_LEAST] or off > 0.0):
         x[ENGINE] += 0.25 * dt * off / (slow * slow)
     # Steering: what the yaw rate would do without it, and what is wanted.
-    idle = _change(h, water, time, (0.0, 0.0), (u, v, r, psi, x[PROPELLER], 0.0))
+    idle = _change(h, water, time, (0.0, 0.0), HullMotion(u, v, r, psi, x[PROPELLER], 0.0))
     turning = (h[7] * h[S_SWAY] + h[8]) * (h[S_MOMENT] + h[S_SPEED] * (u * u + v * v) + h[S_DRIFT] * v * v)
-    steer = (x[RATE_CHANGE] + (x[RATE] - r) / quick - idle[2]) / max(turning, 1e-9 * h[8])
+    steer = (x[RATE_CHANGE] + (x[RATE] - r) / quick - idle.yaw_rate) / max(turning, 1e-9 * h[8])
     command = (n, min(max(steer, -h[S_MOST]), h[S_MOST]))
-    s = integrate_hull(h, (u, v, r, psi, x[PROPELLER], x[STEERING]), command, water, time, dt)
-    x[SWAY], x[PROPELLER], x[STEERING] = s[1], s[4], s[5]
-    return s[0], (s[0] - u) / dt, s[2], (s[2] - r) / dt, s[3]
+    s = integrate_hull(h, HullMotion(u, v, r, psi, x[PROPELLER], x[STEERING]), command, water, time, dt)
+    x[SWAY], x[PROPELLER], x[STEERING] = s.sway, s.propeller, s.steering
+    return Sailed(s.surge, (s.surge - u) / dt, s.yaw_rate, (s.yaw_rate - r) / dt, s.heading)
 
 
 @kernel
@@ -276,7 +325,7 @@ def trial(h: Vector, states: Matrix, commands: Matrix, dt: float, water: Vector)
         Velocity of the water, north and east [m/s].
     """
     for k in range(commands.shape[0]):
-        s = (states[k, 0], states[k, 1], states[k, 2], states[k, 3], states[k, 4], states[k, 5])
+        s = HullMotion(states[k, 0], states[k, 1], states[k, 2], states[k, 3], states[k, 4], states[k, 5])
         s = integrate_hull(h, s, (commands[k, 0], commands[k, 1]), (water[0], water[1]), k * dt, dt)
         for i in range(6):
             states[k + 1, i] = s[i]

@@ -13,7 +13,7 @@ from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
 import simnav  # noqa: F401 (it registers)
 from simnav.environment import spawn_seeds
-from simnav.estimators.learning.bank import take
+from simnav.estimators.learning.bank import Steps, take
 from simnav.estimators.learning.pool import Pool
 from simnav.estimators.learning.reference import Linear
 from simnav.estimators.learning.voyage import prepare
@@ -202,7 +202,7 @@ def test_a_bank_propagates_constant_states_like_all_others(moving):
     linear.transition[0], linear.process_noise[0], linear.moves[0] = phi, np.diag(rng.random(n)), True
     covariance = (root @ root.T)[None].copy()
     expected = phi @ covariance[0] @ phi.T + 4.0 * linear.process_noise[0]
-    steps = np.ones(1, np.bool_), np.zeros(1, np.int64), np.ones(1, np.int64)
-    take(steps, linear.events, np.zeros(1, np.int64), np.ones((1, 1, 1)), np.array([2.0]), covariance, delta)
+    steps = Steps(np.ones(1, np.bool_), np.zeros(1, np.int64), np.ones(1, np.int64))
+    take(steps, linear, np.zeros(1, np.int64), np.ones((1, 1, 1)), np.array([2.0]), covariance, delta)
     np.testing.assert_allclose(covariance[0], expected, rtol=1e-12, atol=1e-12)
     np.testing.assert_allclose(delta[0], phi @ before, rtol=1e-12, atol=1e-12)

@@ -10,16 +10,16 @@ import pytest
 from simnav.blocks import StateBlock
 from simnav.estimator import make
 from simnav.estimators.models import declared_errors
-from simnav.estimators.models.about_truth import AboutTruthModel
 from simnav.estimators.models.chain import chain_of
 from simnav.estimators.models.channels import by_channel
 from simnav.estimators.models.declared_errors import DeclaredError, error_of_fault, errors_of, errors_of_triad
+from simnav.estimators.models.error_states import merged, separate_states, with_variance
 from simnav.estimators.models.fault_states import FaultState, FaultStateModel
 from simnav.estimators.models.inertial import InertialModel
 from simnav.estimators.models.inertial_points import InertialPoints
 from simnav.estimators.models.ship import ShipModel
 from simnav.estimators.models.state_blocks import StateBlocks
-from simnav.estimators.models.sum_of_processes import apart, merged, with_variance
+from simnav.estimators.models.truth_linearised import TruthLinearisedModel
 from simnav.plugins import import_file
 from simnav.scenario import load
 from simnav.source import record
@@ -113,7 +113,7 @@ def test_apart_each_process_has_a_state_and_their_variances_are_those_of_the_mer
     bias = errors_of(
         sheet("gnss_position", bias=np.array([1.0, 0.0, 2.0]), bias_instability=np.full(3, 0.5), correlation_time=60.0)
     )["bias"]
-    found = apart(bias)
+    found = separate_states(bias)
     assert [(p.name, k) for p, k, _ in found] == [("turn_on", 0), ("turn_on", 2), *(("in_run", k) for k in range(3))]
     total = np.zeros(3)
     for _, k, rates in found:
@@ -163,7 +163,7 @@ def initial_variances(plugins) -> dict[str, tuple[float, int]]:
     for name, model, instruments in (
         ("filter", InertialModel(), aids),
         ("points", InertialPoints(), aids),
-        ("oracle", AboutTruthModel(recording.data.truth), aids),
+        ("oracle", TruthLinearisedModel(recording.data.truth), aids),
         ("ship", ShipModel(), no_imu),
         ("general", general(), no_imu),
     ):

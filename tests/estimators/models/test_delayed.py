@@ -7,7 +7,7 @@ import pytest
 
 from simnav.estimator import make
 from simnav.estimators.models.delayed import DELAY, is_delayed, with_delay
-from simnav.estimators.models.levered import is_own, observation_of, with_lever_arms
+from simnav.estimators.models.lever_arms import has_measurement_function, observation_of, with_lever_arms
 from simnav.estimators.models.readings import READINGS
 from simnav.geometry.earth import displace
 from simnav.geometry.rotation import dcm_from_rotation_vector, dcm_from_rpy
@@ -45,7 +45,7 @@ def point(elapsed=0.0, **more):
 @pytest.mark.parametrize("sheet", SHEETS, ids=lambda s: s.kind)
 def test_a_reading_at_a_delay_is_that_of_the_earlier_time(sheet):
     (sheet,) = with_lever_arms(Instruments([sheet])).values()
-    assert is_own(sheet)
+    assert has_measurement_function(sheet)
     found = observation_of(sheet)(point(blocks={DELAY: np.array([0.08])}), sheet)
     reading = found if isinstance(found, np.ndarray) else found[0]
     error = KINDS[sheet.kind].difference(reading, READINGS[sheet.equation](point(-0.08), sheet))

@@ -9,9 +9,9 @@ import pytest
 
 from simnav.declared_process import DeclaredProcess
 from simnav.estimators.models.declared_errors import bias_of
-from simnav.estimators.models.factors_about_truth import FactorsAboutTruth
 from simnav.estimators.models.inertial import InertialModel
 from simnav.estimators.models.state_blocks import StateBlocks
+from simnav.estimators.models.truth_linearised_factors import TruthLinearisedFactors
 from simnav.geometry.rotation import dcm_from_rpy
 from simnav.kinds import INSTRUMENTS as INSTRUMENTS_BY_KIND
 from simnav.kinds import KINDS
@@ -323,7 +323,9 @@ def test_the_oracle_multiplies_with_the_factors_of_the_simulator():
     )
     tap = tap_states(6)
     simulated = Factors(spec.factors()).at(tap, tap.attitude[:, 2:], Surroundings())[:, 0]
-    factors = FactorsAboutTruth(spec.factors(), NavigationStates(tap.time, tap.position, tap.velocity, tap.attitude))
+    factors = TruthLinearisedFactors(
+        spec.factors(), NavigationStates(tap.time, tap.position, tap.velocity, tap.attitude)
+    )
     nominal = InertialModel()
     for k in (1, 4):
         nominal.position, nominal.velocity = tap.position[k].copy(), tap.velocity[k].copy()

@@ -17,7 +17,7 @@ from simnav.estimators.models.channels import by_channel, owners
 from simnav.estimators.models.columns import Columns
 from simnav.estimators.models.delayed import DELAY
 from simnav.estimators.models.inertial import InertialModel
-from simnav.estimators.models.own_observation import OwnObservation
+from simnav.estimators.models.measurement_functions import MeasurementFunction
 from simnav.estimators.models.ship import ShipModel
 from simnav.estimators.solvers.admission import Admission, together
 from simnav.geometry.earth import relative_position
@@ -148,14 +148,14 @@ def test_an_unknown_delay_has_no_such_form():
     given = BEAMS + "timing = { offset_s = 0.05 }"
     sheet = by_channel(Scenario.from_toml(tomllib.loads(given), source="beams").instruments_sheet())["beams:2"]
     late = replace(sheet, blocks=(*sheet.blocks, StateBlock(DELAY, 1, "s", 0.05)))
-    assert OwnObservation(sheet).observations is not None
-    assert OwnObservation(late).observations is None
+    assert MeasurementFunction(sheet).observations is not None
+    assert MeasurementFunction(late).observations is None
 
 
 @pytest.mark.parametrize("name", ["sw-fgo", "gnc-fgo"])
 def test_a_window_gives_the_same(recording: Recording, monkeypatch: pytest.MonkeyPatch, name: str):
     at_once = run_trial(make(name), recording)
-    monkeypatch.setattr(inertial, "of_instruments", lambda own, bias_at: [])
+    monkeypatch.setattr(inertial, "channel_readings_of", lambda own, bias_at: [])
     one_by_one = run_trial(make(name), recording)
     assert (at_once.status, one_by_one.status) == ("ok", "ok")
     np.testing.assert_allclose(at_once.position, one_by_one.position, rtol=0.0, atol=1e-12)
@@ -227,7 +227,7 @@ def test_a_compiled_equation_has_no_such_form():
 def test_a_filter_takes_them_together_as_one_by_one(recording: Recording, monkeypatch: pytest.MonkeyPatch):
     """To what the second derivatives of the ranges are worth: the state moves by metres, the satellites are far."""
     at_once = run_trial(make("ekf"), recording)
-    monkeypatch.setattr(inertial, "of_instruments", lambda own, bias_at: [])
+    monkeypatch.setattr(inertial, "channel_readings_of", lambda own, bias_at: [])
     one_by_one = run_trial(make("ekf"), recording)
     np.testing.assert_allclose(relative_position(at_once.position, one_by_one.position), 0.0, atol=1e-3)
     variances = (np.diagonal(trial.covariance, axis1=1, axis2=2) for trial in (at_once, one_by_one))

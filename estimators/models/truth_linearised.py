@@ -54,13 +54,13 @@ from simnav.types import (
 from .base import ErrorModel, Linearised
 from .declared_errors import errors_of, errors_of_triad
 from .equations import equation_of
-from .factors_about_truth import FactorsAboutTruth
+from .error_states import merged, separate_states
 from .inertial import InertialModel, roll_pitch_yaw
 from .propagation import correct_inertial
 from .state_blocks import StateBlocks
-from .sum_of_processes import apart, merged
+from .truth_linearised_factors import TruthLinearisedFactors
 
-__all__ = ["AboutTruthModel"]
+__all__ = ["TruthLinearisedModel"]
 
 _NAV, _INERTIAL = 9, 15
 #: Times closer than this are one and the same [s].
@@ -86,10 +86,10 @@ class _AidErrors(NamedTuple):
     scale: int
     misalignment: int
     deviation: int
-    processes: list[tuple[int, int, FactorsAboutTruth]]
+    processes: list[tuple[int, int, TruthLinearisedFactors]]
 
 
-class AboutTruthModel(ErrorModel):
+class TruthLinearisedModel(ErrorModel):
     """The model of the module.
 
     Parameters
@@ -159,7 +159,7 @@ class AboutTruthModel(ErrorModel):
             self.blocks.add(name, "bias", merged(replace(bias, processes=beside)))
             self._imu_errors += [_ImuError(axis, -1) for axis in range(first, first + 3)]
             triad = replace(triad, bias=0.0, rate_random_walk=0.0)
-        scale, misalignment = (iter(apart(errors[name])) for name in ("scale", "misalignment"))
+        scale, misalignment = (iter(separate_states(errors[name])) for name in ("scale", "misalignment"))
         for axis in range(first, first + 3):
             for other in range(first, first + 3):
                 for _, _, rates in islice(scale if other == axis else misalignment, 1):
@@ -170,7 +170,7 @@ class AboutTruthModel(ErrorModel):
     def _aid(self, sheet: Datasheet) -> Datasheet:
         """Make the states of an aid; return its datasheet with what is left for the inertial model."""
         name, errors, bias = sheet.name, errors_of(replace(sheet, processes=())), []
-        for process, component, rates in apart(errors["bias"]):
+        for process, component, rates in separate_states(errors["bias"]):
             bias.append((component, self.blocks.add(name, f"{process.name}_{component}", [rates])))
         if "current" in errors and self.water is None:  # along the keel
             bias.append((0, self.blocks.add(name, "current", merged(errors["current"])[:1])))
@@ -188,11 +188,11 @@ class AboutTruthModel(ErrorModel):
             timing=None,  # the times of validity are known
         )  # fmt: skip
 
-    def _processes(self, sheet: Datasheet) -> list[tuple[int, int, FactorsAboutTruth]]:
+    def _processes(self, sheet: Datasheet) -> list[tuple[int, int, TruthLinearisedFactors]]:
         """Make the states of the processes that a datasheet declares by name, each as it is."""
         found = []
         for process in sheet.processes:
-            factors = FactorsAboutTruth(process.factors, self.truth)
+            factors = TruthLinearisedFactors(process.factors, self.truth)
             block = process.block if process.exact is None else process.exact
             for component, rates in enumerate(block.rates()):
                 label = f"{process.name}_of_{component}"
@@ -251,7 +251,7 @@ class AboutTruthModel(ErrorModel):
             self._integral = np.concatenate([[imu.time[0] - imu.interval[0]], imu.time]), total
 
     def _measured(self, first: float, last: float) -> Array:
-        """(6,) mean of the IMU's samples over a stretch of the step."""
+        """(6,) mean of the IMU's samples over a part of the step."""
         if self._integral is None:
             return np.zeros(6)
         time, total = self._integral

@@ -13,12 +13,12 @@ from simnav.world import Surroundings
 
 from .inertial import InertialModel, roll_pitch_yaw
 
-__all__ = ["FactorsAboutTruth"]
+__all__ = ["TruthLinearisedFactors"]
 
 _NOWHERE = Surroundings()
 
 
-class FactorsAboutTruth:
+class TruthLinearisedFactors:
     """The product of the factors of a process, at the nominal state of the model.
 
     A factor that depends on earlier states is computed from the truth at the steps of the run, and is linear between

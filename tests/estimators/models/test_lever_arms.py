@@ -9,11 +9,11 @@ import pytest
 
 from simnav.blocks import LEVER_ARM
 from simnav.estimator import make
-from simnav.estimators.models.about_truth import AboutTruthModel
 from simnav.estimators.models.channels import by_channel, reading_of
 from simnav.estimators.models.inertial import InertialModel
-from simnav.estimators.models.levered import with_lever_arms
-from simnav.estimators.models.own_observation import OwnObservation
+from simnav.estimators.models.lever_arms import with_lever_arms
+from simnav.estimators.models.measurement_functions import MeasurementFunction
+from simnav.estimators.models.truth_linearised import TruthLinearisedModel
 from simnav.estimators.solvers.kalman import KalmanEstimator
 from simnav.geometry.rotation import dcm_from_rpy
 from simnav.recording import Recording
@@ -101,13 +101,13 @@ def test_the_jacobians_are_those_of_differences(recording: Recording, name: str)
     sheet = with_lever_arms(recording.instruments)[name]
     assert sheet.blocks[0].name == LEVER_ARM
     places = dict(zip((b.name for b in sheet.blocks), np.cumsum([0, *(b.size for b in sheet.blocks)]).tolist()))
-    own, values = OwnObservation(sheet, places), np.array([0.4, -0.3, 0.2, 0.01, 0.002, -0.001, 0.003])
+    own, values = MeasurementFunction(sheet, places), np.array([0.4, -0.3, 0.2, 0.01, 0.002, -0.001, 0.003])
     values = values[: sum(b.size for b in sheet.blocks)]
     dcm, zero = dcm_from_rpy(np.array([0.1, -0.05, 2.0])), np.zeros(3)
     point = own.point(0.0, np.array([0.9, 0.1, -5.0]), np.array([3.0, -2.0, 0.3]), dcm, np.array([0.2, -0.1, 0.3]),
                       zero, values)  # fmt: skip
     _, given = own.predict(point)
-    bare = OwnObservation(sheet, places)
+    bare = MeasurementFunction(sheet, places)
     bare._observation = lambda p, s: own.read(p)
     _, slopes = bare.predict(point)
     np.testing.assert_allclose(given, slopes, atol=0.02 * np.abs(slopes).max())  # without terms of second order
@@ -166,7 +166,7 @@ def test_without_such_figures_nothing_changes(recording: Recording):
 def test_the_oracle_has_the_swing_by_the_bias_of_the_gyroscopes(scenario, source):
     """Its nominal rate is as measured: a bias of the rate moves the innovation by the Jacobian times the bias."""
     recording = record(scenario.model_copy(update={"duration": 2.0}), 1)
-    model = AboutTruthModel(recording.data.truth)
+    model = TruthLinearisedModel(recording.data.truth)
     model.begin(recording.start, by_channel(recording.instruments))
     stream = recording.data.aids[source.partition(":")[0]]
     reading = reading_of(next(m for m in stream.measurements() if source.endswith(m.channel)))

@@ -2,7 +2,7 @@
 
 A window predicts each reading of each of its nodes again in every iteration: 20 satellites in 20 nodes are 400 calls of
 a Python function. A kind that has `simnav.kinds.Kind.observations` is called once instead. The result is that of
-`simnav.estimators.models.own_observation`, reading by reading.
+`simnav.estimators.models.measurement_functions`, reading by reading.
 """
 
 from __future__ import annotations
@@ -20,52 +20,52 @@ from simnav.types import Array
 
 from .ambiguity import innovation_of
 from .channels import ChannelDatasheet, whole
-from .own_observation import OwnObservation
+from .measurement_functions import MeasurementFunction
 
-__all__ = ["ManyReadings", "of_instruments"]
+__all__ = ["ChannelReadings", "channel_readings_of"]
 
 
-def of_instruments(
-    own: Mapping[str, OwnObservation], bias_at: Mapping[str, int], form: type[ManyReadings] | None = None
-) -> list[ManyReadings]:
-    """One `ManyReadings` for each instrument with channels whose kind can predict many readings at one time.
+def channel_readings_of(
+    own: Mapping[str, MeasurementFunction], bias_at: Mapping[str, int], form: type[ChannelReadings] | None = None
+) -> list[ChannelReadings]:
+    """One `ChannelReadings` for each instrument with channels whose kind can predict many readings at one time.
 
     Parameters
     ----------
-    own : mapping of str to OwnObservation
+    own : mapping of str to MeasurementFunction
         The equation of each source of readings, by its name.
     bias_at : mapping of str to int
         Index in the error state of the first bias of a source; sources without one are not in it.
     form : type, optional
-        The class for the states of the model. Default: `ManyReadings`, for those of an inertial model.
+        The class for the states of the model. Default: `ChannelReadings`, for those of an inertial model.
     """
     groups: dict[str, list[str]] = {}
     for name, observation in own.items():
         sheet = observation.sheet
         if isinstance(sheet, ChannelDatasheet) and observation.observations is not None:
             groups.setdefault(sheet.instrument, []).append(name)
-    return [(form or ManyReadings)({name: own[name] for name in names}, bias_at) for names in groups.values()]
+    return [(form or ChannelReadings)({name: own[name] for name in names}, bias_at) for names in groups.values()]
 
 
-class ManyReadings:
+class ChannelReadings:
     """The measurement equation of all channels of an instrument.
 
     Parameters
     ----------
-    own : mapping of str to OwnObservation
+    own : mapping of str to MeasurementFunction
         The equation of each channel, by its source.
     bias_at : mapping of str to int
-        As of `of_instruments`.
+        As of `channel_readings_of`.
 
     Attributes
     ----------
     biased : bool
         Whether a channel has biases. Filters take such channels one by one; a change needs new versions of their rows.
     has_noise : bool
-        Whether the noise of a reading depends on the state (`OwnObservation.has_noise`).
+        Whether the noise of a reading depends on the state (`MeasurementFunction.has_noise`).
     """
 
-    def __init__(self, own: Mapping[str, OwnObservation], bias_at: Mapping[str, int]):
+    def __init__(self, own: Mapping[str, MeasurementFunction], bias_at: Mapping[str, int]):
         first = next(iter(own.values()))
         assert isinstance(first.sheet, ChannelDatasheet)
         assert first.observations is not None
@@ -81,7 +81,7 @@ class ManyReadings:
         self._at = [(b.name, slice(places[b.name], places[b.name] + b.size)) for b in stated]
         self._zeros = {b.name: np.zeros((1, b.size)) for b in first.sheet.blocks if b.name not in places}
 
-    def __deepcopy__(self, memo: object) -> ManyReadings:
+    def __deepcopy__(self, memo: object) -> ChannelReadings:
         """Itself: it never changes, and an estimator that takes late readings is copied in each step."""
         return self
 
@@ -154,12 +154,12 @@ class ManyReadings:
         turning = rate[:, :3] - bias[:, :3] - np.einsum("nji,nj->ni", dcm, earth_rate(position[:, 0]))
         return tuple(column.take(row, axis=0) for column in (position, velocity, dcm, turning))
 
-    def _by_navigation(self, given: Array, own: Array, jacobian: Array) -> None:
+    def _by_navigation(self, derivative: Array, own: Array, jacobian: Array) -> None:
         """Write the (n, d, 9) derivative by the navigation state into that by the error state."""
-        jacobian[:, :, :9] = given
+        jacobian[:, :, :9] = derivative
 
     def more_noise(self, sides: Sequence[Array]) -> Array | None:
-        """`OwnObservation.noise_without_state` of n readings.
+        """`MeasurementFunction.noise_without_state` of n readings.
 
         Each sigma is computed by itself: functions of NumPy may differ in the last digit between one number and many.
 

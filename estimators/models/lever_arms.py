@@ -2,7 +2,7 @@
 
 Their datasheet brings a block of states ``lever_arm`` along (`simnav.sensors.AidSpec.blocks`). The compiled loops have
 no place for it. So here the equation is a function with states, like that of a kind of somebody else
-(`simnav.estimators.models.own_observation`). The scale factor and the misalignment become blocks, too.
+(`simnav.estimators.models.measurement_functions`). The scale factor and the misalignment become blocks, too.
 
 With position p, velocity v, direction cosine matrix C, lever arm l and body rate w relative to the Earth, the
 derivatives by the error of the lever arm are (Groves 2013, section 14.3): ``C`` for a position, ``C [w x]`` for a
@@ -26,10 +26,10 @@ from .declared_errors import errors_of
 from .delayed import is_delayed, observation_at_delay, with_delay
 from .equations import equation_of
 
-__all__ = ["is_own", "observation_of", "with_lever_arms"]
+__all__ = ["has_measurement_function", "observation_of", "with_lever_arms"]
 
 
-def is_own(sheet: Datasheet) -> bool:
+def has_measurement_function(sheet: Datasheet) -> bool:
     """Whether an instrument is observed by a function, and not by a compiled equation."""
     return KINDS[sheet.kind].observation is not None or _has_states(sheet)
 

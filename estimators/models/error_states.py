@@ -18,7 +18,7 @@ from simnav.types import Array, Datasheet
 from .declared_errors import DeclaredError, errors_of
 from .equations import equation_of
 
-__all__ = ["apart", "merged", "merged_states", "with_variance"]
+__all__ = ["merged", "merged_states", "separate_states", "with_variance"]
 
 
 def merged(error: DeclaredError) -> list[Rates]:
@@ -77,7 +77,7 @@ def merged_states(sheet: Datasheet) -> dict[str, list[Rates]]:
     return found
 
 
-def apart(error: DeclaredError) -> list[tuple[StateBlock, int, Rates]]:
+def separate_states(error: DeclaredError) -> list[tuple[StateBlock, int, Rates]]:
     """A state for each component of each slow process that is not zero: process, component and rates."""
     return [
         (process, k, rates)

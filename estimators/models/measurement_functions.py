@@ -32,9 +32,9 @@ from simnav.types import KINDS, NO_SIDE, Array, Datasheet
 from .ambiguity import innovation_of
 from .channels import ChannelDatasheet, whole
 from .delayed import acceleration, is_delayed
-from .levered import observation_of
+from .lever_arms import observation_of
 
-__all__ = ["OwnObservation"]
+__all__ = ["MeasurementFunction"]
 
 #: Number of columns of an observation's Jacobian: position, velocity, attitude.
 _COMPONENTS = 9
@@ -47,15 +47,15 @@ _RATE_STEP = 1e-2
 _NONE: Mapping[str, Array] = MappingProxyType({})
 
 
-class OwnObservation:
+class MeasurementFunction:
     """The measurement equation of one instrument, or of one of its channels.
 
     Parameters
     ----------
     sheet : Datasheet
-        Datasheet of an instrument that is observed by a function (`simnav.estimators.models.levered.is_own`). For one
-        with channels it is that of a channel (`simnav.estimators.models.channels.by_channel`); the function receives
-        that of the instrument.
+        Datasheet of an instrument that is observed by a function
+        (`simnav.estimators.models.lever_arms.has_measurement_function`). For one with channels it is that of a channel
+        (`simnav.estimators.models.channels.by_channel`); the function receives that of the instrument.
     places : mapping of str to int, optional
         Index of the first state of each of its blocks in the array of values that `point` receives. A block without a
         place has no state: it is zero, and its uncertainty counts as noise.
@@ -101,7 +101,7 @@ class OwnObservation:
             s * _PART_OF_SIGMA or _SMALLEST_STEP for b in sheet.blocks for s in np.atleast_1d(b.sigma).tolist()
         ]
 
-    def __deepcopy__(self, memo: object) -> OwnObservation:
+    def __deepcopy__(self, memo: object) -> MeasurementFunction:
         """Itself: it never changes, and an estimator that takes late readings is copied in each step."""
         return self
 
@@ -157,11 +157,11 @@ class OwnObservation:
         d = len(self.kind.components)
         bare = isinstance(result, np.ndarray)
         try:
-            reading, given = (result, {}) if bare else result
+            reading, derivatives = (result, {}) if bare else result
             reading = np.asarray(reading, dtype=np.float64)
-            if not isinstance(given, Mapping):
-                given = {NAVIGATION: given}
-            blocks = {name: np.asarray(part, dtype=np.float64) for name, part in given.items()}
+            if not isinstance(derivatives, Mapping):
+                derivatives = {NAVIGATION: derivatives}
+            blocks = {name: np.asarray(part, dtype=np.float64) for name, part in derivatives.items()}
         except (TypeError, ValueError):
             raise self._wrong(repr(result)) from None
         sizes = {name: (d, at.stop - at.start) for name, at in self._columns.items()}
@@ -189,12 +189,12 @@ class OwnObservation:
         except Exception as error:
             raise ValueError(f"{self._label()} raised {type(error).__name__}: {error}") from error
 
-    def _wrong(self, given: str) -> ValueError:
+    def _wrong(self, returned: str) -> ValueError:
         """The error for a result of another form."""
         d = len(self.kind.components)
         message = (
             f"{self._label()} should return a reading of shape {(d,)} and its Jacobian "
-            f"of shape {(d, _COMPONENTS)}, or None, not {given}"
+            f"of shape {(d, _COMPONENTS)}, or None, not {returned}"
         )
         if self.sheet.blocks:
             sizes = ", ".join(f"{name!r}: {(d, at.stop - at.start)}" for name, at in self._columns.items())
@@ -438,7 +438,7 @@ class OwnObservation:
 
         A reading has it by the swing of a lever arm. `linearise` leaves it out: a filter that subtracts its estimate of
         the gyroscopes' bias from the rate is left with the error of that estimate, which is small. A model whose rate
-        is not corrected needs it (`simnav.estimators.models.about_truth`).
+        is not corrected needs it (`simnav.estimators.models.truth_linearised`).
         """
         jacobian = np.zeros((len(self.kind.components), 3))
         reading = self.read(point)
