@@ -81,7 +81,7 @@ class MidValue(
     --------
     2
         A satellite that the others contradict is left out by the window without a schedule
-        (`simnav.estimators.weightings.sibling_vote`). Where no instrument has channels, the numbers are those of
+        (`simnav.estimators.weightings.channel_vote`). Where no instrument has channels, the numbers are those of
         version 1.
     3
         It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).

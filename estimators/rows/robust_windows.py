@@ -193,7 +193,7 @@ class GncFgo(
         A log that is the last witness beside the motion is not rejected for good.
     3
         A satellite that the others contradict is left out without a schedule
-        (`simnav.estimators.weightings.sibling_vote`). Where no instrument has channels, the numbers are those of
+        (`simnav.estimators.weightings.channel_vote`). Where no instrument has channels, the numbers are those of
         version 2.
     4
         It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).

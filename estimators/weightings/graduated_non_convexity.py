@@ -14,7 +14,7 @@ epoch. So if no new measurement is an outlier (u > 1 after the window has been s
 value. Only an outlier starts a new schedule of mu, in which every measurement of the window is weighted again.
 
 A channel that its siblings contradict, such as a satellite, is left out without a schedule
-(`simnav.estimators.weightings.sibling_vote`). At the mu with which a large outlier begins, all measurements have a
+(`simnav.estimators.weightings.channel_vote`). At the mu with which a large outlier begins, all measurements have a
 weight near zero, and the window follows the motion. From there it comes to exclude healthy ones that it would use if it
 began with their full weight, and now and then it does not come back. While one of eight satellites was spoofed, the
 schedules left out healthy ones twice as often as the window does without that satellite.
@@ -33,9 +33,9 @@ from simnav.records import Record
 from simnav.types import Array, Instruments
 
 from .base import Factors
+from .channel_vote import ChannelVote
 from .m_estimators import constants, geman_mcclure, truncated
 from .robust_weighting import RobustWeighting
-from .sibling_vote import SiblingVote
 
 __all__ = ["GraduatedNonConvexity", "softened_geman_mcclure", "softened_truncated"]
 
@@ -124,7 +124,7 @@ class GraduatedNonConvexity(RobustWeighting):
         tuned = constants(truncated if cost == "tls" else geman_mcclure, efficiency)
         self._scale = np.array([1.0, *tuned]) ** -2.0
         self._softened = _Softened(weight=softened_truncated if cost == "tls" else softened_geman_mcclure)
-        self._vote = SiblingVote()
+        self._vote = ChannelVote()
 
     def reset(self, instruments: Instruments) -> None:
         """Begin a run."""

@@ -22,13 +22,13 @@ from simnav.types import Array, Instruments
 
 from .base import Factors
 
-__all__ = ["SiblingVote"]
+__all__ = ["ChannelVote"]
 
 #: Largest number of channels that are left out, each in one iteration.
 MOST = 4
 
 
-class SiblingVote:
+class ChannelVote:
     """The vote of the module. While it lasts, it sets the weights of the new measurements at each iteration."""
 
     def reset(self, instruments: Instruments) -> None:
