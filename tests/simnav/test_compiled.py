@@ -9,12 +9,13 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import get_args, get_origin
 
 import numpy as np
 import pytest
 
-from simnav import cache_folder, compiled
-from simnav.kernel_types import Vector
+from simnav import cache_folder, compiled, warmup
+from simnav.kernel_types import Vector, hints_of
 
 HELPER = """
 from simnav.compiled import helper as inlined
@@ -328,3 +329,15 @@ def test_a_helper_that_borrows_its_arrays_makes_none(monkeypatch: pytest.MonkeyP
     monkeypatch.setattr(compiled, "cache_directory", lambda: None)
     with pytest.raises(NumbaError, match="array passed into the function"):
         compiled.Kernel(_room, typed=True, borrows=True).compile()
+
+
+def test_no_kernel_takes_or_returns_different_values_by_their_places() -> None:
+    """More than three are a named record; a few numbers of one sort, such as four weights, are a small vector."""
+    warmup._import_all()
+    places = {
+        f"{k}: {name}"
+        for k in compiled._kernels
+        for name, hint in hints_of(k.function).items()
+        if get_origin(hint) is tuple and len(get_args(hint)) > 3 and len(set(get_args(hint))) > 1
+    }
+    assert places == set()
