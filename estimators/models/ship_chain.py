@@ -8,6 +8,8 @@ factor (eqs. 12-17).
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -24,12 +26,18 @@ from .ship_kernels import VELOCITY, fill_jacobian, residual_of
 __all__ = ["ShipChain"]
 
 
+class _Measured(NamedTuple):
+    """M measurements: the state of each (-1: none of these states), its instrument, and its value (M, 3)."""
+
+    row: IntegerVector
+    instrument: IntegerVector
+    value: Matrix
+
+
 @kernel
 def _linearise_aids(
     first: int,
-    row: IntegerVector,
-    instrument: IntegerVector,
-    value: Matrix,
+    measured: _Measured,
     codes: IntegerMatrix,
     aids: Matrix,
     position: Matrix,
@@ -43,10 +51,8 @@ def _linearise_aids(
     ----------
     first : int
         Index of the first measurement that is computed.
-    row, instrument : (M,) int arrays
-        Number of the state of each measurement (-1: none of these states); number of its instrument.
-    value : (M, 3) array
-        What was measured.
+    measured : _Measured
+        The measurements.
     codes, aids : (i,), (i, ...) arrays
         Parameters of each instrument for `simnav.estimators.models.ship_kernels.residual_of`.
     position, x : (K, 3), (K, n) arrays
@@ -56,8 +62,9 @@ def _linearise_aids(
     jacobian : (M, 3, n) array
         Overwritten: derivative of the prediction with respect to the state's error.
     """
-    for i in range(first, row.size):
-        k, s = row[i], instrument[i]
+    value = measured.value
+    for i in range(first, measured.row.size):
+        k, s = measured.row[i], measured.instrument[i]
         if k < 0:
             continue
         a, b = residual_of(codes[s], aids[s], position[k], x[k], value[i, 0], value[i, 1])
@@ -96,7 +103,7 @@ class ShipChain(MovingChain):
         """As `Chain.observe`."""
         aids = self.aids
         _linearise_aids(
-            first, row, aids["instrument"], aids["value"], self._codes, self._aids,
+            first, _Measured(row, aids["instrument"], aids["value"]), self._codes, self._aids,
             states[f"{prefix}position"], states[f"{prefix}x"], aids["residual"], jacobian,
         )  # fmt: skip
         if self.front.own:
