@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import json
 import pickle
 import random
@@ -113,10 +114,13 @@ class _Session:
         self._decode = PacketDecoder(streams)
         try:
             load_kinds(homes)
+            observed = self._estimator.observes(copy.deepcopy(instruments))
             self._estimator.reset(start, instruments)
+            told = observed if observed is None or isinstance(observed, str) else list(observed)
+            facts = json.dumps({"observes": told}, default=repr)
         except BaseException as error:
             return self._raised(error)
-        return answer(Up.DONE)
+        return answer(Up.DONE, facts.encode())
 
     def step(self, packet: bytearray) -> bytes:
         try:
