@@ -35,7 +35,6 @@ from simnav.estimators.models.channels import by_channel
 from simnav.estimators.models.inertial import InertialModel
 from simnav.types import (
     Array,
-    Datasheet,
     Estimate,
     InitialState,
     Instruments,
@@ -90,12 +89,9 @@ class GtsamEstimator(Solver):
         """An IMU, and anything to aid it."""
         return (IMU, AID)
 
-    def observes(self, instruments: Instruments) -> Collection[str] | None:
+    def observes(self, instruments: Instruments) -> Collection[str]:
         """Those with a compiled measurement equation."""
-        return {name for name, sheet in instruments.items() if self._observes(sheet)}
-
-    def _observes(self, sheet: Datasheet) -> bool:
-        return bool(sheet.equation) and self.graph.model.observes(sheet)
+        return [name for name, sheet in instruments.items() if sheet.equation]
 
     def __init__(self, threshold: float = 1.0, iterations: int = 5):
         if not threshold >= 0.0:
@@ -110,7 +106,7 @@ class GtsamEstimator(Solver):
         instruments = by_channel(instruments)
         InertialModel().choose(instruments, self.label)
         prior, values = self.graph.begin(start, instruments)
-        observed = [name for name, sheet in instruments.items() if self._observes(sheet)]
+        observed = self.observes(instruments)
         self._admission = Admission(instruments, observed)
         self._restarts = self._epoch = 0
         self._ends: list[tuple[float, int]] = []

@@ -7,6 +7,7 @@ import json
 import pickle
 import random
 import sys
+from collections.abc import Collection
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -116,7 +117,8 @@ class _Session:
             load_kinds(homes)
             observed = self._estimator.observes(copy.deepcopy(instruments))
             self._estimator.reset(start, instruments)
-            told = observed if observed is None or isinstance(observed, str) else list(observed)
+            names = isinstance(observed, Collection) and not isinstance(observed, str)
+            told = list(observed) if names else observed
             facts = json.dumps({"observes": told}, default=repr)
         except BaseException as error:
             return self._raised(error)
