@@ -22,7 +22,7 @@ import inspect
 import re
 import typing
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from typing import Any, ClassVar
@@ -88,6 +88,14 @@ class Solver(Estimator):
         model = own.get("_choice", own.get("model"))
         found: Needs = () if model is None else model.needs
         return found
+
+    def observes(self, instruments: Instruments) -> Collection[str] | None:
+        """The instruments that its model observes; None without a model, and for a model that is unaided by design."""
+        choice = vars(self).get("_choice", vars(self).get("model"))
+        if choice is None:
+            return None
+        model = choice.choose(instruments, self.label)
+        return None if model.unaided else {name for name, sheet in instruments.items() if model.observes(sheet)}
 
 
 @dataclass(frozen=True)
@@ -247,13 +255,21 @@ class Row(Estimator):
         """The instruments that its solver needs; and one that solves raw readings, if it is loosely coupled."""
         return (*self.solver.needs, _SOLUTIONS) if self.loose else self.solver.needs
 
+    def observes(self, instruments: Instruments) -> Collection[str] | None:
+        """The instruments that its solver uses; without raw readings that are solved, if it is loosely coupled."""
+        return self.solver.observes(self._used(instruments))
+
+    def _used(self, instruments: Instruments) -> Instruments:
+        """Those that the solver is given."""
+        if not self.loose:
+            return instruments
+        return instruments.without({name for sheet in instruments.values() for name in sheet.sources})
+
     def reset(self, start: InitialState, instruments: Instruments) -> None:
         """Begin a run; UnsuitableScenario where the pieces lack an instrument."""
-        if self.loose:
-            if lack := lacking((_SOLUTIONS,), instruments):
-                raise UnsuitableScenario(f"{self.name}: {lack}")
-            instruments = instruments.without({name for sheet in instruments.values() for name in sheet.sources})
-        self._instruments = instruments
+        if self.loose and (lack := lacking((_SOLUTIONS,), instruments)):
+            raise UnsuitableScenario(f"{self.name}: {lack}")
+        self._instruments = instruments = self._used(instruments)
         self._late = self._late_arrivals() if any(sheet.timing for sheet in instruments.values()) else None
         self._fix_test = FixTest(instruments) if self.sets_aside else None
         self.solver.reset(start, instruments)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
-from simnav.estimator.needs import lacking
 from simnav.estimator.registry import registered
+from simnav.estimator.suitability import unsuitable
 from simnav.leaderboard.campaign.request import EstimatorRequest, Estimators, requests
 
 if TYPE_CHECKING:
@@ -43,7 +43,7 @@ def baselines(scenarios: Iterable[Scenario]) -> list[str]:
     found: dict[str, None] = {}
     for scenario in scenarios:
         instruments = open_source(scenario, 0).instruments
-        suitable = [name for name in BASELINES if not lacking(registered(name)().needs, instruments)]
+        suitable = [name for name in BASELINES if not unsuitable(registered(name)(), instruments)]
         found |= dict.fromkeys(suitable[:MOST])
     return sorted(found, key=BASELINES.index)
 

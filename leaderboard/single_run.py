@@ -18,14 +18,15 @@ from simnav.leaderboard.campaign.request import EstimatorRequest
 from simnav.leaderboard.figures.lag_figure import lag_figure
 from simnav.leaderboard.figures.run_figure import run_figure
 from simnav.leaderboard.ranking.ranking_table import consistency
-from simnav.leaderboard.ranking.rows import Consistency
 from simnav.leaderboard.results.errors import RequestError, mistakes, printable
 from simnav.leaderboard.results.frame import frame
 from simnav.leaderboard.results.shown import Shown
 from simnav.scoring import SCORES, protection_levels, score, stanford
-from simnav.scoring.consistency import badge
+from simnav.scoring.consistency import JUDGED
+from simnav.scoring.ending import outcome, why_lost
 from simnav.scoring.lagged import seconds_of
 from simnav.scoring.trajectory_errors import TrajectoryErrors, trajectory_errors
+from simnav.scoring.verdict import verdict
 
 from .estimator_output import first_lines
 from .ranking import tables
@@ -58,7 +59,7 @@ class EstimatorRun:
     reference : bool
         Whether the estimator receives the truth (a reference row).
     status, reason : str
-        As in `simnav.trial.trial`.
+        As in `simnav.trial.trial`; a run that is ``lost`` (`simnav.scoring.ending`) is not ``ok``.
     seconds : float
         Wall-clock time of the whole run [s].
     scores : mapping of str to float
@@ -75,6 +76,11 @@ class EstimatorRun:
     seconds: float
     scores: Mapping[str, float]
     trial: Trial
+
+    @property
+    def failed(self) -> bool:
+        """Whether it counts as a failure."""
+        return self.status not in ("ok", "unsuitable")
 
     def __repr__(self) -> str:
         error = self.scores.get("horizontal_rmse", math.nan)
@@ -236,9 +242,7 @@ def run_once(
         with first_lines(request.label):
             trial = run_trial(estimator, recording)
         seconds = time.perf_counter() - started
-        scores = score(trial, recording) if len(trial) else {}
-        runs.append(EstimatorRun(request.label, request.parameters, estimator.reference, trial.status,
-                                 printable(trial.reason), seconds, scores, trial))  # fmt: skip
+        runs.append(_judged(request.label, request.parameters, estimator.reference, seconds, trial, recording))
     report(len(requests), len(requests))
     return RunReport(recording, simulated, tuple(runs), scenario)
 
@@ -254,17 +258,25 @@ def score_of_files(scenario: Scenario, paths: Sequence[Path], seed: int) -> Scor
     for path in paths:
         with mistakes(ValueError, OSError):
             trial = trial_of_file(path, recording)
-        scores = score(trial, recording) if len(trial) else {}
-        runs.append(EstimatorRun(path.name, {}, False, trial.status, printable(trial.reason), math.nan, scores, trial))
+        runs.append(_judged(path.name, {}, False, math.nan, trial, recording))
     errors = {run.estimator: trajectory_errors(run.trial, recording) for run in runs if len(run.trial)}
     known = {name: found for name, found in errors.items() if found is not None}
     return ScoreReport(recording, simulated, tuple(runs), scenario, known)
 
 
+def _judged(
+    label: str, parameters: Mapping[str, Any], reference: bool, seconds: float, trial: Trial, recording: Recording
+) -> EstimatorRun:
+    """What an estimator did, with its scores and how it ended."""
+    scores = score(trial, recording) if len(trial) else {}
+    status = outcome(trial.status, scores)
+    reason = why_lost(scores) if status == "lost" else printable(trial.reason)
+    return EstimatorRun(label, parameters, reference, status, reason, seconds, scores, trial)
+
+
 def _covariance(scores: Mapping[str, float]) -> str:
-    """What the truth of this run says of the covariance: the verdict, and the NEES that it is from."""
-    nees = scores.get("nees_horizontal", math.nan)
-    return consistency(Consistency(badge(np.array([nees])), nees))
+    """What the truth of this run says of the covariance: the worst verdict, and the NEES that it is from."""
+    return consistency(verdict({group: np.array([scores.get(f"nees_{group}", math.nan)]) for group in JUDGED}))
 
 
 def _late_scores(estimators: Sequence[EstimatorRun]) -> list[tuple[float, str]]:

@@ -576,6 +576,14 @@ class Datasheet:
         return KINDS[self.kind].role
 
     @property
+    def gives_position(self) -> bool:
+        """Whether its readings tell the horizontal position: a fix, a range to a known point, a sounding over a chart.
+
+        Satellites are known points, and so are beacons and other vessels.
+        """
+        return self.role in ("fix", "range") or "bottom" in self.details
+
+    @property
     def equation(self) -> str:
         """The compiled measurement equation of this kind; empty where it has none, or one of its own."""
         equation = KINDS[self.kind].equation

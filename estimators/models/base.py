@@ -81,6 +81,8 @@ class ErrorModel(ABC):
     reports_all: bool = False
     #: The IMU samples of the step, for `functions`.
     samples: Samples = NO_SAMPLES
+    #: Whether it observes nothing by design: inertial navigation alone.
+    unaided: ClassVar[bool] = False
     #: Names of the arrays that `correct` changes.
     state: ClassVar[tuple[str, ...]] = ()
     #: Names of further arrays that `propagate` keeps from one call to the next.

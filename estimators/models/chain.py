@@ -237,6 +237,11 @@ class Chain(ABC):
         self.front.choose(instruments, name)
         return self
 
+    @property
+    def unaided(self) -> bool:
+        """Whether its model observes nothing by design."""
+        return self.front.unaided
+
     def observes(self, instrument: Datasheet) -> bool:
         """Whether measurements of an instrument can be factors."""
         return self.front.observes(instrument)

@@ -15,6 +15,8 @@ __all__ = ["UnaidedModel"]
 class UnaidedModel(InertialModel):
     """The inertial model, blind to every aid."""
 
+    unaided = True
+
     def __init__(self) -> None:
         super().__init__()
 

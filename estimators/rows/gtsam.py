@@ -6,7 +6,7 @@ has 15 states: biases, scale factor and misalignment of the aids count as white 
 
 They use the instruments with a compiled measurement equation (`simnav.kinds.EQUATIONS`). Those that a Python function
 observes, with their blocks of states, are left out without a message: raw observations of satellites, beams, ranges to
-beacons, instruments of plug-ins. Without another aid these rows are inertial navigation. In the tests
+beacons, instruments of plug-ins. Where these alone give a position, the scenario is unsuitable. In the tests
 ``tests/cases/gtsam_channels.py`` has GTSAM's smoother over satellites.
 """
 

@@ -11,6 +11,7 @@ update, of zero length between measurements of the same time; let the process no
 from __future__ import annotations
 
 from abc import abstractmethod
+from collections.abc import Collection
 from typing import Any, ClassVar
 
 import numpy as np
@@ -65,14 +66,21 @@ class FilterpyEstimator(Estimator):
     def correct(self, kf: Any, z: Array, sheet: Datasheet) -> None:
         """Call ``kf.update`` with a measurement; positions come as metres north, east(, down)."""
 
+    def observes(self, instruments: Instruments) -> Collection[str] | None:
+        """Those of a kind that ``needs`` or ``uses`` names."""
+        return [s.name for s in instruments.values() if self._uses(s)]
+
+    def _uses(self, sheet: Datasheet) -> bool:
+        needed = (kind for entry in self.needs for kind in ((entry,) if isinstance(entry, str) else entry))
+        return sheet.kind in {*self.uses, *needed} or sheet.equation in self.uses
+
     def reset(self, start: InitialState, instruments: Instruments) -> None:
         """Begin a run."""
         lack = lacking(self.needs, instruments)
         if lack:
             raise UnsuitableScenario(f"{self.name}: {lack}")
         self.origin = np.array(start.position, dtype=np.float64)
-        used = {*self.uses, *(k for n in self.needs for k in ((n,) if isinstance(n, str) else n))}
-        self.sheets = {s.name: s for s in instruments.values() if s.kind in used or s.equation in self.uses}
+        self.sheets = {s.name: s for s in instruments.values() if self._uses(s)}
         for sheet in self.sheets.values():
             if sheet.channels and KINDS[sheet.kind].side:
                 raise UnsuitableScenario(

@@ -53,6 +53,7 @@ class FilterpyUnscentedEstimator(Solver, FilterpyEstimator):
         "filterpy's filter works alone, to be compared with SigmaPointEstimator",
     )
     uses = OBSERVED
+    observes = FilterpyEstimator.observes
 
     @classmethod
     def misfit(cls, keyword: str, made: type) -> str:

@@ -24,7 +24,7 @@ Letters 5(2), 2020; F. Dellaert and others, GTSAM 4.3.
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Any, ClassVar, Literal
 
 import numpy as np
@@ -33,7 +33,15 @@ from simnav.estimator.needs import AID, IMU, Needs
 from simnav.estimators.composition import Solver
 from simnav.estimators.models.channels import by_channel
 from simnav.estimators.models.inertial import InertialModel
-from simnav.types import Array, Estimate, InitialState, Instruments, Measurement, Measurements, NavigationStates
+from simnav.types import (
+    Array,
+    Estimate,
+    InitialState,
+    Instruments,
+    Measurement,
+    Measurements,
+    NavigationStates,
+)
 
 from .admission import LATE, Admission
 from .gtsam_graph import InertialGraph, Observation
@@ -81,6 +89,10 @@ class GtsamEstimator(Solver):
         """An IMU, and anything to aid it."""
         return (IMU, AID)
 
+    def observes(self, instruments: Instruments) -> Collection[str]:
+        """Those with a compiled measurement equation."""
+        return [name for name, sheet in instruments.items() if sheet.equation]
+
     def __init__(self, threshold: float = 1.0, iterations: int = 5):
         if not threshold >= 0.0:
             raise ValueError(f"threshold scales the updates that are linearised again: 0 or more, not {threshold}")
@@ -94,7 +106,7 @@ class GtsamEstimator(Solver):
         instruments = by_channel(instruments)
         InertialModel().choose(instruments, self.label)
         prior, values = self.graph.begin(start, instruments)
-        observed = [name for name, sheet in instruments.items() if sheet.equation and self.graph.model.observes(sheet)]
+        observed = self.observes(instruments)
         self._admission = Admission(instruments, observed)
         self._restarts = self._epoch = 0
         self._ends: list[tuple[float, int]] = []

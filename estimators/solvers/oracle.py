@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import replace
 from typing import ClassVar
 
@@ -83,6 +83,10 @@ class OracleEstimator(KalmanEstimator):
     def needs(self) -> Needs:
         """An instrument beside the IMU."""
         return (AID,)
+
+    def observes(self, instruments: Instruments) -> Collection[str] | None:
+        """All of them: about the true motion there is a model of each."""
+        return instruments.keys()
 
     def reveal(self, recording: Recording) -> None:
         """Receive the labels, and the true figures if datasheets or the initial covariance are wrong."""

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from simnav.estimator import UnsuitableScenario, find, lacking
+from simnav.estimator import UnsuitableScenario, find, unsuitable
 from simnav.estimator.looking_back import LookingBack
 from simnav.leaderboard.results.errors import RequestError, mistakes
 
@@ -37,7 +37,8 @@ def require_suitable(scenario: Scenario, asked: Iterable[EstimatorRequest], *, l
     Raises
     ------
     RequestError
-        If one needs an instrument that is not there, or has a lag that it cannot answer; one sentence.
+        If one needs an instrument that is not there, uses no position where there is one, or has a lag that it cannot
+        answer; one sentence.
     """
     from simnav.source import open_source
 
@@ -48,7 +49,7 @@ def require_suitable(scenario: Scenario, asked: Iterable[EstimatorRequest], *, l
             if file_of(request.name) or request.point or not comes_with_simnav(request.cls or find(request.name)):
                 continue
             estimator = request.make()
-            lack = lacking(estimator.needs, instruments)
+            lack = unsuitable(estimator, instruments)
         if lack and not lags_only:
             raise RequestError(f"{request.label} cannot run on {scenario.id}: {lack}")
         if isinstance(estimator, LookingBack):

@@ -202,7 +202,7 @@ def run_unit(index: int, unit: Unit) -> tuple[int, Counter[str]]:
             except Exception as error:  # of what it answered
                 result = unit.result(entrant, key, "error", f"its result cannot be stored: {named(error)}")
                 _store(unit.folder, result)
-            statuses[result.status] += 1
+            statuses[result.outcome] += 1
     return index, statuses
 
 

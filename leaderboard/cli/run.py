@@ -9,7 +9,7 @@ from simnav.leaderboard.figures.stanford import stanford_diagrams
 from simnav.leaderboard.figures.style import save_as
 from simnav.leaderboard.results.errors import RequestError
 from simnav.leaderboard.running import run
-from simnav.scoring.consistency import ending
+from simnav.scoring.ending import ending
 
 from .commands import RunCommand
 from .console import FAILED, USER, Output
@@ -69,7 +69,7 @@ def show(out: Output, request: RunCommand) -> None:
         out.print(f"error against delay: {delays}")
     if shown is not None:
         out.print(f"Stanford diagrams: {shown}")
-    if any(e.trial.failed for e in report.estimators):
+    if any(e.failed for e in report.estimators):
         out.code = FAILED
     elif all(e.status == "unsuitable" for e in report.estimators):
         out.code = USER

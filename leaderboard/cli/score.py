@@ -26,5 +26,5 @@ def show(out: Output, request: ScoreCommand) -> None:
             out.remark(f"{e.estimator}: {e.status}: {e.reason}")
     if drawn is not None:
         out.print(f"figure: {drawn}")
-    if any(e.trial.failed for e in report.estimators):
+    if any(e.failed for e in report.estimators):
         out.code = FAILED

@@ -185,7 +185,8 @@ class Ranking:
                 for k in ("value", "low", "high")
             }
             | {"wrong_datasheet": getattr(worst[t.track, row.estimator], "ratio", math.nan)}
-            | {f"{part}_{k}": v for part in ("clean", "faulty") for k, v in vars(getattr(row, part)).items()}
+            | {f"{part}_{k}": v for part in ("clean", "faulty") for k, v in vars(getattr(row, part)).items()
+               if k != "groups"}
             | {s: row.ratios.get(s, math.nan) for s in scenarios}
             for t in self.tracks
             for row in t.rows

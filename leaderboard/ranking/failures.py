@@ -18,18 +18,18 @@ __all__ = ["failure_table", "failures"]
 
 def failures(results: Sequence[Result]) -> dict[str, int]:
     """How many results have which status, but for those that are ok or do not suit."""
-    return dict(Counter(r.status for r in _failed(results)))
+    return dict(Counter(r.outcome for r in _failed(results)))
 
 
 def failure_table(results: Sequence[Result]) -> list[Table]:
     """A table with a line for each estimator, scenario and status that failed; none where nothing did."""
     found: dict[tuple[str, str, str], list[Result]] = {}
     for r in _failed(results):
-        found.setdefault((r.estimator, r.scenario, r.status), []).append(r)
-    rows = [[*key, len(failed), failed[0].reason] for key, failed in found.items()]
+        found.setdefault((r.estimator, r.scenario, r.outcome), []).append(r)
+    rows = [[*key, len(failed), failed[0].why] for key, failed in found.items()]
     columns = ["estimator", "scenario", "status", "runs", "reason of the first"]
     return [tables.table("Failures", columns, rows, numeric=["runs"])] if rows else []
 
 
 def _failed(results: Sequence[Result]) -> list[Result]:
-    return [r for r in results if r.status not in ("ok", "unsuitable")]
+    return [r for r in results if r.outcome not in ("ok", "unsuitable")]

@@ -4,9 +4,9 @@
 (`simnav.leaderboard.ranking.scenario_runs`). The score of a row is the geometric mean over its runs; each scenario
 counts the same (`simnav.leaderboard.ranking.statistics`). It never improves when a run gets worse or fails.
 
-**Failures count.** A failed run (error, timeout, out of memory, diverged, invalid output, no position at all) has the
-ratio `FAILURE`; no run has more. An epoch without a position counts with the last position that was given. Nothing is
-dropped.
+**Failures count.** A failed run (error, timeout, out of memory, diverged, lost, invalid output, no position at all) has
+the ratio `FAILURE`; no run has more. An epoch without a position counts with the last position that was given. Nothing
+is dropped.
 
 **Tracks.** There are ranks within a track only. A row is ranked if it has run all scenarios of the track that are on
 the board, with all seeds that the track asks (`simnav.leaderboard.ranking.evidence`); otherwise it is incomplete. One
@@ -36,7 +36,9 @@ from simnav.estimator import EstimatorError
 from simnav.estimator.registry import registered
 from simnav.leaderboard.campaign.request import comes_with_simnav
 from simnav.leaderboard.results.errors import RequestError
-from simnav.scoring import SCORES, badge
+from simnav.scoring import SCORES
+from simnav.scoring.consistency import JUDGED
+from simnav.scoring.verdict import verdict
 from simnav.spec import closest
 
 from .board import (
@@ -94,8 +96,8 @@ PROVISIONAL = 10
 FAR = 10.0
 
 #: All scores that a ranking reads, unless it is asked for another one.
-RANKED_SCORES = frozenset({"horizontal_rmse", "smoothed_horizontal_rmse", "update_median"}) | {
-    f"{name}{part}" for name in ("nees_horizontal", "coverage_95") for part in ("_clean", "_faulty")
+RANKED_SCORES = frozenset({"horizontal_rmse", "smoothed_horizontal_rmse", "update_median", "beyond_sigma"}) | {
+    f"{name}{part}" for name in ("coverage_95", *(f"nees_{g}" for g in JUDGED)) for part in ("_clean", "_faulty")
 }
 
 _ORDER: Mapping[Standing, int] = {
@@ -176,7 +178,7 @@ def _families(track: Track, runs: Mapping[str, Mapping[str, Runs]]) -> list[list
                 with np.errstate(invalid="ignore"):
                     values = np.log(errors).tolist()
                 logs.setdefault(label, {}).update(
-                    {(s, r.seed): x for r, x in zip(found.results, values, strict=True) if r.status == "ok"}
+                    {(s, r.seed): x for r, x in zip(found.results, values, strict=True) if r.outcome == "ok"}
                 )
     return families(logs, _comes_with_simnav)
 
@@ -480,11 +482,13 @@ def _units(rows: Sequence[Row], tables: Sequence[ScenarioRuns], cells: Mapping[s
 
 def _consistency(runs: Sequence[Runs], part: str) -> Consistency:
     """Over all runs that went as far as having a figure."""
-    nees = np.concatenate([r.numbers(f"nees_horizontal{part}") for r in runs])
+    found = verdict({group: np.concatenate([r.numbers(f"nees_{group}{part}") for r in runs]) for group in JUDGED})
     inside = np.concatenate([r.numbers(f"coverage_95{part}") for r in runs])
     return Consistency(
-        badge(nees),
-        float(nees.mean()) if len(nees) else math.nan,
+        found.badge,
+        found.nees,
+        found.group,
+        found.groups,
         float(inside.mean()) if len(inside) else math.nan,
         float(inside.min()) if len(inside) else math.nan,
     )

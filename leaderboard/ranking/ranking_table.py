@@ -15,7 +15,9 @@ from .stored_robustness import worst_of
 from .summary import sentence
 
 if TYPE_CHECKING:
-    from .board import Consistency, Ranking, Row, TrackRanking
+    from simnav.scoring.verdict import Verdict
+
+    from .board import Ranking, Row, TrackRanking
 
 __all__ = [
     "between",
@@ -71,14 +73,16 @@ def between(low: float, high: float, write: Callable[[Any], str] = tables.number
     return f"{write(low)} – {write(high)}" if math.isfinite(low) and math.isfinite(high) else ""
 
 
-def consistency(c: Consistency) -> str:
-    """A verdict, and the NEES that it is from.
+def consistency(c: Verdict) -> str:
+    """A verdict, the NEES that it is from, and of what.
 
-    >>> from simnav.leaderboard.ranking.board import Consistency
-    >>> consistency(Consistency("optimistic", 7.31)), consistency(Consistency())
-    ('optimistic 7.31', '–')
+    >>> from simnav.scoring.verdict import Verdict
+    >>> consistency(Verdict("optimistic", 7.31, "heading", ("horizontal", "vertical", "velocity", "heading")))
+    'optimistic 7.31 (heading)'
+    >>> consistency(Verdict())
+    '–'
     """
-    return tables.MISSING if c.badge == "unknown" else f"{c.badge} {tables.number(c.nees)}"
+    return tables.MISSING if c.badge == "unknown" else f"{c.badge} {tables.number(c.nees)} ({c.words})"
 
 
 def ranking_tables(ranking: Ranking, mine: Collection[str] = ()) -> list[tables.Fitted]:

@@ -6,9 +6,9 @@ import math
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Literal
 
-if TYPE_CHECKING:
-    from simnav.scoring.consistency import Badge
+from simnav.scoring.verdict import Verdict
 
+if TYPE_CHECKING:
     from .statistics import Gain
 
 __all__ = [
@@ -33,22 +33,18 @@ Standing = Literal["ranked", "reference", "unsuitable", "incomplete", "implausib
 
 
 @dataclass(frozen=True)
-class Consistency:
-    """How the covariance that an estimator states agrees with its horizontal errors, over all its runs.
+class Consistency(Verdict):
+    """How the covariance that an estimator states agrees with its errors, over all its runs.
+
+    The verdict is that of the worst of horizontal position, height, velocity and heading.
 
     Attributes
     ----------
-    badge : str
-        Verdict on the NEES: ``optimistic``, ``consistent``, ``pessimistic``, or ``unknown`` without a covariance.
-    nees : float
-        Mean over the runs of the mean NEES by degree of freedom; 1 is ideal.
     coverage, worst_coverage : float
-        Share of the epochs at which the truth lies in the stated 95 % ellipse: mean over the runs, and of the run with
-        the smallest.
+        Share of the epochs at which the truth lies in the stated 95 % ellipse of the horizontal position: mean over the
+        runs, and of the run with the smallest.
     """
 
-    badge: Badge = "unknown"
-    nees: float = math.nan
     coverage: float = math.nan
     worst_coverage: float = math.nan
 

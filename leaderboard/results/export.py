@@ -46,6 +46,8 @@ _UNIT_SUFFIX = {"-": "", "%": "_percent", "rad": "_deg", "m/s": "_m_s"}
 _DEGREES = math.degrees(1.0)
 _FACTS = ("scenario", "seed", "draws", "estimator", "parameters", "learned", "reference", "status", "reason", "note")
 _COSTS = ("seconds", "peak_memory")
+#: Column -> attribute: how a run ended as tables count it, and why.
+_ENDED = {"status": "outcome", "reason": "why"}
 #: Column -> attribute: digests of scenario, estimator and simulator, and limits.
 _ORIGIN = {
     "scenario_digest": "scenario_digest",
@@ -114,7 +116,7 @@ class Document:
 def _run(result: Result) -> dict[str, Any]:
     scores = ((name, float(result.scores.get(name, math.nan))) for name in SCORES)
     return {
-        **{name: as_json(getattr(result, name)) for name in (*_FACTS, *_COSTS)},
+        **{name: as_json(getattr(result, _ENDED.get(name, name))) for name in (*_FACTS, *_COSTS)},
         **{column: getattr(result, name) for column, name in _ORIGIN.items()},
         "provenance": result.provenance.id,
         "scores": {name: value if math.isfinite(value) else None for name, value in scores},
@@ -194,7 +196,7 @@ def table(results: Sequence[Result]) -> pa.Table:
     kinds |= dict.fromkeys(("reference", "dirty"), pa.bool_()) | dict.fromkeys(("seconds", "time_limit_s"), real)
     columns: dict[str, Any] = {}
     for name in (*_FACTS, *_COSTS):
-        values = [getattr(r, name) for r in results]
+        values = [getattr(r, _ENDED.get(name, name)) for r in results]
         if name in ("draws", "parameters", "learned"):  # runs share them
             texts = {id(v): v for v in values}
             known = {key: json.dumps(as_json(dict(v)), sort_keys=True) for key, v in texts.items()}

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from simnav.scoring.consistency import ending
+from simnav.scoring.ending import ending, outcome, why_lost
 
 from .ahead import made_ahead
 from .errors import printable
@@ -166,8 +166,18 @@ class Result:
         return self.key.rpartition("-")[0]
 
     @property
+    def outcome(self) -> str:
+        """The status as it counts: ``lost`` in place of ``ok`` (`simnav.scoring.ending.outcome`)."""
+        return outcome(self.status, self.scores)
+
+    @property
+    def why(self) -> str:
+        """The reason of what it did not end well by; empty if it is ``ok``."""
+        return why_lost(self.scores) if self.outcome == "lost" else self.reason
+
+    @property
     def ending(self) -> str:
-        """The status, or ``inconsistent`` (`simnav.scoring.consistency.ending`)."""
+        """The outcome, or ``inconsistent`` (`simnav.scoring.ending.ending`)."""
         return ending(self.status, self.scores)
 
     @property

@@ -106,7 +106,7 @@ def runs_data(label: str, ranking: Ranking, runs: Mapping[str, Mapping[str, Runs
             "seed": [r.seed for r in results],
             "note": [r.note for r in results] if any(r.note for r in results) else None,
             "status": [r.ending for r in results] if any(r.ending != "ok" for r in results) else None,
-            "reason": [r.reason for r in results] if any(r.reason for r in results) else None,
+            "reason": [r.why for r in results] if any(r.why for r in results) else None,
             "seconds": shorts([r.seconds for r in results], 3),
             "scores": _scores(results),
         }

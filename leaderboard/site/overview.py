@@ -22,6 +22,7 @@ from .rounding import short
 if TYPE_CHECKING:
     from simnav.leaderboard.ranking.board import Ranking, Row, TrackRanking, TrackRow
     from simnav.leaderboard.ranking.runs import Runs
+    from simnav.scoring.verdict import Verdict
 
     from .content import EstimatorEntry, ScenarioEntry
 
@@ -51,7 +52,8 @@ _AFTER = (
     Column(
         "badge",
         "Consistency, faults",
-        "Whether the stated covariance agrees with the errors from the first fault on; optimistic: errors are larger.",
+        "Whether the stated covariance agrees with the errors from the first fault on; optimistic: errors are larger. "
+        "The worst of horizontal, vertical, velocity and heading, as far as the results have them.",
         "badge",
         filter=True,
         hidden=True,
@@ -70,7 +72,8 @@ _AFTER = (
     Column(
         "failed",
         "Failed",
-        "Runs with an exception, an invalid output, a timeout, too much memory or divergence. They count as the worst.",
+        "Runs with an exception, an invalid output, a timeout, too much memory or divergence, and lost ones: an error "
+        "beyond 100 times its stated sigma for more than a tenth of the time. They count as the worst.",
         "text",
     ),
     Column("gain", "× plain row", "Error over that of the plain row on the same runs; below 1 is better.", "ratio"),
@@ -197,9 +200,9 @@ def board_row(
         **_gain(row),
         "far": short(row.far),
         "family": entry.facts.family,
-        "badge": "" if row.faulty.badge == "unknown" else row.faulty.badge,
+        "badge": _verdict(row.faulty),
         "coverage": short(row.faulty.coverage),
-        "clean_badge": "" if row.clean.badge == "unknown" else row.clean.badge,
+        "clean_badge": _verdict(row.clean),
         "clean_coverage": short(row.clean.coverage),
         "failed": {"text": f"{row.failed} of {row.runs}", "value": row.failed} if row.runs else None,
         "p95": short(row.p95),
@@ -231,6 +234,11 @@ def _cost(label: str, cost: CostMultiple | None) -> dict[str, Any]:
         },
         "cost_spread": _ends(cost.low, cost.high),
     }
+
+
+def _verdict(found: Verdict) -> str:
+    """A verdict, and of what it is: ``optimistic (heading)``."""
+    return "" if found.badge == "unknown" else f"{found.badge} ({found.words})"
 
 
 def _gain(row: Row) -> dict[str, Any]:

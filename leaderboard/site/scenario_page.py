@@ -244,7 +244,7 @@ def _failures(ranking: ScenarioRanking, runs: Mapping[str, Runs]) -> list[dict[s
     for row in ranking.rows:
         for status, count in row.statuses.items():
             if status != "ok":
-                reason = next(r.reason for r in runs[row.estimator].tried if r.ending == status)
+                reason = next(r.why for r in runs[row.estimator].tried if r.ending == status)
                 if status == "inconsistent":
                     reason = "it reports for most of the time that its measurements contradict it; its error counts"
                 found.setdefault((status, reason), {})[row.estimator] = count

@@ -30,6 +30,7 @@ from . import shipped
 from .history import append
 from .outdated_results import changes, outdated
 from .readme import draw, replaced, tables
+from .unsuited_results import unsuited
 
 __all__ = ["Published", "begin", "missing", "publish", "run"]
 
@@ -80,6 +81,8 @@ class Published:
 def begin(working: Path, folder: Path) -> None:
     """Let a new folder start with the results that come with simnav, as far as their versions are those of today.
 
+    Results of rows that do not suit their scenario any more are left out, too; their next run says why.
+
     Results in a folder that a campaign began before versions were declared get the address of version 1.
 
     Raises
@@ -92,7 +95,7 @@ def begin(working: Path, folder: Path) -> None:
         _readdress(working, before["current"])
     elif shipped(folder) and store.described(folder).get("benchmark") == BENCHMARK:
         found = store.load(folder, series=False)
-        old = changes(found)
+        old = changes(found).keys() | unsuited(found)
         write_packed(declared(r for r in found if (r.scenario, r.estimator) not in old), working)
         requested.copy(working, [folder])
 

@@ -14,6 +14,7 @@ from simnav.estimator.lookup import Description, describe, find, make
 from simnav.estimator.needs import Needs, NeedsError, checked_needs, lacking
 from simnav.estimator.parameters import Parameter
 from simnav.estimator.registry import GROUP, names, register
+from simnav.estimator.suitability import unsuitable, unused_positions
 
 __all__ = [
     "GROUP",
@@ -31,4 +32,6 @@ __all__ = [
     "make",
     "names",
     "register",
+    "unsuitable",
+    "unused_positions",
 ]

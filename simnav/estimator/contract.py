@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from simnav.estimator.needs import Needs
@@ -66,6 +66,20 @@ class Estimator(ABC):
         that has them all, the run is a failure. By default nothing is needed.
         """
         return ()
+
+    def observes(self, instruments: Instruments) -> Collection[str] | None:
+        """Return the names of the instruments whose readings it uses; None if it does not say.
+
+        If some of the instruments give a position (`simnav.kinds.Datasheet.gives_position`) and none of these is among
+        the names, the scenario is unsuitable. By default, and for dead reckoning, which uses no position by design, it
+        is None.
+
+        Parameters
+        ----------
+        instruments : Instruments
+            Those of the run, as for `reset`. All that `needs` names are there.
+        """
+        return None
 
     @property
     def learned_from(self) -> Sequence[tuple[int, int]]:

@@ -16,7 +16,7 @@ from __future__ import annotations
 import math
 import re
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import Any
 
 import numpy as np
@@ -100,6 +100,10 @@ class LookingBack(Estimator):
     def needs(self) -> Needs:
         """What the estimator needs."""
         return self.inner.needs
+
+    def observes(self, instruments: Instruments) -> Collection[str] | None:
+        """What the estimator uses."""
+        return self.inner.observes(instruments)
 
     @property
     def learned_from(self) -> Sequence[tuple[int, int]]:

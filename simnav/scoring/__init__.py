@@ -6,9 +6,9 @@
 - `stanford`: errors and protection levels, for Stanford diagrams.
 - `register_score`: registers a function as a score, of simnav or of a third party.
 
-Modules: ``registry``; the scores themselves in ``accuracy``, ``outages``, ``consistency``, ``integrity``,
-``detection``, ``noise_estimation``, ``smoothed`` and ``cost``, registered by ``standard``; ``navigation_error``,
-``scores``, ``plot_series``; ``trajectory_errors`` as programs for odometry report them.
+Modules: ``registry``; the scores themselves in ``accuracy``, ``outages``, ``consistency``, ``ending``, ``integrity``,
+``detection``, ``noise_estimation``, ``smoothed`` and ``cost``, registered by ``standard``; ``verdict`` on a covariance;
+``navigation_error``, ``scores``, ``plot_series``; ``trajectory_errors`` as programs for odometry report them.
 """
 
 from __future__ import annotations

@@ -9,18 +9,17 @@ Errors are correlated over the epochs of a run, so epochs are not independent sa
 therefore those of the mean over M runs, chi-square with M d degrees of freedom. They are exact at one epoch, and wider
 than necessary for a mean over time.
 
-The horizontal NEES and the coverage are also computed for two parts of a run: before the first measurement that a fault
-affected, and from then on. An estimator may be consistent without faults and inconsistent with them.
+The NEES of what a verdict looks at (`JUDGED`), and the coverage, are also computed for two parts of a run: before the
+first measurement that a fault affected, and from then on. An estimator may be consistent without faults and
+inconsistent with them.
 
-An estimator can also test itself. If its measurements contradict its estimate, it sets the diagnostic ``inconsistent``
-to 1. A run in which this is so for more than a third of the time, or at the end, has the status ``inconsistent``, not
-``ok``.
+The verdict itself is that of the worst of them (`simnav.scoring.verdict`). How a run ended is in
+`simnav.scoring.ending`.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from typing import Literal
 
 import numpy as np
@@ -32,24 +31,30 @@ from simnav.types import Array
 
 __all__ = [
     "GROUPS",
+    "JUDGED",
     "LARGEST",
     "MARGIN",
     "Badge",
     "badge",
     "coverage",
-    "ending",
     "first_fault",
     "nees",
     "nees_band",
+    "nees_of_groups",
 ]
 
 #: The components of each group that gets a NEES.
 GROUPS: dict[str, tuple[int, ...]] = {
     "horizontal": (0, 1),
+    "vertical": (2,),
     "position": (0, 1, 2),
     "velocity": (3, 4, 5),
     "attitude": (6, 7, 8),
+    "heading": (8,),
 }
+
+#: The groups that a verdict on a covariance looks at.
+JUDGED = ("horizontal", "vertical", "velocity", "heading")
 
 #: Largest mean NEES [-]. It replaces the infinite NEES of a singular covariance, so that scores are finite.
 LARGEST = 1e12
@@ -146,8 +151,8 @@ def coverage(nees_horizontal: Array, level: float) -> float:
     return float(np.mean(x <= -2.0 * math.log1p(-level))) if len(x) else float("nan")
 
 
-def _nees_of(given: ScoringInput) -> dict[str, tuple[Array, NDArray[np.int64]]]:
-    """The result of `nees` for each group; empty without a covariance."""
+def nees_of_groups(given: ScoringInput) -> dict[str, tuple[Array, NDArray[np.int64]]]:
+    """The result of `nees` for each group; empty without a covariance. For `ScoringInput.shared`."""
     covariance = given.trial.covariance
     if covariance is None:
         return {}
@@ -190,7 +195,7 @@ def _register_nees(group: str, title: str, part: str = "") -> None:
         uses_covariance=True,
     )  # fmt: skip
     def mean(given: ScoringInput) -> float:
-        found = given.shared(_nees_of).get(group)
+        found = given.shared(nees_of_groups).get(group)
         if found is None:
             return float("nan")
         values, degrees = found
@@ -204,72 +209,22 @@ def _register_coverage(percent: int, part: str = "") -> None:
         better="nominal", uses_covariance=True,
     )  # fmt: skip
     def share(given: ScoringInput) -> float:
-        found = given.shared(_nees_of).get("horizontal")
+        found = given.shared(nees_of_groups).get("horizontal")
         if found is None:
             return float("nan")
         values, degrees = found
         return coverage(np.where((degrees == 2) & _part(given, part), values, np.nan), percent / 100.0)
 
 
+_TITLES = {"horizontal": "horizontal position", "vertical": "height"}
 for _group in GROUPS:
-    _register_nees(_group, "horizontal position" if _group == "horizontal" else _group)
+    _register_nees(_group, _TITLES.get(_group, _group))
 for _percent in (50, 95):
     _register_coverage(_percent)
 for _of in ("_clean", "_faulty"):
-    _register_nees("horizontal", "horizontal position", _of)
+    for _group in JUDGED:
+        _register_nees(_group, _TITLES.get(_group, _group), _of)
     _register_coverage(95, _of)
-
-
-def _reports(given: ScoringInput) -> NDArray[np.bool_]:
-    """The diagnostic ``inconsistent`` as a mask, at the epochs that have it."""
-    reported = given.trial.diagnostics.get("inconsistent", np.empty(0))
-    return reported[np.isfinite(reported)] > 0.5 if reported.ndim == 1 else np.zeros(0, dtype=bool)
-
-
-@register_score(
-    "inconsistent", title="Share of the epochs at which it reports that it is inconsistent", unit="-", better="lower"
-)
-def _inconsistent(given: ScoringInput) -> float:
-    """NaN for an estimator that does not test itself."""
-    reports = _reports(given)
-    return float(np.mean(reports)) if reports.size else float("nan")
-
-
-@register_score(
-    "inconsistent_end",
-    title="Share of the last tenth of the epochs at which it reports that it is inconsistent",
-    unit="-",
-    better="lower",
-)
-def _inconsistent_end(given: ScoringInput) -> float:
-    """NaN for an estimator that does not test itself."""
-    reports = _reports(given)
-    return float(np.mean(reports[-max(1, reports.size // 10) :])) if reports.size else float("nan")
-
-
-def ending(status: str, scores: Mapping[str, float]) -> str:
-    """The final status of a run: the status of its trial, or ``inconsistent``.
-
-    A run with the status ``ok`` becomes ``inconsistent`` if the estimator reported the diagnostic ``inconsistent`` for
-    more than a third of the run, or for most of its last tenth, for example after a late fault. This is not a failure:
-    a ranking uses the error of the run as it is, so that an estimator does not lose by the report.
-
-    Parameters
-    ----------
-    status : str
-        Status of the trial.
-    scores : mapping of str to float
-        Scores of the run, by name.
-
-    Examples
-    --------
-    >>> ending("ok", {"inconsistent": 0.4}), ending("timeout", {}), ending("ok", {"inconsistent": 0.1})
-    ('inconsistent', 'timeout', 'ok')
-    >>> ending("ok", {"inconsistent": 0.1, "inconsistent_end": 0.9})
-    'inconsistent'
-    """
-    reported = scores.get("inconsistent", 0.0) > 1.0 / 3.0 or scores.get("inconsistent_end", 0.0) > 0.5
-    return "inconsistent" if status == "ok" and reported else status
 
 
 def badge(nees_by_run: Array, degrees: int = 2) -> Badge:

@@ -6,6 +6,7 @@ from __future__ import annotations
 from simnav.scoring import accuracy
 from simnav.scoring import outages
 from simnav.scoring import consistency
+from simnav.scoring import ending
 from simnav.scoring import integrity
 from simnav.scoring import detection
 from simnav.scoring import noise_estimation
@@ -22,6 +23,7 @@ __all__ = [
     "consistency",
     "cost",
     "detection",
+    "ending",
     "integrity",
     "lagged",
     "noise_estimation",

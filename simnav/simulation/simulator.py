@@ -20,9 +20,10 @@ from simnav.sensors.faults import build_layers, labels
 from simnav.sensors.timing import Clock
 from simnav.spec import SpecError
 from simnav.timing import TIME_TOLERANCE
-from simnav.types import KINDS, Array, InitialState, NavigationStates
+from simnav.types import KINDS, Array, InitialState, NavigationStates, TapStates
 from simnav.world import Steered, Surroundings, Trajectory, WorldBlock
 from simnav.world.initial_state import draw_start
+from simnav.world.start import HIGHEST_LATITUDE, POLAR
 
 __all__ = ["Simulator", "ideal", "sample_times", "simulate", "simulate_many"]
 #: Rate of the truth where no IMU sets it [Hz].
@@ -173,11 +174,17 @@ class Simulator:
         -------
         Block
             Measurements, labels and truth of the interval.
+
+        Raises
+        ------
+        SpecError
+            If the vessel comes within a degree of a pole.
         """
         start, until = self.time, min(until, self.duration)
         taps = self._taps(start, until)
         block = self._shared(taps) if self._trajectory is None else self._trajectory.advance(until, taps)
         self.time = until
+        self._refuse_a_pole(block.taps[_STEPS])
         imu, imu_labels = None, None
         if self.imu is not None:
             # The ideal samples are not needed again, unless other runs share them.
@@ -200,6 +207,11 @@ class Simulator:
         for name, clock in self.clocks.items():
             aids[name] = clock.stamp(aids[name], block.taps[name].time)
         return Block(start, until, imu, imu_labels, {name: aids[name] for name in self.aids}, block.taps[_STEPS])
+
+    def _refuse_a_pole(self, truth: TapStates) -> None:
+        polar = np.flatnonzero(np.abs(truth.position[:, 0]) >= HIGHEST_LATITUDE)
+        if polar.size:
+            raise SpecError(f"{self.scenario.id}: the latitude of the vessel at {truth.time[polar[0]]:g} s {POLAR}")
 
     def _taps(self, start: float, until: float) -> dict[str, Array]:
         taps = {n: sample_times(s.rate, s.phase, start, until) for n, s in self.scenario.aids.items()}

@@ -151,6 +151,7 @@ class _FileSession:
     """A session whose answers come from a file."""
 
     needs = ()
+    observed = None
 
     def __init__(self, name: str, read: _Read, recording: Recording):
         self.name, self._read, self._start = name, read, recording.start

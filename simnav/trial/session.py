@@ -11,7 +11,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Protocol
 
-from simnav.estimator import Estimator, NeedsError, UnsuitableScenario, lacking
+from simnav.estimator import Estimator, NeedsError, UnsuitableScenario, lacking, unused_positions
 from simnav.estimator.looking_back import inner_of
 from simnav.recording import Recording
 from simnav.trial.log import DivergedError, TrialLog
@@ -56,9 +56,12 @@ class Session(Protocol):
     ----------
     name : str
         Registered name of the estimator, or the name of its class.
+    observed : object
+        The value of `Estimator.observes` for the instruments of the run, from `begin` on.
     """
 
     name: str
+    observed: Any
 
     @property
     def needs(self) -> Any:
@@ -66,7 +69,7 @@ class Session(Protocol):
         ...
 
     def begin(self, recording: Recording, packets: PacketEncoder) -> None:
-        """Start the run: call `Estimator.reset`."""
+        """Start the run: call `Estimator.observes` and `Estimator.reset`."""
         ...
 
     def run(self, packets: PacketEncoder, log: TrialLog) -> None:
@@ -140,6 +143,8 @@ def run_session(session: Session, recording: Recording, log: TrialLog) -> Trial:
         started = time.perf_counter()
         session.begin(recording, packets)
         reset_seconds = time.perf_counter() - started
+        if unused := unused_positions(session.observed, recording.instruments):
+            return log.trial(session.name, "unsuitable", unused)
         where = ""
         try:
             session.run(packets, log)
@@ -190,6 +195,7 @@ class _LocalSession:
     def __init__(self, estimator: Estimator):
         self.estimator = estimator
         self.name = estimator.name or type(estimator).__name__
+        self.observed: Any = None
         self._encode = EstimateEncoder()
         self._decode = PacketDecoder(())
 
@@ -201,6 +207,7 @@ class _LocalSession:
         self._decode = PacketDecoder(packets.streams)
         if self.estimator.reference:
             self.estimator.reveal(recording)
+        self.observed = self.estimator.observes(copy.deepcopy(recording.instruments))
         self.estimator.reset(copy.deepcopy(recording.start), copy.deepcopy(recording.instruments))
 
     def run(self, packets: PacketEncoder, log: TrialLog) -> None:

@@ -29,6 +29,7 @@ from numpy.typing import NDArray
 from simnav.geometry.earth import principal_radii
 from simnav.spec import SpecError
 from simnav.types import Array
+from simnav.world.start import HIGHEST_LATITUDE, POLAR
 from simnav.world.trajectory import SampledTrajectory, Voyage
 
 __all__ = ["GivenTrack", "Limits", "Poses", "metres_per_unit", "smooth_track"]
@@ -39,8 +40,8 @@ _EXACT = 5e-4
 _FOLLOWING, _CREEP = 15.0, 0.2
 #: Number of courses between two poses from which the heading is made.
 _COURSES = 16
-#: Highest pitch of a given attitude [rad], and highest latitude [rad].
-_PITCH, _LATITUDE = np.radians(85.0), np.radians(89.0)
+#: Highest pitch of a given attitude [rad].
+_PITCH = np.radians(85.0)
 
 
 @dataclass(frozen=True)
@@ -101,7 +102,7 @@ class Poses:
                 f"{self.line[k - 1]}; poses are in order of time, without duplicates"
             )
         self._refuse(np.any(~np.isfinite(self.position), axis=1), "the position is not finite")
-        self._refuse(np.abs(self.position[:, 0]) > _LATITUDE, "the latitude should be within 89 degrees")
+        self._refuse(np.abs(self.position[:, 0]) >= HIGHEST_LATITUDE, f"the latitude {POLAR}")
         if self.attitude is not None:
             self._refuse(np.any(~np.isfinite(self.attitude), axis=1), "the attitude is not finite")
             self._refuse(np.abs(self.attitude[:, 1]) > _PITCH, "the pitch should be within 85 degrees")

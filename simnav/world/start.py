@@ -2,13 +2,28 @@
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Self
 
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
 from simnav.spec import NonNegative, Spec, quantity
 
-__all__ = ["Start"]
+__all__ = ["HIGHEST_LATITUDE", "POLAR", "Start"]
+
+#: Latitudes from here on, north or south, are refused [rad].
+HIGHEST_LATITUDE = math.radians(89.0)
+#: What a message says of them.
+POLAR = (
+    "should be less than 89 degrees north or south: nearer to a pole the axes north and east, in which states and "
+    "errors are, turn too fast"
+)
+
+
+def _not_polar(latitude: float) -> float:
+    if not abs(latitude) < HIGHEST_LATITUDE - 1e-12:
+        raise ValueError(POLAR)
+    return latitude
 
 
 class Start(Spec):
@@ -17,7 +32,7 @@ class Start(Spec):
     Attributes
     ----------
     latitude, longitude : float
-        Geodetic latitude and longitude [rad].
+        Geodetic latitude and longitude [rad]; the latitude is below `HIGHEST_LATITUDE`, north or south.
     height : float
         Height of the vessel's reference point above the ellipsoid [m]; the sea surface is at 0.
     depth : float
@@ -28,7 +43,7 @@ class Start(Spec):
         Speed through the water [m/s].
     """
 
-    latitude: Annotated[float, Field(gt=-1.5533, lt=1.5533)] = quantity("deg")
+    latitude: Annotated[float, AfterValidator(_not_polar)] = quantity("deg")
     longitude: Annotated[float, Field(ge=-3.1416, le=3.1416)] = quantity("deg")
     height: float = quantity("m", 0.0)
     depth: float | None = quantity("m", None)

@@ -4,7 +4,7 @@ On the voyages of the family `FAMILY` the IMU has up to 20 times the noise of it
 steps, and no measurement of another instrument is wrong. So a plain filter or window is right to use them all. Promised
 is, for every row: at most 2 % of the voyages above `WORSE` times the error of the plain row, and none above `RUINED`
 times; and, in 99 % of the voyages beyond `LOST` times the plain row, that the row admits it: by its self-test, so that
-the run ends as *inconsistent* (`simnav.scoring.consistency.ending`), or by its covariance. A covariance admits an error
+the run ends as *inconsistent* (`simnav.scoring.ending`), or by its covariance. A covariance admits an error
 if the normalised error squared of the horizontal position is at most `ADMITTED` by degree of freedom, in the mean over
 the run. A row that cannot promise the first two says on its page when not to use it (`explained`). The figure
 has the geometric mean of the ratios, too, and the voyage of the largest. Where the plain row is itself lost (its
@@ -32,7 +32,7 @@ from simnav.estimators.solvers.solution_separation import SolutionSeparation
 from simnav.estimators.solvers.window import WindowEstimator
 from simnav.scenario import load
 from simnav.scoring import score
-from simnav.scoring.consistency import ending
+from simnav.scoring.ending import ending
 from simnav.source import record
 from simnav.spec import SpecError
 from simnav.trial import run_trial

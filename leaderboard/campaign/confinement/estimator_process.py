@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import copy
 import json
 import pickle
 import random
 import sys
+from collections.abc import Collection
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -113,10 +115,14 @@ class _Session:
         self._decode = PacketDecoder(streams)
         try:
             load_kinds(homes)
+            observed = self._estimator.observes(copy.deepcopy(instruments))
             self._estimator.reset(start, instruments)
+            names = isinstance(observed, Collection) and not isinstance(observed, str)
+            told = list(observed) if names else observed
+            facts = json.dumps({"observes": told}, default=repr)
         except BaseException as error:
             return self._raised(error)
-        return answer(Up.DONE)
+        return answer(Up.DONE, facts.encode())
 
     def step(self, packet: bytearray) -> bytes:
         try:

@@ -366,6 +366,8 @@ class RemoteSession:
     ----------
     needs : object
         As it declared them before it knew the instruments.
+    observed : object
+        The instruments that it says it uses.
     libraries : list of str
         What it imported, and the server may import, too.
     peak_memory : int
@@ -375,6 +377,7 @@ class RemoteSession:
     def __init__(self, write: int, read: int, limits: Limits):
         self.name = ""
         self.needs: Any = ()
+        self.observed: Any = None
         self.limits = limits
         self.libraries: list[str] = []
         self.peak_memory = 0
@@ -416,7 +419,8 @@ class RemoteSession:
     def begin(self, recording: Recording, packets: PacketEncoder) -> None:
         """Hand over start and datasheets."""
         homes = homes_of_kinds(recording.instruments)
-        self._ask(Down.RESET, (recording.start, recording.instruments, packets.streams, homes))
+        facts = _facts(self._ask(Down.RESET, (recording.start, recording.instruments, packets.streams, homes)))
+        self.observed = facts.get("observes")
 
     def run(self, packets: PacketEncoder, log: TrialLog) -> None:
         """Hand over all packets; each is sent when the whole answer to the last one is here.

@@ -15,7 +15,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from simnav.estimator import describe
-from simnav.leaderboard.ranking import reference
+from simnav.leaderboard.ranking import failures, reference
 from simnav.leaderboard.ranking.board import Ranking, Reference
 from simnav.leaderboard.ranking.ranking import rank
 from simnav.leaderboard.ranking.ranking_table import track_table
@@ -127,10 +127,10 @@ def test_the_order_of_the_results_does_not_matter():
 
 def test_failures_count_and_are_never_dropped():
     scores = [row(ranked(campaign(SIMPLE)), "good").score]
-    for failures in (1, 3, 6, 20):
-        r = row(ranked(changed(campaign(SIMPLE), "good", range(failures), status="error", rmse=1e-9)), "good")
-        assert (r.runs, r.failed) == (40, 2 * failures)
-        assert r.failed_low < failures / 20 <= r.failed_high
+    for count in (1, 3, 6, 20):
+        r = row(ranked(changed(campaign(SIMPLE), "good", range(count), status="error", rmse=1e-9)), "good")
+        assert (r.runs, r.failed) == (40, 2 * count)
+        assert r.failed_low < count / 20 <= r.failed_high
         scores.append(r.score)
     assert scores == sorted(scores)
     assert scores[-1] == pytest.approx(FAILURE)
@@ -399,6 +399,31 @@ def test_consistency_is_judged_without_and_with_faults():
     assert r.clean.coverage == pytest.approx((11 * 0.9 + 0.038) / 12)
     assert (r.update_median, r.peak_memory) == (2e-3, 77)
     assert row(ranked(results), "poor").clean.badge == "unknown"
+    assert (r.faulty.words, r.clean.words) == ("horizontal only", "horizontal only")  # as in results of old
+
+
+def test_the_worst_of_what_a_row_states_is_shown():
+    nees = {f"nees_{group}_clean": 1.0 for group in ("vertical", "velocity", "heading")}
+    results = changed(campaign(SIMPLE, seeds=12), "fair", range(12), scores=nees | {"nees_heading_clean": 400.0})
+    ranking = ranked(results)
+    clean = row(ranking, "fair").clean
+    assert (clean.badge, clean.nees, clean.group) == ("optimistic", 400.0, "heading")
+    cells = [cell for line in track_table(ranking.track("sea")).rows for cell in line]
+    assert "optimistic 400 (heading)" in cells
+    assert "consistent 1.00 (horizontal only)" in cells
+
+
+def test_a_lost_run_counts_as_a_failure():
+    results = campaign(SIMPLE, seeds=12)
+    lost = changed(results, "good", [0, 1], scores={"beyond_sigma": 0.11})
+    failed = changed(results, "good", [0, 1], status="diverged")
+    kept = changed(results, "good", [0, 1], scores={"beyond_sigma": 0.1})
+    assert row(ranked(lost), "good", "one-v1").statuses == {"lost": 2, "ok": 10}
+    assert [row(ranked(r), "good").failed for r in (lost, failed, kept)] == [4, 4, 0]
+    assert row(ranked(lost), "good").score == row(ranked(failed), "good").score > 1.5
+    assert failures.failures(lost) == {"lost": 4}
+    (reason, *_) = failures.failure_table(lost)[0].columns[4].cells
+    assert str(reason) == "an error is beyond 100 times its stated sigma at 11 % of the epochs"
 
 
 def test_post_processing_ranks_those_who_smooth():

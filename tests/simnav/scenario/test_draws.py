@@ -244,7 +244,7 @@ def test_a_scenario_without_draws_has_none():
         ("uniform = [5, 20]", "uniform = [-5, 20]", "(5.0 s) before it starts (10.0 s) (for some draws: "),
         ("uniform = [10, 20]", "uniform = [10, 60]", "it starts at 60 s, but duration_s = 40 (for some draws: "),
         ("normal = [5, 1]", "normal = [5, 2]", "sigma_m is not negative (for some draws: "),
-        ("uniform = [-60, 60]", "uniform = [-60, 95]", "should be less than 89 (for some draws: "),
+        ("uniform = [-60, 60]", "uniform = [-60, 95]", "turn too fast (for some draws: "),
     ],
 )  # fmt: skip
 def test_a_bad_distribution_gets_a_sentence(old: str, new: str, sentence: str):

@@ -175,3 +175,31 @@ def test_ideal_run_is_the_run_without_its_errors(name):
         imu, begin, truth = perfect.data.imu, perfect.initial_truth, perfect.data.truth
         states = integrate(begin.position[0], begin.velocity[0], begin.attitude[0], imu)
         np.testing.assert_allclose(states.velocity[-1], truth.velocity[-1], atol=1e-6)
+
+
+def northward(latitude_deg: float) -> Scenario:
+    """A ship that goes towards the nearer pole with 10 m/s."""
+    table = load("ship-straight").to_toml()
+    table["start"] |= {
+        "latitude_deg": latitude_deg,
+        "speed_m_s": 10.0,
+        "heading_deg": 0.0 if latitude_deg > 0 else 180.0,
+    }
+    return Scenario.from_toml(table).model_copy(update={"duration": 30.0})
+
+
+@pytest.mark.parametrize("latitude_deg", [88.9995, -88.9995])
+def test_a_voyage_that_comes_within_a_degree_of_a_pole_is_refused(latitude_deg: float):
+    assert len(simulate(northward(0.9999 * latitude_deg), 0).data.truth)
+    said = (
+        r"ship-straight-v\d+: the latitude of the vessel at 6 s should be less than 89 degrees .* axes north and east"
+    )
+    with pytest.raises(SpecError, match=said):
+        simulate(northward(latitude_deg), 0)
+
+
+@pytest.mark.parametrize("latitude_deg", [89.0, -89.0, 90.0])
+def test_a_start_within_a_degree_of_a_pole_is_refused_with_the_reason(latitude_deg: float):
+    said = rf"start.latitude_deg = {latitude_deg}: should be less than 89 degrees .* axes north and east"
+    with pytest.raises(SpecError, match=said):
+        northward(latitude_deg)

@@ -267,6 +267,16 @@ def test_needs_that_are_not_met_are_no_failure(recording: Recording) -> None:
     assert (trial.status, trial.reason, trial.failed, len(trial)) == ("unsuitable", reason, False, 0)
 
 
+def test_who_uses_no_position_where_there_is_one_is_not_run(recording: Recording) -> None:
+    class Reckons(Good):
+        def observes(self, instruments: Instruments) -> set[str]:
+            return instruments.keys() - {"gnss"}
+
+    trial = run_trial(Reckons(), recording)
+    reason = "it uses no instrument that gives a position; here that is gnss (gnss_position)"
+    assert (trial.status, trial.reason, trial.failed, len(trial)) == ("unsuitable", reason, False, 0)
+
+
 def test_to_refuse_a_scenario_that_has_what_is_needed_is_a_failure(recording: Recording) -> None:
     class Refuses(Good):
         needs = ("imu",)
