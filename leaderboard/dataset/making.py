@@ -105,7 +105,7 @@ def make(
     family : Scenario
         A training family.
     sizes : mapping of str to int
-        Number of voyages of each split.
+        Number of voyages of each split that is to be written. Of a split that has more, the larger number counts.
     folder : Path
         New, empty, or with a data set that is continued.
     seal : Seal
@@ -126,7 +126,7 @@ def make(
     jobs = [
         (split, part, numbers)
         for split in sizes
-        for part, numbers in enumerate(part_numbers(sizes[split]))
+        for part, numbers in enumerate(part_numbers(manifest.sizes[split]))
         if voyages_in(folder, split, part) < len(numbers)
     ]
     total, written, processor = sum(len(numbers) for *_, numbers in jobs), 0, 0.0

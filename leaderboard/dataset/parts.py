@@ -132,7 +132,8 @@ def read_recordings(folder: Path, family: str, split: str, numbers: Iterable[int
     RequestError
         If a voyage is not there, or a file is damaged.
     """
-    part, files = -1, dict[str, ParquetFile]()
+    part = -1
+    files: dict[str, ParquetFile] = {}
     names = list(schemas(split != TEST))
     try:
         for number in numbers:

@@ -2,7 +2,7 @@
 
 `NavigationEnv` (``navigation.py``) is an adapter over the same sources of data that every campaign uses.
 `NavigationVectorEnv` (``vector.py``) runs several of them together, and `EstimatorAgent` (``agent.py``) makes an agent
-of an estimator. ``wrappers.py`` holds relative actions and observations of order one, ``windows.py`` cuts recordings,
+of an estimator. ``wrappers.py`` holds relative actions and observations of order one, ``windowing.py`` cuts recordings,
 ``seeds.py`` the seeds of training, and ``rendering.py`` draws the chart of a run. Tasks around a running filter are in
 `simnav.estimators.learning`.
 """
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from simnav.environment.agent import EstimatorAgent, unpack
     from simnav.environment.navigation import REWARDS, NavigationEnv, Observation, checked_action
     from simnav.environment.vector import NavigationVectorEnv, spawn_seeds
-    from simnav.environment.windows import windows
+    from simnav.environment.windowing import windows
     from simnav.environment.wrappers import NormaliseObservation, RelativeAction
 
 __all__ = [
@@ -36,7 +36,7 @@ _HOMES = {
     "agent": ("EstimatorAgent", "unpack"),
     "navigation": ("REWARDS", "NavigationEnv", "Observation", "checked_action"),
     "vector": ("NavigationVectorEnv", "spawn_seeds"),
-    "windows": ("windows",),
+    "windowing": ("windows",),
     "wrappers": ("NormaliseObservation", "RelativeAction"),
 }
 
