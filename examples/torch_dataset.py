@@ -59,7 +59,7 @@ def tensors(window):
         if isinstance(value, dict):
             found[name] = tensors(value)
         else:
-            tensor = torch.from_numpy(value[0].astype("int64") if value.dtype.kind in "iu" else value[0])
+            tensor = torch.from_numpy(value.astype("int64") if value.dtype.kind in "iu" else value)[0]
             exact = name in ("interval", "time", "truth") or not tensor.is_floating_point()
             found[name] = tensor if exact else tensor.float()
     return found
