@@ -18,6 +18,7 @@ from simnav.leaderboard.results.errors import RequestError
 from .arguments import results_of, scenario_of, scenarios_of
 from .claiming import claim
 from .costing import bench, costs
+from .datasets import dataset, read_voyages, voyages
 from .inspection import allan, bound, cite, merge, rank, realism, reproduce, rescore, seal, verify
 from .logs import align, export, inspect_log, recordings, score_files, tune_noise
 from .requests import ScenarioLike, Scenarios
@@ -38,12 +39,14 @@ __all__ = [
     "cite",
     "claim",
     "costs",
+    "dataset",
     "evaluate",
     "export",
     "inspect_log",
     "make",
     "merge",
     "rank",
+    "read_voyages",
     "realism",
     "record",
     "recordings",
@@ -60,4 +63,5 @@ __all__ = [
     "tune",
     "tune_noise",
     "verify",
+    "voyages",
 ]

@@ -18,11 +18,12 @@ _require_links(_Path(__file__).parent)
 
 if TYPE_CHECKING:
     from simnav.blocks import StateBlock
-    from simnav.environment import EstimatorAgent, NavigationEnv, NavigationVectorEnv
+    from simnav.environment import EstimatorAgent, NavigationEnv, NavigationVectorEnv, windows
     from simnav.estimator import Estimator, UnsuitableScenario, names, register
     from simnav.kinds import Component, Kind
     from simnav.leaderboard.claiming import claim
     from simnav.leaderboard.costing import bench, costs
+    from simnav.leaderboard.datasets import dataset, read_voyages, voyages
     from simnav.leaderboard.inspection import (
         allan,
         bound,
@@ -107,6 +108,7 @@ __all__ = [
     "cite",
     "claim",
     "costs",
+    "dataset",
     "draw_standard",
     "evaluate",
     "export",
@@ -119,6 +121,7 @@ __all__ = [
     "open_source",
     "publish_standard",
     "rank",
+    "read_voyages",
     "realism",
     "record",
     "recordings",
@@ -143,13 +146,15 @@ __all__ = [
     "tune_noise",
     "verify",
     "verify_bundle",
+    "voyages",
+    "windows",
 ]
 
 # Modules, loaded when one of their names is first used. Those of the third floor are named by a string, because
 # the library must not import a floor above it.
 _HOMES = {
     "blocks": ("StateBlock",),
-    "environment": ("EstimatorAgent", "NavigationEnv", "NavigationVectorEnv"),
+    "environment": ("EstimatorAgent", "NavigationEnv", "NavigationVectorEnv", "windows"),
     "estimator": ("Estimator", "UnsuitableScenario", "names", "register"),
     "kinds": ("Component", "Kind"),
     "plugins": ("load_plugin",),
@@ -175,6 +180,7 @@ _HOMES = {
     ),
     "leaderboard.claiming": ("claim",),
     "leaderboard.costing": ("bench", "costs"),
+    "leaderboard.datasets": ("dataset", "read_voyages", "voyages"),
     "leaderboard.inspection": (
         "allan",
         "bound",

@@ -37,7 +37,7 @@ from simnav.types import (
     TriadDatasheet,
 )
 
-__all__ = ["AidStream", "Block", "ImuLabels", "Recording", "RecordingError", "packets"]
+__all__ = ["AidStream", "Block", "ImuLabels", "Recording", "RecordingError", "from_arrays", "packets", "to_arrays"]
 
 #: Version of the files that `Recording.save` writes. It is increased when their format changes.
 FORMAT = 1
@@ -337,7 +337,8 @@ class Recording:
         temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
         try:
             with open(temporary, "wb") as file:
-                np.savez(file, allow_pickle=False, **_to_arrays(self))
+                facts, arrays = to_arrays(self)
+                np.savez(file, allow_pickle=False, meta=np.array(json.dumps(facts)), **arrays)
                 file.flush()
                 os.fsync(file.fileno())
             os.replace(temporary, path)
@@ -366,7 +367,7 @@ class Recording:
                         f"{path}: written in format {meta.get('format')!r} of recordings, but this version of simnav "
                         f"reads format {FORMAT}; record it again"
                     )
-                return _from_arrays(meta, {name: file[name] for name in file.files})
+                return from_arrays(meta, {name: file[name] for name in file.files})
         except RecordingError:
             raise
         except (ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile) as error:
@@ -444,10 +445,18 @@ def _plain(value: Any) -> Any:
     return value.tolist() if isinstance(value, np.ndarray) else value
 
 
-def _to_arrays(recording: Recording) -> dict[str, Any]:
-    """All arrays under names like ``truth.position``; everything else as JSON in ``meta``."""
+def to_arrays(recording: Recording) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
+    """The parts of a recording for a file: plain facts, which JSON takes, and arrays.
+
+    Returns
+    -------
+    facts : dict
+        Scenario, seed, datasheets, faults and draws. Infinity is a float.
+    arrays : dict of str to array
+        The arrays under names like ``truth.position`` and ``aid.dvl.value``. `from_arrays` takes both.
+    """
     data, instruments = recording.data, recording.instruments
-    meta = {
+    facts = {
         "format": FORMAT,
         "scenario": recording.scenario,
         "seed": int(recording.seed),
@@ -461,14 +470,14 @@ def _to_arrays(recording: Recording) -> dict[str, Any]:
         "start_time": recording.start.time,
     }
     if recording.draws:
-        meta["draws"] = dict(recording.draws)
+        facts["draws"] = dict(recording.draws)
     if recording.actual is not None:
-        meta["actual"] = _sheets(recording.actual)
+        facts["actual"] = _sheets(recording.actual)
     if recording.actual_covariance is not None:
-        meta["actual_covariance"] = recording.actual_covariance.tolist()
+        facts["actual_covariance"] = recording.actual_covariance.tolist()
     if recording.origins:
-        meta["origins"] = {name: dict(origin) for name, origin in recording.origins.items()}
-    arrays: dict[str, Any] = {"meta": np.array(json.dumps(meta))}
+        facts["origins"] = {name: dict(origin) for name, origin in recording.origins.items()}
+    arrays: dict[str, NDArray[Any]] = {}
 
     def add(prefix: str, holder: object, names: Sequence[str]) -> None:
         arrays.update({f"{prefix}.{n}": getattr(holder, n) for n in names})
@@ -483,7 +492,7 @@ def _to_arrays(recording: Recording) -> dict[str, Any]:
     for name, stream in data.aids.items():
         add(f"aid.{name}", stream, _CHANNEL_ARRAYS if stream.channels else _AID_ARRAYS)
         add(f"aid.{name}", stream, stream.optional)
-    return arrays
+    return facts, arrays
 
 
 def _instruments(sheets: Mapping[str, Any], step: float) -> Instruments:
@@ -513,13 +522,21 @@ def _process(given: Mapping[str, Any]) -> DeclaredProcess:
     return DeclaredProcess(**{**given, "block": StateBlock(**given["block"]), "exact": exact, "factors": factors})
 
 
-def _from_arrays(meta: dict[str, Any], arrays: dict[str, Any]) -> Recording:
+def from_arrays(facts: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> Recording:
+    """The recording whose parts `to_arrays` gave.
+
+    Raises
+    ------
+    KeyError, TypeError, ValueError
+        If a part is missing or is not as it should be.
+    """
+
     def get(prefix: str, names: Sequence[str]) -> list[Any]:
         return [arrays[f"{prefix}.{n}"] for n in names]
 
     told = (k for k, names in _STATES_OF.items() if f"truth.{names[-1]}" in arrays and k is not NavigationStates)
     kind = next(told, NavigationStates)
-    channels = {aid["name"]: tuple(aid.get("channels", ())) for aid in meta["aids"]}
+    channels = {aid["name"]: tuple(aid.get("channels", ())) for aid in facts["aids"]}
 
     def stream(name: str, kind: str) -> AidStream:
         names: tuple[str, ...] = _CHANNEL_ARRAYS if channels.get(name) else _AID_ARRAYS
@@ -528,19 +545,19 @@ def _from_arrays(meta: dict[str, Any], arrays: dict[str, Any]) -> Recording:
         return AidStream(name, kind, **arrays_of, channels=channels.get(name, ()))
 
     data = Block(
-        meta["begin"],
-        meta["end"],
+        facts["begin"],
+        facts["end"],
         ImuSamples(*get("imu", _IMU_ARRAYS)) if "imu.time" in arrays else None,
         ImuLabels(*get("imu_labels", ("faults", "fault_error"))) if "imu_labels.faults" in arrays else None,
-        {name: stream(name, kind) for name, kind in meta["streams"].items()},
+        {name: stream(name, kind) for name, kind in facts["streams"].items()},
         kind(*get("truth", _STATES_OF[kind])),
     )
     return Recording(
-        meta["scenario"],
-        meta["seed"],
-        _instruments(meta, meta["step"]),
+        facts["scenario"],
+        facts["seed"],
+        _instruments(facts, facts["step"]),
         NavigationStates(*get("initial_truth", _STATE_ARRAYS)),
-        InitialState(meta["start_time"], *get("start", ("position", "velocity", "attitude", "covariance"))),
+        InitialState(facts["start_time"], *get("start", ("position", "velocity", "attitude", "covariance"))),
         tuple(
             FaultLabel(
                 f["kind"],
@@ -550,12 +567,12 @@ def _from_arrays(meta: dict[str, Any], arrays: dict[str, Any]) -> Recording:
                 f.get("parameters", {}),
                 tuple(f.get("channels", ())),
             )
-            for f in meta["faults"]
+            for f in facts["faults"]
         ),
         data,
-        meta["note"],
-        meta.get("draws", {}),
-        _instruments(meta["actual"], meta["step"]) if "actual" in meta else None,
-        np.array(meta["actual_covariance"]) if "actual_covariance" in meta else None,
-        meta.get("origins", {}),
+        facts["note"],
+        facts.get("draws", {}),
+        _instruments(facts["actual"], facts["step"]) if "actual" in facts else None,
+        np.array(facts["actual_covariance"]) if "actual_covariance" in facts else None,
+        facts.get("origins", {}),
     )

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from simnav.leaderboard.calls import option, request
 from simnav.leaderboard.claim_requests import ClaimRequest
+from simnav.leaderboard.dataset_requests import DatasetRequest
 from simnav.leaderboard.error_requests import AllanRequest, RealismRequest
 from simnav.leaderboard.log_requests import (
     AlignRequest,
@@ -307,6 +308,7 @@ COMMANDS: Mapping[str, tuple[type[Any], str]] = {
     "show": (ShowCommand, "show"),
     "run": (RunCommand, "run"),
     "simulate": (SimulateCommand, "simulate"),
+    "dataset": (DatasetRequest, "dataset"),
     "score": (ScoreCommand, "score"),
     "export": (ExportRequest, "export"),
     "inspect": (InspectCommand, "inspect"),
@@ -342,8 +344,8 @@ HEADINGS: Mapping[str, Sequence[str]] = {
     "Every day": ("list", "show", "run", "evaluate", "check", "new-estimator", "simulate", "sweep", "campaign",
                   "leaderboard"),
     "Logs and programs of others": ("inspect", "align", "tune-noise", "recordings", "export", "score"),
-    "Study and publish": ("tune", "train", "bench", "robustness", "bound", "allan", "realism", "reproduce", "claim",
-                          "rescore", "merge", "submit", "verify", "seal", "cite"),
+    "Study and publish": ("tune", "train", "dataset", "bench", "robustness", "bound", "allan", "realism", "reproduce",
+                          "claim", "rescore", "merge", "submit", "verify", "seal", "cite"),
     "Maintain": ("standard", "reference", "warmup"),
 }  # fmt: skip
 

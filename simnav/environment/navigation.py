@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -30,9 +30,9 @@ from numpy.typing import NDArray
 from simnav.arrivals import Arrivals
 from simnav.environment.charted import ChartedEnv
 from simnav.environment.observed_steps import ClosedLoopSteps, ObservedSteps, horizontal, pack, rows_of
-from simnav.environment.sample_counts import most_samples
+from simnav.environment.sample_counts import places_of
 from simnav.geometry.rotation import dcm_from_rpy, rotation_vector_from_dcm
-from simnav.types import KINDS, Array, InitialState
+from simnav.types import Array, InitialState
 
 if TYPE_CHECKING:
     from simnav.environment.rendering import Chart
@@ -145,12 +145,8 @@ class NavigationEnv(ChartedEnv[Observation, Array]):
         self.reveal_truth = reveal_truth
         self.closed_loop = closed_loop
         self._weights = _weights(reward)
-        most = [most_samples(s) for s in possible]
-        self._most = {name: max(m.get(name, 0) for m in most) for m in most for name in m}
-        self._widths = {
-            name: len(KINDS[sheet.kind].values) for s in possible for name, sheet in s.instruments_sheet().items()
-        }
-        self._sides = _sides(scenario.id, possible)
+        places = places_of(possible)
+        self._most, self._widths, self._sides = places.most, places.widths, places.sides
         self.observation_space = _observation_space(self._most, self._widths, self._sides)
         self.action_space = spaces.Box(-_ACTION_LIMIT, _ACTION_LIMIT, dtype=np.float64)
         self._source: Any = None
@@ -382,28 +378,6 @@ def _open(scenario: Scenario, seed: int) -> tuple[Any, str]:
 
 
 # ------------------------------------------------------------------------------------------------- spaces
-
-
-def _sides(scenario: str, possible: Sequence[Scenario]) -> dict[str, int]:
-    """The number of components of the side information of each instrument with channels.
-
-    Raises
-    ------
-    ValueError
-        If the channels of an instrument are not the same in all runs.
-    """
-    found: dict[str, tuple[str, ...]] = {}
-    sides = {}
-    for s in possible:
-        for name, sheet in s.instruments_sheet().items():
-            if found.setdefault(name, sheet.channels) != sheet.channels:
-                raise ValueError(
-                    f"scenario {scenario}: the channels of {name!r} differ from run to run; an environment has a fixed "
-                    "slot for each"
-                )
-            if sheet.channels:
-                sides[name] = len(KINDS[sheet.kind].side)
-    return sides
 
 
 def _observation_space(most: Mapping[str, int], widths: Mapping[str, int], sides: Mapping[str, int]) -> spaces.Dict:

@@ -3,12 +3,59 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
+
+from simnav.types import KINDS
 
 if TYPE_CHECKING:
     from simnav.scenario import Scenario
 
-__all__ = ["most_samples"]
+__all__ = ["Places", "most_samples", "places_of"]
+
+
+@dataclass(frozen=True)
+class Places:
+    """The places for the samples of a step, of any run of a scenario.
+
+    Attributes
+    ----------
+    most : dict of str to int
+        For ``imu`` and each aiding instrument the largest number of samples.
+    widths : dict of str to int
+        For each aiding instrument the number of components of a reading.
+    sides : dict of str to int
+        For each instrument with channels the number of components of the side information.
+    """
+
+    most: dict[str, int]
+    widths: dict[str, int]
+    sides: dict[str, int]
+
+
+def places_of(possible: Sequence[Scenario]) -> Places:
+    """The places for all runs of a scenario, from what it may become (`simnav.scenario.Scenario.extremes`).
+
+    Raises
+    ------
+    ValueError
+        If the channels of an instrument are not the same in all runs.
+    """
+    counts = [most_samples(s) for s in possible]
+    channels: dict[str, tuple[str, ...]] = {}
+    widths: dict[str, int] = {}
+    sides: dict[str, int] = {}
+    for s in possible:
+        for name, sheet in s.instruments_sheet().items():
+            widths[name] = len(KINDS[sheet.kind].values)
+            if channels.setdefault(name, sheet.channels) != sheet.channels:
+                raise ValueError(
+                    f"scenario {s.id}: the channels of {name!r} differ from run to run, and each needs a fixed slot"
+                )
+            if sheet.channels:
+                sides[name] = len(KINDS[sheet.kind].side)
+    return Places({name: max(m.get(name, 0) for m in counts) for m in counts for name in m}, widths, sides)
 
 
 def most_samples(scenario: Scenario) -> dict[str, int]:

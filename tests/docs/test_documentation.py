@@ -229,3 +229,15 @@ def test_calls_from_python(tmp_path, monkeypatch, capsys):
     exec(blocks("reference/python.md", "python")[0], {})
     assert (tmp_path / "run.png").stat().st_size > 10_000
     assert capsys.readouterr().out.strip().endswith("of 2")
+
+
+def test_the_data_set_of_the_guide(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    names = dict[str, Any]()
+    for block in blocks("how-to/make-a-data-set.md", "python"):
+        exec(block, names)
+    said = capsys.readouterr().out
+    assert said.startswith("gnss ")
+    assert said.count("<Recording: training-ships-v1, seed 2199023255") == 3
+    assert said.count("(32, 500, 3) (32, 11, 3, 3)") == 3
+    assert len(names["Learned"].learned_from) == 2

@@ -149,7 +149,7 @@ CALLS: dict[str, tuple[list[str], Callable[[], Any]]] = {
 #: Commands whose calls are compared where their own tests are: they take minutes, or need what another one makes.
 ELSEWHERE = {"claim", "merge", "reference", "reproduce", "rescore", "robustness", "seal", "submit", "tune", "verify"}
 ELSEWHERE |= {"inspect", "realism", "align", "tune-noise", "recordings", "export", "score"}
-ELSEWHERE |= {"show", "train anfis"}
+ELSEWHERE |= {"show", "train anfis", "dataset"}
 ELSEWHERE |= {"standard run", "standard check", "standard audit", "standard draw", "standard publish"}
 
 
