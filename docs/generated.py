@@ -36,10 +36,10 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
 
 def calls() -> str:
     """All calls of ``import simnav`` with their options, which come from their requests."""
-    from simnav.leaderboard import costing, inspection, publishing, running
+    from simnav.leaderboard import costing, inspection, publishing, recommending, running
 
     parts = []
-    for module in (running, inspection, costing, publishing):
+    for module in (running, recommending, inspection, costing, publishing):
         for name in (n for n in module.__all__ if inspect.isfunction(getattr(module, n))):
             call = getattr(module, name)
             doc, taken = inspect.getdoc(call) or "", inspect.signature(call).parameters

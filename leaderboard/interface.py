@@ -20,6 +20,7 @@ from .claiming import claim
 from .costing import bench, costs
 from .inspection import allan, bound, cite, merge, rank, realism, reproduce, rescore, seal, verify
 from .logs import align, export, inspect_log, recordings, score_files, tune_noise
+from .recommending import recommend
 from .requests import ScenarioLike, Scenarios
 from .running import campaign, check, evaluate, make, record, robustness, run, sweep, tune
 
@@ -45,6 +46,7 @@ __all__ = [
     "merge",
     "rank",
     "realism",
+    "recommend",
     "record",
     "recordings",
     "reproduce",

@@ -47,6 +47,7 @@ if TYPE_CHECKING:
         submit,
         verify_bundle,
     )
+    from simnav.leaderboard.recommending import recommend
     from simnav.leaderboard.results.errors import RequestError
     from simnav.leaderboard.running import campaign, check, evaluate, make, record, robustness, run, sweep, tune
     from simnav.plugins import load_plugin
@@ -120,6 +121,7 @@ __all__ = [
     "publish_standard",
     "rank",
     "realism",
+    "recommend",
     "record",
     "recordings",
     "register",
@@ -188,6 +190,7 @@ _HOMES = {
         "verify",
     ),
     "leaderboard.logs": ("align", "export", "inspect_log", "recordings", "score_files", "tune_noise"),
+    "leaderboard.recommending": ("recommend",),
     "leaderboard.results.errors": ("RequestError",),
     "leaderboard.running": ("campaign", "check", "evaluate", "make", "record", "robustness", "run", "sweep", "tune"),
     "leaderboard.publishing": (

@@ -23,7 +23,7 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
-__all__ = ["FILE", "Trouble", "trouble_of", "troubles"]
+__all__ = ["FILE", "Trouble", "trouble_of", "troubles", "within"]
 
 FILE = Path(__file__).with_name("troubles.toml")
 
@@ -68,3 +68,12 @@ def trouble_of(scenario: str) -> str:
     name, _, version = scenario.rpartition("-v")
     name = name if name and version.isdigit() else scenario
     return next((t.name for t in troubles().values() if name in t.scenarios), "")
+
+
+def within(title: str) -> str:
+    """A title as it stands within a sentence.
+
+    >>> within("The IMU wrong")
+    'the IMU wrong'
+    """
+    return title[:1].lower() + title[1:]
