@@ -100,8 +100,8 @@ class Recommendation(Shown):
     confidence : str
         ``beyond these scenarios``: better than the plain row, and so it is likely in other scenarios of the kind;
         ``in these scenarios``: told from the plain row there; ``undecided``: no row is; ``none``: no evidence.
-    why_none : str
-        Why there is no evidence; empty where there is some.
+    why : str
+        Why there is no evidence, or why the rows cannot be ordered; empty otherwise.
     row, plain : Candidate or None
         The row that should be taken, and the plain row; None without evidence.
     as_good : tuple of Candidate
@@ -121,7 +121,7 @@ class Recommendation(Shown):
     without_evidence: tuple[str, ...]
     limit: float | None
     confidence: Confidence
-    why_none: str
+    why: str
     row: Candidate | None
     plain: Candidate | None
     as_good: tuple[Candidate, ...]
@@ -187,8 +187,6 @@ def recommendation(
     over = groups[0] if len(groups) == 1 else _together(chosen)
     if not over.plain or " or " in over.plain or (found := over.row(over.plain)) is None:
         return none("the scenarios with these troubles have no plain row in common")
-    if over.insufficient:
-        return none(over.insufficient)
     epoch = 1000.0 * found.update_median
     score = next(iter(chosen.values())).track.score
     candidates = {r.estimator: _candidate(r, over.plain, score, epoch) for r in over.ranked}
@@ -197,7 +195,7 @@ def recommendation(
     if not allowed:
         return none(f"no row with a stored cost takes {limit:g} ms or less")
     best = [c for c in allowed.values() if not allowed.keys() & set(c.result.worse_than)]
-    better = [c for c in best if over.plain in c.result.better_than]
+    better = [c for c in best if over.plain in c.result.better_than and not over.insufficient]
     decided = bool(better) or over.plain not in allowed
     row = min(better or best, key=lambda c: c.result.to_reference) if decided else plain
     confidence: Confidence = "undecided" if not better else "in these scenarios"
@@ -206,8 +204,9 @@ def recommendation(
     rest = [c for c in better or best if c is not row]
     rest.sort(key=lambda c: c.cost if better and math.isfinite(c.cost) else c.result.to_reference)
     return Recommendation(
-        tuple(instruments), tuple(chosen), without, limit, confidence, "", row, plain, tuple(rest), len(candidates),
-        groups, _elsewhere(fitting, chosen, row.estimator, [t for t in troubles() if not asked or t in chosen]),
+        tuple(instruments), tuple(chosen), without, limit, confidence, over.insufficient, row, plain, tuple(rest),
+        len(candidates), groups,
+        _elsewhere(fitting, chosen, row.estimator, [t for t in troubles() if not asked or t in chosen]),
         _worse(fitting, chosen, row.estimator),
     )  # fmt: skip
 

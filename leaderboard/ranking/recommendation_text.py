@@ -18,14 +18,14 @@ __all__ = ["sentences"]
 
 _NAMED = 3  # troubles that are named; of more, how many there are
 _TIMES = 2.0  # from this ratio on it is written as a multiple
-_WORDS = {2: "two", 3: "three", 4: "four", 5: "five"}
+_WORDS = {4: "four", 5: "five", 6: "six", 7: "seven", 8: "eight", 9: "nine"}
 
 
 def sentences(answer: Recommendation) -> list[str]:
     """The answer: which row and why, what it costs, how sure that is, where else it was run, and what is not known."""
     gaps = [_gap(answer)] if answer.without_evidence else []
     if answer.row is None or answer.plain is None:
-        return [f"No evidence: {answer.why_none}.", *(gaps if answer.groups else [])]
+        return [f"No evidence: {answer.why}.", *(gaps if answer.groups else [])]
     said = [_choice(answer, answer.row, answer.plain), *_cost(answer.row, answer.plain), *_sure(answer, answer.row)]
     for other in answer.elsewhere:
         if math.isfinite(other.result.to_plain) and answer.row is not answer.plain:
@@ -71,7 +71,8 @@ def _sure(answer: Recommendation, row: Candidate) -> list[str]:
     runs = f"{spread(g.units for g in answer.groups)} {answer.groups[0].unit}s"
     said = [f"The evidence is {scenarios} scenario{'s' * (scenarios != 1)} with {runs} each."]
     if answer.confidence == "undecided":
-        said.append(f"None of {answer.compared} rows is told from the plain row and better.")
+        why = f"they cannot be ordered, for {answer.why}" if answer.why else "that is what a test of all at once says"
+        said.append(f"None of {answer.compared} rows is told from the plain row and better: {why}.")
     else:
         said.append(f"A test of {answer.compared} rows at once tells it from the plain row.")
     low, high = row.result.scenarios_low, row.result.scenarios_high
@@ -84,10 +85,10 @@ def _sure(answer: Recommendation, row: Candidate) -> list[str]:
             cheap = answer.as_good[0]
             dearer = math.isnan(cheap.cost) or cheap.cost >= row.cost
             more = "" if dearer else f"; the cheapest is `{cheap.estimator}`, at {tables.number(cheap.cost, 2)} times"
-            said.append(f"{len(answer.as_good)} other row{'s' * (len(answer.as_good) != 1)} may be as good{more}.")
-        said.append(
-            f"{tables.percent(row.result.bad)} of its runs were lost, or had {BAD:g} times the plain row's error."
-        )
+            others = f"{len(answer.as_good)} row{'s' * (len(answer.as_good) != 1)}"
+            said.append(f"It shares the place with {others} that may be as good{more}.")
+        share = f"{tables.percent(row.result.bad)} were" if row.result.bad else "none was"
+        said.append(f"Of its {row.result.runs} runs {share} lost, or beyond {BAD:g} times the plain row's error.")
     if math.isfinite(row.result.coverage):
         said.append(f"Its 95 % region held the truth in {tables.percent(row.result.coverage)} of the epochs.")
     return said
@@ -104,5 +105,5 @@ def _titles(names: Iterable[str]) -> list[str]:
 def _listed(names: tuple[str, ...]) -> str:
     titles = _titles(names)
     if len(titles) > _NAMED:
-        return f"{_WORDS.get(len(titles), str(len(titles)))} kinds of trouble"
+        return f"{_WORDS[len(titles)]} kinds of trouble"
     return " and ".join(filter(None, [", ".join(titles[:-1]), titles[-1]]))
