@@ -250,14 +250,14 @@ def profile_table(profile: TrackProfile, most: int = 12) -> tables.Fitted:
     most : int
         Rows that are shown: those that may be the best of most groups first.
     """
-    names: dict[str, list[float]] = {}
-    best: dict[str, int] = {}
-    for group in profile.groups:
-        for r in group.ranked:
-            names.setdefault(r.estimator, []).append(r.to_plain)
-            best[r.estimator] = best.get(r.estimator, 0) + (group.separates and r.may_be_best)
-    whole = [n for n, found in names.items() if len(found) == len(profile.groups)]
-    order = sorted(whole, key=lambda n: (-best[n], float(np.nanmean(np.log(names[n]))) if names[n] else 0.0, n))
+    names = [r.estimator for r in profile.groups[0].ranked]
+    rows = {n: [found for g in profile.groups if (found := g.row(n)) is not None and found.ranked] for n in names}
+    best = {n: sum(r.may_be_best for g, r in zip(profile.groups, found, strict=False) if g.separates)
+            for n, found in rows.items()}  # fmt: skip
+    order = sorted(
+        (n for n, found in rows.items() if len(found) == len(profile.groups)),
+        key=lambda n: (-best[n], _mean(r.to_plain for r in rows[n]), n),
+    )
     cells = [[n, *(_cell(g, n) for g in profile.groups)] for n in order[:most]]
     columns = ["estimator", *(g.title for g in profile.groups)]
     left = f" {len(order) - most} rows more are in the document of --json." if len(order) > most else ""
@@ -266,6 +266,12 @@ def profile_table(profile: TrackProfile, most: int = 12) -> tables.Fitted:
         always=len(columns), numeric=columns[1:],
         caption=f"+: may be the best of a group that separates rows. {profile.silence}{left}".rstrip(),
     )  # fmt: skip
+
+
+def _mean(ratios: Iterable[float]) -> float:
+    """The geometric mean of those that are known; infinite without any."""
+    logs = [math.log(r) for r in ratios if r > 0.0]
+    return math.fsum(logs) / len(logs) if logs else math.inf
 
 
 def _cell(group: TroubleGroup, estimator: str) -> str:
