@@ -36,10 +36,10 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
 
 def calls() -> str:
     """All calls of ``import simnav`` with their options, which come from their requests."""
-    from simnav.leaderboard import costing, datasets, inspection, publishing, running
+    from simnav.leaderboard import costing, datasets, inspection, publishing, recommending, running
 
     parts = []
-    for module in (running, datasets, inspection, costing, publishing):
+    for module in (running, recommending, datasets, inspection, costing, publishing):
         for name in (n for n in module.__all__ if inspect.isfunction(getattr(module, n))):
             call = getattr(module, name)
             doc, taken = inspect.getdoc(call) or "", inspect.signature(call).parameters

@@ -95,7 +95,11 @@ def scenarios_of(
 
 
 def results_of(
-    folder: str | os.PathLike[str], *, series: bool = False, scores: Collection[str] | None = None
+    folder: str | os.PathLike[str],
+    *,
+    series: bool = False,
+    scores: Collection[str] | None = None,
+    scenarios: Collection[str] | None = None,
 ) -> list[Result]:
     """The current results of a folder, all of one version of the benchmark.
 
@@ -107,13 +111,15 @@ def results_of(
         Whether to include the series that charts need; they stay on disk until they are read.
     scores : collection of str, optional
         Only these scores. Default: all.
+    scenarios : collection of str, optional
+        Only results of these versioned ids, without series. Default: all.
     """
     from simnav.leaderboard.results.provenance import benchmark_of
     from simnav.leaderboard.results.store import load
 
     path = absolute(folder)
     with mistakes(StoreError):
-        results = load(path, series=series, scores=scores)
+        results = load(path, series=series, scores=scores, scenarios=scenarios)
     if not results:
         raise RequestError(f"there are no results in {path}; 'simnav campaign' makes some")
     benchmark_of(r.provenance for r in results)

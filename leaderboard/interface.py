@@ -21,6 +21,7 @@ from .costing import bench, costs
 from .datasets import dataset, read_voyages, voyages
 from .inspection import allan, bound, cite, merge, rank, realism, reproduce, rescore, seal, verify
 from .logs import align, export, inspect_log, recordings, score_files, tune_noise
+from .recommending import recommend
 from .requests import ScenarioLike, Scenarios
 from .running import campaign, check, evaluate, make, record, robustness, run, sweep, tune
 
@@ -48,6 +49,7 @@ __all__ = [
     "rank",
     "read_voyages",
     "realism",
+    "recommend",
     "record",
     "recordings",
     "reproduce",

@@ -69,6 +69,7 @@ def site(request: SiteRequest) -> SiteReport:
     from simnav.leaderboard.papers.page import pages_in
     from simnav.leaderboard.ranking.agreement import rank_correlations
     from simnav.leaderboard.ranking.ranking import rank as ranked
+    from simnav.leaderboard.ranking.trouble_profile import profiles
     from simnav.leaderboard.results.web_addresses import linked_from
     from simnav.leaderboard.site.report import SiteReport
     from simnav.leaderboard.site.site import build
@@ -79,7 +80,8 @@ def site(request: SiteRequest) -> SiteReport:
 
     shown, processes = whole_number("runs_shown", request.runs_shown, 1), whole_number("workers", request.workers, 1)
     found, seeds = attached(results_of(request.results, series=True))
-    ranking = ranked(found, tracks=scenario_files.tracks(request.results), requested=requested.read(request.results))
+    own = scenario_files.tracks(request.results)
+    ranking = ranked(found, tracks=own, requested=requested.read(request.results))
     correlations = () if request.against is None else tuple(rank_correlations(ranking, rank(request.against)))
     output = absolute(request.output)
     index = build(
@@ -87,7 +89,7 @@ def site(request: SiteRequest) -> SiteReport:
         papers=pages_in(Path(request.papers)), runs_shown=shown, figures=request.figures, seeds=seeds,
         sweeps=[*swept.sweeps_in(Path(request.sweeps)), *stored_sweeps(found)],
     )  # fmt: skip
-    return SiteReport(index, found, ranking, correlations)
+    return SiteReport(index, found, ranking, correlations, profiles(found, tracks=own))
 
 
 @dataclass(frozen=True)

@@ -48,6 +48,7 @@ if TYPE_CHECKING:
         submit,
         verify_bundle,
     )
+    from simnav.leaderboard.recommending import recommend
     from simnav.leaderboard.results.errors import RequestError
     from simnav.leaderboard.running import campaign, check, evaluate, make, record, robustness, run, sweep, tune
     from simnav.plugins import load_plugin
@@ -123,6 +124,7 @@ __all__ = [
     "rank",
     "read_voyages",
     "realism",
+    "recommend",
     "record",
     "recordings",
     "register",
@@ -194,6 +196,7 @@ _HOMES = {
         "verify",
     ),
     "leaderboard.logs": ("align", "export", "inspect_log", "recordings", "score_files", "tune_noise"),
+    "leaderboard.recommending": ("recommend",),
     "leaderboard.results.errors": ("RequestError",),
     "leaderboard.running": ("campaign", "check", "evaluate", "make", "record", "robustness", "run", "sweep", "tune"),
     "leaderboard.publishing": (

@@ -30,6 +30,7 @@ from simnav.leaderboard.publishing_requests import (
     StandardRequest,
     SubmitRequest,
 )
+from simnav.leaderboard.recommend_requests import RecommendRequest
 from simnav.leaderboard.requests import (
     BenchRequest,
     BoundRequest,
@@ -306,6 +307,7 @@ class TrainAnfisCommand:
 COMMANDS: Mapping[str, tuple[type[Any], str]] = {
     "list": (ListCommand, "list_"),
     "show": (ShowCommand, "show"),
+    "recommend": (RecommendRequest, "recommend"),
     "run": (RunCommand, "run"),
     "simulate": (SimulateCommand, "simulate"),
     "dataset": (DatasetRequest, "dataset"),
@@ -341,8 +343,8 @@ COMMANDS: Mapping[str, tuple[type[Any], str]] = {
 
 #: Heading of the help -> the commands below it.
 HEADINGS: Mapping[str, Sequence[str]] = {
-    "Every day": ("list", "show", "run", "evaluate", "check", "new-estimator", "simulate", "sweep", "campaign",
-                  "leaderboard"),
+    "Every day": ("list", "show", "recommend", "run", "evaluate", "check", "new-estimator", "simulate", "sweep",
+                  "campaign", "leaderboard"),
     "Logs and programs of others": ("inspect", "align", "tune-noise", "recordings", "export", "score"),
     "Study and publish": ("tune", "train", "dataset", "bench", "robustness", "bound", "allan", "realism", "reproduce",
                           "claim", "rescore", "merge", "submit", "verify", "seal", "cite"),

@@ -9,7 +9,6 @@ from simnav.leaderboard.publishing_requests import SiteRequest
 from simnav.leaderboard.ranking.agreement import LEAST, correlation_table
 from simnav.leaderboard.ranking.confinement import confinement_line
 from simnav.leaderboard.ranking.failures import failure_table
-from simnav.leaderboard.ranking.ranking_table import ranking_tables
 from simnav.leaderboard.ranking.voyages import voyage_tables
 
 from .console import Output
@@ -22,7 +21,7 @@ def show(out: Output, request: SiteRequest) -> None:
     with out.progress("site") as progress:
         made = site.of(replace(request, progress=progress))
     out.document(made.to_dict())
-    out.print(*ranking_tables(made.ranking), *failure_table(made.results))
+    out.print(*made.shown(), *failure_table(made.results))
     out.print(*filter(None, [confinement_line(made.results)]))
     out.print(*voyage_tables(made.voyages))
     if made.correlations:

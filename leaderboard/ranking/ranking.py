@@ -32,9 +32,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from simnav.estimator import EstimatorError
-from simnav.estimator.registry import registered
-from simnav.leaderboard.campaign.request import comes_with_simnav
 from simnav.leaderboard.results.errors import RequestError
 from simnav.scoring import SCORES
 from simnav.scoring.consistency import JUDGED
@@ -64,7 +61,7 @@ from .remarks import (
     seed_remarks,
     superseded_remarks,
 )
-from .runs import Runs, group
+from .runs import Runs
 from .scenario_runs import Cell, ScenarioRuns
 from .statistics import (
     Gain,
@@ -80,13 +77,12 @@ from .statistics import (
     weighted_quantile,
 )
 from .superseded import only_version, superseded_by
-from .tracks import Track, catalogued, tracks_of
-from .variants import families, surplus
+from .track_runs import TrackRuns, runs_of_tracks
 
 if TYPE_CHECKING:
     from simnav.leaderboard.results.result import Result
 
-__all__ = ["FAR", "PROVISIONAL", "RANKED_SCORES", "rank", "require_lower", "require_score"]
+__all__ = ["FAR", "PROVISIONAL", "RANKED_SCORES", "rank", "rank_track", "require_lower", "require_score"]
 
 Array = NDArray[np.float64]
 
@@ -96,9 +92,9 @@ PROVISIONAL = 10
 FAR = 10.0
 
 #: All scores that a ranking reads, unless it is asked for another one.
-RANKED_SCORES = frozenset({"horizontal_rmse", "smoothed_horizontal_rmse", "update_median", "beyond_sigma"}) | {
-    f"{name}{part}" for name in ("coverage_95", *(f"nees_{g}" for g in JUDGED)) for part in ("_clean", "_faulty")
-}
+RANKED_SCORES = frozenset(
+    {"horizontal_rmse", "smoothed_horizontal_rmse", "update_median", "coverage_95", "beyond_sigma"}
+) | {f"{name}{part}" for name in ("coverage_95", *(f"nees_{g}" for g in JUDGED)) for part in ("_clean", "_faulty")}
 
 _ORDER: Mapping[Standing, int] = {
     "ranked": 0, "variant": 1, "identical": 2, "implausible": 3, "incomplete": 4, "unsuitable": 5, "reference": 6,
@@ -149,45 +145,13 @@ def rank(
     ValueError
         If an estimator has two results for one run.
     """
-    runs = group(results)
-    known = dict(tracks or {})
-    headers = catalogued()  # what a scenario is, it says, and not what results say
-    known = {**{name: h.track for name, h in headers.items()}, **known}
     boards: list[TrackRanking] = []
     scenarios: dict[str, ScenarioRanking] = {}
-    for track in tracks_of(runs, known, score):
-        apart = surplus(_families(track, runs))
-        recorded = {s: headers[s].recorded for s in track.scenarios if s in headers}
-        every = (ScenarioRuns(s, runs[s], track, recorded.get(s), apart) for s in track.scenarios)
-        tables = [t for t in every if t.cells]
-        if not tables:
-            continue
-        boards.append(_track(track, tables, apart, requested or {}))
-        if track.name != "post-processing":
-            scenarios |= {t.name: _scenario(t, apart) for t in tables}
+    for found in runs_of_tracks(results, score, tracks):
+        boards.append(rank_track(found, requested))
+        if found.track.name != "post-processing":
+            scenarios |= {t.name: _scenario(t, found.apart) for t in found.tables}
     return Ranking(tuple(boards), tuple(scenarios[name] for name in sorted(scenarios)))
-
-
-def _families(track: Track, runs: Mapping[str, Mapping[str, Runs]]) -> list[list[str]]:
-    """Variants of one row on a track, by name and by what they estimate."""
-    logs: dict[str, dict[object, float]] = {}
-    for s in track.scenarios:
-        for label, found in runs[s].items():
-            if not found.reference:
-                errors = np.maximum(found.column(track.score), 1e-9)
-                with np.errstate(invalid="ignore"):
-                    values = np.log(errors).tolist()
-                logs.setdefault(label, {}).update(
-                    {(s, r.seed): x for r, x in zip(found.results, values, strict=True) if r.outcome == "ok"}
-                )
-    return families(logs, _comes_with_simnav)
-
-
-def _comes_with_simnav(name: str) -> bool:
-    try:
-        return comes_with_simnav(registered(name))
-    except EstimatorError:
-        return False
 
 
 @dataclass(frozen=True, eq=False)
@@ -226,13 +190,17 @@ def _scenario(table: ScenarioRuns, apart: Mapping[str, Sequence[str]]) -> Scenar
     )  # fmt: skip
 
 
-def _track(
-    track: Track,
-    tables: Sequence[ScenarioRuns],
-    apart: Mapping[str, Sequence[str]],
-    requested: Mapping[str, Sequence[int]],
-) -> TrackRanking:
-    """The ranking over the scenarios of a track."""
+def rank_track(runs: TrackRuns, requested: Mapping[str, Sequence[int]] | None = None) -> TrackRanking:
+    """The ranking over some scenarios of a track, each of their strata counting the same.
+
+    Parameters
+    ----------
+    runs : TrackRuns
+        Their runs.
+    requested : mapping of str to sequence of int, optional
+        As for `rank`.
+    """
+    track, tables, apart = runs.track, runs.tables, runs.apart
     names = sorted({n for t in tables for n in (*t.cells, *t.unsuitable)})
     used = [t for t in tables if any(len(c.logs) and not c.runs.reference for c in t.cells.values())] or list(tables)
     cells = {n: {t.name: t.cells[n] for t in used if n in t.cells and len(t.cells[n].logs)} for n in names}
@@ -266,7 +234,7 @@ def _track(
         _units(found, used, shown), tuple(t.name for t in used),
         (
             *remarks(separation, unit, found, references, why),
-            *request_remarks([(len(t.seeds), requested.get(t.name, ())) for t in used]),
+            *request_remarks([(len(t.seeds), (requested or {}).get(t.name, ())) for t in used]),
             *reference_remarks(references),
             *learned_remarks(found),
             *superseded_remarks(found),
@@ -330,7 +298,7 @@ def _figures(tables: Sequence[ScenarioRuns], cells: Mapping[str, Cell]) -> _Figu
         cell = cells[t.name]
         units, values = cell.by_unit
         completed = {u for u, failed_here in zip(cell.units, cell.failed.tolist(), strict=True) if not failed_here}
-        strata += ["recordings" if _all_recorded(tables) else t.name] * len(units)
+        strata += ["recordings" if _all_recorded(tables) else t.stratum] * len(units)
         clusters += [(t.name, u) if t.recorded else u for u in units]
         logs.append(values)
         failed += [u not in completed for u in units]
@@ -402,7 +370,7 @@ def _gain(name: str, tables: Sequence[ScenarioRuns], cells: Mapping[str, Cell], 
         for seed, log in zip(*_by_seed(cells[t.name]), strict=True):
             mine.append(log)
             theirs.append(plain[seed])
-            strata.append(t.name)
+            strata.append(t.stratum)
             clusters.append((t.name, t.unit(seed)) if t.recorded else seed)
     return gain(mine, theirs, strata, clusters, excess)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -19,6 +20,7 @@ from .confinement import confined
 from .failures import failures
 from .ranking_table import ranking_tables
 from .standing import Standing, standing_table
+from .trouble_profile import TrackProfile, profiles
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -43,6 +45,11 @@ class _Report(Shown):
 
     results: Sequence[Result]
     ranking: Ranking
+
+    @cached_property
+    def profiles(self) -> tuple[TrackProfile, ...]:
+        """The results by kind of trouble, of each track that has scenarios of the catalogue."""
+        return profiles(self.results)
 
     def headline(self) -> str:
         """How much was run."""

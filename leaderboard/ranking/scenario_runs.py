@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Container, Mapping
+from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -106,6 +107,8 @@ class ScenarioRuns:
 
     Attributes
     ----------
+    stratum : str
+        Scenarios of one stratum count as one where a mean is taken over several. Default: the name of the scenario.
     cells : dict of str to Cell
         By estimator, of those that the scenario suits.
     unsuitable : dict of str to str
@@ -121,7 +124,7 @@ class ScenarioRuns:
     def __init__(
         self, name: str, by: Mapping[str, Runs], track: Track, recorded: bool | None = None, apart: Container[str] = ()
     ):
-        self.name, self.track = name, track
+        self.name, self.stratum, self.track = name, name, track
         self.unsuitable = {n: why for n in sorted(by) if (why := by[n].unsuitable())}
         entries = {n: by[n] for n in sorted(by) if by[n].tried and n not in self.unsuitable}
         if track.score == SMOOTHED and track.name == "post-processing":  # whoever never smooths is not in it
@@ -172,6 +175,18 @@ class ScenarioRuns:
         same = len(there) == len(runs.results)
         counted = runs if same else Runs(there) if there else runs
         return Cell(counted, len(counts), [self.unit(r.seed) for r in there], np.array(logs, dtype=np.float64))
+
+    def in_stratum(self, name: str) -> ScenarioRuns:
+        """The same runs as a part of a stratum."""
+        made = copy(self)
+        made.stratum = name
+        return made
+
+    def of_rows(self, names: Container[str]) -> ScenarioRuns:
+        """The runs of some rows alone; what their errors are divided by stays."""
+        made = copy(self)
+        made.cells = {name: cell for name, cell in self.cells.items() if name in names}
+        return made
 
     @cached_property
     def seals(self) -> frozenset[str]:

@@ -34,6 +34,7 @@ __all__ = [
     "Result",
     "batches",
     "listed",
+    "of_scenarios",
     "rows",
     "schema",
     "to_table",
@@ -300,6 +301,15 @@ def write_tables(file: BinaryIO, tables: Iterator[pa.Table], *, level: int | Non
     with pq.ParquetWriter(file, schema(), **options) as writer:
         for table in tables:
             writer.write_table(table)
+
+
+def of_scenarios(table: pa.Table, scenarios: Collection[str]) -> pa.Table:
+    """The rows of a table that are of some scenarios, by their versioned ids."""
+    import pyarrow as pa
+    import pyarrow.compute as pc
+
+    wanted = pa.array(sorted(scenarios), pa.string())
+    return table.filter(pc.is_in(table.column("scenario").cast(pa.string()), value_set=wanted))
 
 
 def rows(

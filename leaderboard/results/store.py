@@ -48,7 +48,7 @@ from .folder import (
     tables_of,
 )
 from .provenance import Provenance
-from .result import BATCH, FORMAT, Result, listed, rows, schema, to_table, write_tables
+from .result import BATCH, FORMAT, Result, listed, of_scenarios, rows, schema, to_table, write_tables
 from .stored_series import StoredSeries
 
 if TYPE_CHECKING:
@@ -283,7 +283,13 @@ def _rewrite(path: Path, keys: Collection[str], change: Callable[[pa.Table], pa.
                 write_tables(target, iter(tables))
 
 
-def load(folder: str | os.PathLike[str], *, series: bool = True, scores: Collection[str] | None = None) -> list[Result]:
+def load(
+    folder: str | os.PathLike[str],
+    *,
+    series: bool = True,
+    scores: Collection[str] | None = None,
+    scenarios: Collection[str] | None = None,
+) -> list[Result]:
     """The current results of a folder, each once, in order of scenario, estimator and seed.
 
     Only the columns that are needed are read, so that a hundred thousand results take seconds. Results that cannot be
@@ -297,6 +303,8 @@ def load(folder: str | os.PathLike[str], *, series: bool = True, scores: Collect
         False leaves the series out. Otherwise they stay in their files until they are asked for.
     scores : collection of str, optional
         Only these are read. Default: all.
+    scenarios : collection of str, optional
+        Only results of these versioned ids are read, without series. Default: all.
 
     Raises
     ------
@@ -313,8 +321,9 @@ def load(folder: str | os.PathLike[str], *, series: bool = True, scores: Collect
 
     def scan() -> None:
         for file, tables in contents(path, columns):
-            for group, table in enumerate(tables):
-                stored = partial(StoredSeries, str(file), group) if series else None
+            for group, whole in enumerate(tables):
+                stored = partial(StoredSeries, str(file), group) if series and scenarios is None else None
+                table = whole if scenarios is None else of_scenarios(whole, scenarios)
                 for result in rows(table, known, scores=scores, series=stored):
                     variant = variants.get((result.scenario, result.estimator))
                     if variant == result.variant:

@@ -11,6 +11,7 @@ from simnav.leaderboard.ranking import tables
 from simnav.leaderboard.ranking.confinement import confined
 from simnav.leaderboard.ranking.failures import failures
 from simnav.leaderboard.ranking.ranking_table import ranking_tables
+from simnav.leaderboard.ranking.trouble_profile import profile_table
 from simnav.leaderboard.ranking.voyages import side_by_side
 from simnav.leaderboard.results.shown import Shown
 
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
 
     from simnav.leaderboard.ranking.agreement import RankCorrelation
     from simnav.leaderboard.ranking.board import Ranking
+    from simnav.leaderboard.ranking.trouble_profile import TrackProfile
     from simnav.leaderboard.ranking.voyages import Voyages
     from simnav.leaderboard.results.result import Result
 
@@ -39,20 +41,23 @@ class SiteReport(Shown):
         Of these.
     correlations : tuple of RankCorrelation
         How well the order agrees with that of other results, where there are any.
+    profiles : tuple of TrackProfile
+        The results by kind of trouble, of the tracks that have scenarios of the catalogue.
     """
 
     index: Path
     results: Sequence[Result]
     ranking: Ranking
     correlations: tuple[RankCorrelation, ...] = ()
+    profiles: tuple[TrackProfile, ...] = ()
 
     def headline(self) -> str:
         """Where the site is, and how many runs it shows."""
         return f"{self.index}, {sum(r.tried for r in self.results)} runs"
 
     def shown(self) -> Sequence[tables.Fitted]:
-        """A table for each track."""
-        return ranking_tables(self.ranking)
+        """A table for each track, and one for its kinds of trouble where there are several."""
+        return [*ranking_tables(self.ranking), *(profile_table(p) for p in self.profiles if len(p.groups) > 1)]
 
     @property
     def voyages(self) -> list[Voyages]:
@@ -66,6 +71,7 @@ class SiteReport(Shown):
             "runs": sum(r.tried for r in self.results),
             "failed": failures(self.results),
             "ranking": self.ranking.to_dict(),
+            "profiles": [p.to_dict() for p in self.profiles],
             "confinement": confined(self.results),
             "correlations": [c.to_dict() for c in self.correlations],
             "voyages": [v.to_dict() for v in self.voyages],

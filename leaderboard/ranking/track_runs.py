@@ -1,0 +1,101 @@
+"""The runs of a track, scenario by scenario: what the ranking of a track, or of a part of it, is made from."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from simnav.estimator import EstimatorError
+from simnav.estimator.registry import registered
+from simnav.leaderboard.campaign.request import comes_with_simnav
+
+from .runs import Runs, group
+from .scenario_runs import ScenarioRuns
+from .tracks import Track, catalogued, tracks_of
+from .variants import families, surplus
+
+if TYPE_CHECKING:
+    from simnav.leaderboard.results.result import Result
+
+__all__ = ["TrackRuns", "runs_of_tracks"]
+
+
+@dataclass(frozen=True, eq=False)
+class TrackRuns:
+    """The runs of all rows on some scenarios of a track.
+
+    Attributes
+    ----------
+    track : Track
+        The track, with its score.
+    tables : sequence of ScenarioRuns
+        One a scenario.
+    apart : mapping of str to sequence of str
+        Variants beyond the first few of one row, which have no rank, and their family.
+    """
+
+    track: Track
+    tables: Sequence[ScenarioRuns]
+    apart: Mapping[str, Sequence[str]]
+
+    def only(self, wanted: Callable[[str], bool]) -> TrackRuns:
+        """Those of the scenarios whose versioned ids are wanted."""
+        return replace(self, tables=[t for t in self.tables if wanted(t.name)])
+
+    def of_rows(self, names: Container[str]) -> TrackRuns:
+        """Those of some rows; what their errors are divided by stays."""
+        return replace(self, tables=[t.of_rows(names) for t in self.tables])
+
+
+def runs_of_tracks(
+    results: Iterable[Result],
+    score: str | None = None,
+    tracks: Mapping[str, str] | None = None,
+) -> Iterator[TrackRuns]:
+    """The runs of each track, in the order in which tracks are shown; tracks without a run are left out.
+
+    Parameters
+    ----------
+    results, score, tracks
+        As for `simnav.leaderboard.ranking.ranking.rank`.
+
+    Raises
+    ------
+    ValueError
+        If an estimator has two results for one run.
+    """
+    runs = group(results)
+    headers = catalogued()  # what a scenario is, it says, and not what results say
+    known = {**{name: h.track for name, h in headers.items()}, **(tracks or {})}
+    for track in tracks_of(runs, known, score):
+        apart = surplus(_families(track, runs))
+        recorded = {s: headers[s].recorded for s in track.scenarios if s in headers}
+        every = (ScenarioRuns(s, runs[s], track, recorded.get(s), apart) for s in track.scenarios)
+        tables = [t for t in every if t.cells]
+        if tables:
+            yield TrackRuns(track, tables, apart)
+
+
+def _families(track: Track, runs: Mapping[str, Mapping[str, Runs]]) -> list[list[str]]:
+    """Variants of one row on a track, by name and by what they estimate."""
+    logs: dict[str, dict[object, float]] = {}
+    for s in track.scenarios:
+        for label, found in runs[s].items():
+            if not found.reference:
+                errors = np.maximum(found.column(track.score), 1e-9)
+                with np.errstate(invalid="ignore"):
+                    values = np.log(errors).tolist()
+                logs.setdefault(label, {}).update(
+                    {(s, r.seed): x for r, x in zip(found.results, values, strict=True) if r.outcome == "ok"}
+                )
+    return families(logs, _comes_with_simnav)
+
+
+def _comes_with_simnav(name: str) -> bool:
+    try:
+        return comes_with_simnav(registered(name))
+    except EstimatorError:
+        return False

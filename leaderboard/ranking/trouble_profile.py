@@ -1,0 +1,281 @@
+"""The profile of a track: the result of each row in each kind of trouble, tested within the kind.
+
+The mean over a track is one number over unlike questions: which row is best with a lasting bias, and which in an
+outage. So the scenarios of a track are grouped by what goes wrong in them (`simnav.leaderboard.ranking.troubles`), and
+each group is ranked by itself, as a track is (`simnav.leaderboard.ranking.ranking`).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from simnav.leaderboard.results.plain import as_json
+
+from . import tables
+from .board import TrackRanking
+from .ranking import rank_track
+from .statistics import Interval, scenario_interval, share
+from .track_runs import TrackRuns, runs_of_tracks
+from .troubles import trouble_of, troubles, within
+
+if TYPE_CHECKING:
+    from simnav.leaderboard.results.result import Result
+
+    from .rows import Row
+    from .scenario_runs import ScenarioRuns
+
+__all__ = ["BAD", "GroupRow", "TrackProfile", "TroubleGroup", "group_of", "profile_table", "profiles", "ranked_group"]
+
+#: A run is bad if it is lost, or its error is more than so many times that of the plain row in the same run.
+BAD = 5.0
+
+
+@dataclass(frozen=True)
+class GroupRow:
+    """One estimator in one kind of trouble.
+
+    Attributes
+    ----------
+    estimator : str
+        Label.
+    ranked : bool
+        Whether it is compared with the others; the plain row is, references are not.
+    to_plain, to_plain_low, to_plain_high : float
+        Geometric mean of its error over that of the plain row in the same run, with the 95 % interval over seeds
+        (recordings). NaN where there is no plain row; the interval also with too few seeds.
+    scenarios_low, scenarios_high : float
+        The same interval for other scenarios of the kind; NaN with fewer than three scenarios.
+    to_reference, to_reference_low, to_reference_high : float
+        The same over the reference of the group: an oracle, or the plain row on recorded voyages.
+    coverage : float
+        Share of the epochs at which the truth lies in the stated 95 % ellipse, mean over the runs; NaN without one.
+    bad, bad_low, bad_high : float
+        Share of the runs that are bad (`BAD`), with its 95 % interval. NaN where there is no plain row.
+    runs : int
+        Number of runs that count.
+    may_be_best : bool
+        Whether it belongs to the set that holds the best row of the group with 95 % probability.
+    better_than, worse_than : tuple of str
+        The rows that it is told from, all pairs of the group at once.
+    update_median : float
+        Median wall-clock time of an epoch in these runs [s].
+    """
+
+    estimator: str
+    ranked: bool
+    to_plain: float
+    to_plain_low: float
+    to_plain_high: float
+    scenarios_low: float
+    scenarios_high: float
+    to_reference: float
+    to_reference_low: float
+    to_reference_high: float
+    coverage: float
+    bad: float
+    bad_low: float
+    bad_high: float
+    runs: int
+    may_be_best: bool
+    better_than: tuple[str, ...]
+    worse_than: tuple[str, ...]
+    update_median: float
+
+
+@dataclass(frozen=True)
+class TroubleGroup:
+    """The scenarios of a track with one kind of trouble.
+
+    Attributes
+    ----------
+    trouble, title : str
+        Name and title of the kind of trouble.
+    scenarios : tuple of str
+        Versioned ids.
+    plain, reference : str
+        The plain row, and what `GroupRow.to_reference` is over, as in `simnav.leaderboard.ranking.board.TrackRanking`.
+    unit : str
+        ``seed`` or ``recording``.
+    units : int
+        How many of them the ranked rows have, at least.
+    insufficient : str
+        Why the rows cannot be ordered; empty where they can.
+    rows : tuple of GroupRow
+        Ranked rows by error, then the others that were run.
+    """
+
+    trouble: str
+    title: str
+    scenarios: tuple[str, ...]
+    plain: str
+    reference: str
+    unit: str
+    units: int
+    insufficient: str
+    rows: tuple[GroupRow, ...]
+
+    @property
+    def ranked(self) -> tuple[GroupRow, ...]:
+        """The rows that are compared."""
+        return tuple(r for r in self.rows if r.ranked)
+
+    @property
+    def separates(self) -> bool:
+        """Whether any row is told from any other."""
+        return any(r.better_than for r in self.ranked)
+
+    def row(self, estimator: str) -> GroupRow | None:
+        """The row of an estimator; None where it was not run."""
+        return next((r for r in self.rows if r.estimator == estimator), None)
+
+
+@dataclass(frozen=True)
+class TrackProfile:
+    """The results on a track by kind of trouble.
+
+    Attributes
+    ----------
+    track, title, score : str
+        As in `simnav.leaderboard.ranking.board.TrackRanking`.
+    groups : tuple of TroubleGroup
+        In the order of `simnav.leaderboard.ranking.troubles.troubles`.
+    """
+
+    track: str
+    title: str
+    score: str
+    groups: tuple[TroubleGroup, ...]
+
+    @property
+    def silence(self) -> str:
+        """The groups that separate nobody, in one sentence; empty where each separates somebody."""
+        silent = [within(g.title) for g in self.groups if not g.separates]
+        return f"No row is told from another in these groups: {', '.join(silent)}." if silent else ""
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain dicts and lists for JSON."""
+        found: dict[str, Any] = as_json(vars(self))
+        return found | {"silence": self.silence}
+
+
+def profiles(
+    results: Iterable[Result], *, score: str | None = None, tracks: Mapping[str, str] | None = None
+) -> tuple[TrackProfile, ...]:
+    """The profile of each track; scenarios without a kind of trouble are left out.
+
+    Parameters
+    ----------
+    results, score, tracks
+        As for `simnav.leaderboard.ranking.ranking.rank`.
+
+    Raises
+    ------
+    ValueError
+        If an estimator has two results for one run.
+    """
+    return tuple(filter(None, map(_profile, runs_of_tracks(results, score, tracks))))
+
+
+def _profile(runs: TrackRuns) -> TrackProfile | None:
+    groups = tuple(filter(None, (group_of(runs, name) for name in troubles())))
+    return TrackProfile(runs.track.name, runs.track.title, runs.track.score, groups) if groups else None
+
+
+def group_of(runs: TrackRuns, trouble: str) -> TroubleGroup | None:
+    """The results on the scenarios with one kind of trouble; None where there is none among the runs."""
+    chosen = runs.only(lambda scenario: trouble_of(scenario) == trouble)
+    return ranked_group(chosen, trouble, troubles()[trouble].title) if chosen.tables else None
+
+
+def ranked_group(runs: TrackRuns, trouble: str, title: str) -> TroubleGroup:
+    """The results on some scenarios, whatever their kinds of trouble are."""
+    board = rank_track(runs)
+    rows = tuple(_row(r, board, runs.tables) for r in board.rows if r.runs)
+    return TroubleGroup(
+        trouble, title, board.scenarios, board.plain, board.reference, board.unit, board.units, board.insufficient, rows
+    )
+
+
+def _row(row: Row, board: TrackRanking, every: Sequence[ScenarioRuns]) -> GroupRow:
+    gain = row.gain
+    cells = [t.cells[row.estimator] for t in every if row.estimator in t.cells]
+    inside = np.concatenate([c.runs.numbers("coverage_95") for c in cells])
+    beside = _beside_plain(row.estimator, every) if board.plain else []
+    over = scenario_interval([b.log for b in beside], [b.scenario for b in beside]) if beside else Interval(math.nan)
+    bad = share(sum(b.bad for b in beside), len(beside))
+    return GroupRow(
+        row.estimator, row.ranked,
+        math.nan if gain is None else gain.value,
+        math.nan if gain is None else gain.low,
+        math.nan if gain is None else gain.high,
+        over.low, over.high, row.score, row.low, row.high,
+        float(inside.mean()) if len(inside) else math.nan,
+        bad.value, bad.low, bad.high, row.runs, row.may_be_best, row.better_than, row.worse_than, row.update_median,
+    )  # fmt: skip
+
+
+class _Beside(NamedTuple):
+    """A run beside the plain row's: the logarithm of the ratio of the errors as it counts, and whether it is bad."""
+
+    scenario: str
+    log: float
+    bad: bool
+
+
+def _beside_plain(name: str, every: Iterable[ScenarioRuns]) -> list[_Beside]:
+    found = []
+    for t in every:
+        if name not in t.cells or t.plain not in t.cells:
+            continue
+        plain = {r.seed: t.log(t.plain, r.seed) for r in t.cells[t.plain].runs.tried}
+        mine = t.cells[name]
+        for run, log, capped in zip(mine.runs.tried, mine.logs.tolist(), mine.capped.tolist(), strict=True):
+            bad = math.isinf(log) or log - plain[run.seed] > math.log(BAD)
+            found.append(_Beside(t.name, capped - plain[run.seed], bad))
+    return found
+
+
+def profile_table(profile: TrackProfile, most: int = 12) -> tables.Fitted:
+    """The errors beside the plain row's, a row an estimator and a column a kind of trouble.
+
+    Parameters
+    ----------
+    profile : TrackProfile
+        What is shown.
+    most : int
+        Rows that are shown: those that may be the best of most groups first.
+    """
+    names = [r.estimator for r in profile.groups[0].ranked]
+    rows = {n: [found for g in profile.groups if (found := g.row(n)) is not None and found.ranked] for n in names}
+    best = {n: sum(r.may_be_best for g, r in zip(profile.groups, found, strict=False) if g.separates)
+            for n, found in rows.items()}  # fmt: skip
+    order = sorted(
+        (n for n, found in rows.items() if len(found) == len(profile.groups)),
+        key=lambda n: (-best[n], _mean(r.to_plain for r in rows[n]), n),
+    )
+    cells = [[n, *(_cell(g, n) for g in profile.groups)] for n in order[:most]]
+    columns = ["estimator", *(g.title for g in profile.groups)]
+    left = f" {len(order) - most} rows more are in the document of --json." if len(order) > most else ""
+    return tables.Fitted(
+        f"{profile.title}: error beside the plain row's, by kind of trouble", columns, cells, columns,
+        always=len(columns), numeric=columns[1:],
+        caption=f"+: may be the best of a group that separates rows. {profile.silence}{left}".rstrip(),
+    )  # fmt: skip
+
+
+def _mean(ratios: Iterable[float]) -> float:
+    """The geometric mean of those that are known; infinite without any."""
+    logs = [math.log(r) for r in ratios if r > 0.0]
+    return math.fsum(logs) / len(logs) if logs else math.inf
+
+
+def _cell(group: TroubleGroup, estimator: str) -> str:
+    row = group.row(estimator)
+    if row is None:
+        return tables.MISSING
+    return tables.number(row.to_plain, 2) + (" +" if row.may_be_best and group.separates else "")
