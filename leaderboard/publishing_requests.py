@@ -79,7 +79,9 @@ class SiteRequest:
     output: PathLike = option(
         "--output", "-o", default="site", help="Folder of the site.", more="An older site there is replaced."
     )
-    papers: PathLike = option(default="reproduced", help="Folder that 'simnav reproduce' wrote; its papers get pages.")
+    papers: PathLike = option(
+        default="reproduced", help="Folder that 'simnav paper reproduce' wrote; its papers get pages."
+    )
     sweeps: PathLike = option(
         default="results", help="Folder with the folders of sweeps; the pages of scenarios show them."
     )
@@ -153,7 +155,7 @@ class StandardRequest:
         cli=str,
         cli_default="1/1",
         read=part_of,
-        help="Do part K of N of the runs; 'simnav merge' puts the parts together.",
+        help="Do part K of N of the runs; 'simnav campaign merge' puts the parts together.",
     )
     progress: CampaignProgress = option(default=None, help=CAMPAIGN_PROGRESS, hidden=True)
 

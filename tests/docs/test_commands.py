@@ -41,7 +41,7 @@ def mistake(line: str) -> str | None:
             return None if type(error).__name__ == "Exit" else repr(error)  # --help and --version end it
         return str(error.format_message())
     left = words[0] if hasattr(command, "commands") and words else "--help"
-    return None if left == "COMMAND" or left.startswith("--") else f"no command {left!r}"
+    return None if left == "COMMAND" or left.startswith("-") else f"no command {left!r}"
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(ROOT).as_posix())
