@@ -231,8 +231,9 @@ class PublishRequest:
     history: PathLike | None = option(default=None, help="File of the editions. Default: that of simnav.")
     readme: PathLike | None = option(
         default=None,
-        help="Whose tables are written. Default: of the command, README.md, if it is here; of the call, none.",
-        more="They stand between the marks of `simnav.leaderboard.standard.readme`.",
+        help="Whose first answer is written. Default: of the command, README.md, if it is here; of the call, none.",
+        more="It stands between the marks of `simnav.leaderboard.standard.readme`, as do the tables of docs/board.md "
+        "beside it, if that is there.",
     )
     site: PathLike | None = option(
         default=None,

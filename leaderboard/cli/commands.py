@@ -106,6 +106,7 @@ class RunCommand(RunRequest):
     stanford: Path | None = option(
         default=None, help="Write Stanford diagrams, error beside protection level: .png, .svg or .pdf."
     )
+    animate: Path | None = option(default=None, help="Write a moving picture of the run: .gif.")
     alert_limit: float = option(
         default=25.0,
         least=0.01,

@@ -209,7 +209,7 @@ OTHER_NAMES: dict[str, Callable[..., Any] | None] = {
 #: Options that are no argument of the call: what is done with the object that it returns, and files that it writes.
 OF_THE_RESULT = {
     "list": {"topic"},
-    "run": {"plot", "plot_lags", "stanford", "alert_limit"},
+    "run": {"plot", "plot_lags", "stanford", "alert_limit", "animate"},
     "simulate": {"output", "csv"},
     "score": {"plot"},
     "sweep": {"plot"},
