@@ -168,8 +168,8 @@ def _frames(
             close.set_title(f"fault: {active}" if active else "close-up", fontsize=9, color=_FAULTY if active else INK)
             said = "\n".join(f"{e.label}: {np.hypot(*e.path.at(time)):.1f} m" for e in estimates)
             close.text(0.03, 0.97, said, transform=close.transAxes, va="top", fontsize=8)
-            canvas.draw()
-            yield np.asarray(canvas.buffer_rgba())[..., :3].copy()
+            canvas.draw()  # type: ignore[no-untyped-call]
+            yield np.asarray(canvas.buffer_rgba())[..., :3].copy()  # type: ignore[no-untyped-call]
 
 
 def _truth(recording: Recording) -> tuple[_Path, Array]:
