@@ -72,7 +72,7 @@ def commands() -> str:
         "# Command line",
         NOTE,
         "Results go to standard output, messages to standard error. The exit code is 0 for success, 1 for a failure "
-        "and 2 for a mistake of the user (3: see verify). `--json` prints a document for other programs.",
+        "and 2 for a mistake of the user (3: see campaign verify). `--json` prints a document for other programs.",
     ]
     for name, command in _commands(root, "simnav"):
         help_text = re.sub(r"\s+", " ", command.help or "").strip()
@@ -90,10 +90,11 @@ def commands() -> str:
 def _commands(command: Any, name: str) -> Iterator[tuple[str, Any]]:
     children = getattr(command, "commands", {})
     for key, child in sorted(children.items()):
-        if getattr(child, "commands", None):
-            yield from _commands(child, f"{name} {key}")
-        else:
+        group = bool(getattr(child, "commands", None))
+        if not group or child.invoke_without_command:
             yield f"{name} {key}", child
+        if group:
+            yield from _commands(child, f"{name} {key}")
 
 
 def _invocation(parameter: Any) -> str:

@@ -47,7 +47,7 @@ def claim(request: ClaimRequest) -> Answer:
     from simnav.leaderboard.papers.claims.search import search
 
     if not request.claim:
-        raise RequestError("no claim was named; 'simnav claim' lists those of the papers")
+        raise RequestError("no claim was named; 'simnav paper claim' lists those of the papers")
     known = request.claim in {c.name for c in claims()}
     mine = (request.than, request.scenario, request.gain)
     if known and mine != (None, None, None):

@@ -83,7 +83,7 @@ def export(request: ExportRequest) -> list[Path]:
         raise RequestError("'blind' and 'truth' exclude each other")
     if request.blind and not seal.secret:
         raise RequestError(
-            "'blind' needs 'sealed': without a key anybody can make the runs again; make one with 'simnav seal KEYFILE'"
+            "'blind' needs 'sealed': without a key anybody can make the runs; 'simnav campaign seal KEYFILE' makes one"
         )
     if request.form not in formats("recording"):
         raise RequestError(f"format = {request.form!r} is unknown; there are: {', '.join(formats('recording'))}")

@@ -79,7 +79,9 @@ class SiteRequest:
     output: PathLike = option(
         "--output", "-o", default="site", help="Folder of the site.", more="An older site there is replaced."
     )
-    papers: PathLike = option(default="reproduced", help="Folder that 'simnav reproduce' wrote; its papers get pages.")
+    papers: PathLike = option(
+        default="reproduced", help="Folder that 'simnav paper reproduce' wrote; its papers get pages."
+    )
     sweeps: PathLike = option(
         default="results", help="Folder with the folders of sweeps; the pages of scenarios show them."
     )
@@ -153,7 +155,7 @@ class StandardRequest:
         cli=str,
         cli_default="1/1",
         read=part_of,
-        help="Do part K of N of the runs; 'simnav merge' puts the parts together.",
+        help="Do part K of N of the runs; 'simnav campaign merge' puts the parts together.",
     )
     progress: CampaignProgress = option(default=None, help=CAMPAIGN_PROGRESS, hidden=True)
 
@@ -229,8 +231,9 @@ class PublishRequest:
     history: PathLike | None = option(default=None, help="File of the editions. Default: that of simnav.")
     readme: PathLike | None = option(
         default=None,
-        help="Whose tables are written. Default: of the command, README.md, if it is here; of the call, none.",
-        more="They stand between the marks of `simnav.leaderboard.standard.readme`.",
+        help="Whose first answer is written. Default: of the command, README.md, if it is here; of the call, none.",
+        more="It stands between the marks of `simnav.leaderboard.standard.readme`, as do the tables of docs/board.md "
+        "beside it, if that is there.",
     )
     site: PathLike | None = option(
         default=None,

@@ -118,7 +118,7 @@ class PublicRecordings:
         return _FOLDER / f"{self.scenario}.toml"
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain: what ``simnav recordings --json`` prints."""
+        """Plain: what ``simnav log recordings --json`` prints."""
         found: dict[str, Any] = as_json({**asdict(self), "state": self.state})
         return found
 
@@ -183,8 +183,8 @@ def take(paths: Iterable[Path], output: Path, names: Sequence[str] = ()) -> list
     if not found and wanted:
         raise RequestError(
             f"{', '.join(map(str, given)) or 'nothing'}: no file has the checksum of one of "
-            f"{', '.join(one.scenario for one in known)}; it may be another version of it ('simnav recordings' shows "
-            "which one is meant)"
+            f"{', '.join(one.scenario for one in known)}; it may be another version of it ('simnav log recordings' "
+            "shows which one is meant)"
         )
     made = []
     for one in public_recordings(names, output):

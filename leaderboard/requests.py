@@ -509,8 +509,8 @@ class ReproduceRequest:
         "--holds-if",
         default=False,
         help="Search for the conditions under which the paper's claims hold.",
-        more="All choices that the paper does not print are varied (see `simnav claim`), on --runs seeds (6) of the "
-        "search; judged on twice as many or more. The tables are those that come with simnav.",
+        more="All choices that the paper does not print are varied (see `simnav paper claim`), on --runs seeds (6) of "
+        "the search; judged on twice as many or more. The tables are those that come with simnav.",
     )
     limit: int = option(default=200, help="With --until-decided: largest number of runs of a scenario.", least=1)
     minutes: float | None = option(

@@ -16,6 +16,7 @@ from simnav.kinds import EQUATIONS, KINDS
 from simnav.leaderboard.campaign.recorder import record_here
 from simnav.leaderboard.campaign.request import EstimatorRequest
 from simnav.leaderboard.figures.lag_figure import lag_figure
+from simnav.leaderboard.figures.moving_picture import moving_picture
 from simnav.leaderboard.figures.run_figure import run_figure
 from simnav.leaderboard.ranking.ranking_table import consistency
 from simnav.leaderboard.results.errors import RequestError, mistakes, printable
@@ -159,10 +160,36 @@ class RunReport(Shown):
         RequestError
             If no estimator gave anything.
         """
+        return run_figure(self.recording, self._drawn(), self._references(), self.scenario)
+
+    def animate(self, path: Path) -> Path:
+        """Write a moving picture of the run, a GIF: the vessel on its track, fixes, estimates with their ellipses.
+
+        Parameters
+        ----------
+        path : Path
+            The file.
+
+        Returns
+        -------
+        Path
+            The file.
+
+        Raises
+        ------
+        RequestError
+            If no estimator gave anything.
+        """
+        return moving_picture(self.recording, self._drawn(), path, self._references())
+
+    def _drawn(self) -> list[tuple[str, Trial]]:
         trials = [(e.estimator, e.trial) for e in self.estimators]
         if not any(len(trial) for _, trial in trials):
             raise RequestError("there is nothing to draw: no estimator gave an estimate")
-        return run_figure(self.recording, trials, [e.estimator for e in self.estimators if e.reference], self.scenario)
+        return trials
+
+    def _references(self) -> list[str]:
+        return [e.estimator for e in self.estimators if e.reference]
 
     def plot_lags(self) -> Figure:
         """The latency-accuracy curve: horizontal RMSE against the delay of the output.

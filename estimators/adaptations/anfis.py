@@ -5,7 +5,7 @@ five-layer first-order network, that its inputs are features of the present moti
 the covariance of GNSS. The reconstruction follows Jang 1993 (`simnav.estimators.adaptations.sugeno`,
 `simnav.estimators.training.hybrid_learning`): three inputs with three Gaussian memberships each, 27 rules. The output
 is the logarithm of the variance divided by that of the datasheet. The training data are described in
-`simnav.estimators.training.anfis_training`; `simnav train anfis` repeats the training.
+`simnav.estimators.training.anfis_training`; `simnav paper train-anfis` repeats the training.
 """
 
 from __future__ import annotations
@@ -134,7 +134,7 @@ class Anfis(NoiseAdaptation):
     features : "innovation", "motion" or "recent"
         The set of inputs: innovation and motion; motion only; or innovation and earlier innovations.
     file : str
-        Parameter file of `simnav train anfis`; empty: the file that comes with simnav.
+        Parameter file of `simnav paper train-anfis`; empty: the file that comes with simnav.
     lowest, highest : float
         Bounds of the sigma, as multiples of the datasheet's sigma (of the learned one with ``level="learned"``).
     level : "learned" or "datasheet"

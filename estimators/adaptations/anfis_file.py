@@ -110,7 +110,9 @@ class Parameters:
         try:
             document = json.loads(path.read_text(encoding="utf-8"))
         except OSError as error:
-            raise ParametersError(f"{path}: {error.strerror}; 'simnav train anfis' writes a parameter file") from None
+            raise ParametersError(
+                f"{path}: {error.strerror}; 'simnav paper train-anfis' writes a parameter file"
+            ) from None
         except ValueError as error:
             raise ParametersError(f"{path}: no parameter file of the ANFIS, for it is not JSON ({error})") from None
         if not isinstance(document, dict) or document.get("format") != FORMAT:

@@ -411,7 +411,7 @@ def _require_local(path: Path, scenarios: Sequence[str]) -> None:
     if shipped:
         raise RequestError(
             f"{path} holds results that came with simnav, of {shipped[0]} and others: a campaign of the code of today "
-            "needs another folder, and 'simnav merge' puts the two together"
+            "needs another folder, and 'simnav campaign merge' puts the two together"
         )
 
 

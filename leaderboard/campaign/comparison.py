@@ -135,7 +135,7 @@ def differing(stored: Result, again: Result) -> tuple[list[str], list[str]]:
         own = name in SCORES and SCORES[name].__module__.startswith("simnav.")
         if own and name not in stored.scores and SCORES[name].__module__ not in homes:
             undecided.append(
-                f"{name} is missing, and the results were scored with other code: 'simnav rescore' adds it"
+                f"{name} is missing, and the results were scored with other code: 'simnav campaign rescore' adds it"
             )
     return different, undecided
 

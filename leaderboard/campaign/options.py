@@ -85,7 +85,7 @@ class CampaignOptions(RunOptions):
     keep_trials: bool = option(
         "--keep-trials",
         default=False,
-        help="Keep the estimates, for 'simnav rescore'.",
+        help="Keep the estimates, for 'simnav campaign rescore'.",
         more="Also the covariances, diagnostics and flags: about 190 bytes an epoch and run.",
     )
     covariance_interval: float = option(
@@ -112,7 +112,7 @@ class CampaignOptions(RunOptions):
         cli=str,
         cli_default="1/1",
         read=part_of,
-        help="Do part K of N of the runs; 'simnav merge' puts the parts together.",
+        help="Do part K of N of the runs; 'simnav campaign merge' puts the parts together.",
     )
     confinement: str = option(
         default="auto",

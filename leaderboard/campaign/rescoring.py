@@ -58,7 +58,7 @@ class Rescored:
     seconds: float
 
     def to_dict(self) -> dict[str, Any]:
-        """What ``simnav rescore --json`` prints."""
+        """What ``simnav campaign rescore --json`` prints."""
         facts = asdict(self)
         return {"results": str(facts.pop("folder")), **facts, "scores": list(self.scores)}
 

@@ -137,7 +137,9 @@ def read_seal(path: str | os.PathLike[str] | None, *, secret: bool = True) -> Se
                 f"the key file {file} can be read by others (mode {mode:03o}); 'chmod 600 {file}' mends it"
             )
         if weakness := _weakness(words):
-            raise RequestError(f"the key file {file} {weakness}; 'simnav seal NEWFILE' makes one that is random")
+            raise RequestError(
+                f"the key file {file} {weakness}; 'simnav campaign seal NEWFILE' makes one that is random"
+            )
     key = hashlib.blake2b(words, digest_size=32, person=b"simnav key").digest()
     if not public:
         return Seal(key, file.resolve())
@@ -154,7 +156,7 @@ def _content(file: Path) -> tuple[bytes, int]:
                 raise RequestError(f"the key file {file} is no plain file")
             return opened.read(_MOST + _LONGEST_PUBLIC + 100).strip(), stat.S_IMODE(status.st_mode)
     except OSError as error:
-        hint = f"; 'simnav seal {file}' makes one" if isinstance(error, FileNotFoundError) else ""
+        hint = f"; 'simnav campaign seal {file}' makes one" if isinstance(error, FileNotFoundError) else ""
         raise RequestError(f"the key file {file} cannot be read: {error.strerror}{hint}") from None
 
 

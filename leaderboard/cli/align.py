@@ -1,4 +1,4 @@
-"""``simnav align``: delays, lever arms, offsets and scales of the instruments of a log."""
+"""``simnav log align``: delays, lever arms, offsets and scales of the instruments of a log."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""``simnav allan``: the Allan deviation of an IMU."""
+"""``simnav log allan``: the Allan deviation of an IMU."""
 
 from __future__ import annotations
 

@@ -10,20 +10,36 @@ import io
 import os
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
+from typer.core import TyperGroup
 
 from simnav.leaderboard.results.errors import shortened
 
-from .commands import COMMANDS, GROUPS, HEADINGS
+from .commands import COMMANDS, GROUPS, HEADINGS, MOVED
 from .console import USER, Output
-from .derived import command
+from .derived import command, command_of_group
 
 __all__ = ["app", "main"]
 
+
+class _Root(TyperGroup):
+    """The command: its commands in the order of their headings, and where those went that have another name now."""
+
+    def list_commands(self, ctx: Any) -> list[str]:
+        return [*_heading]
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        if args[0] in MOVED:
+            ctx.fail(f"'simnav {args[0]}' is 'simnav {MOVED[args[0]]}' now")
+        return super().resolve_command(ctx, args)
+
+
+_heading = {name: heading for heading, names in HEADINGS.items() for name in names}
 app = typer.Typer(
     name="simnav",
+    cls=_Root,
     help="The open benchmark for marine integrated navigation: simulate, estimate, score, rank.",
     no_args_is_help=True,
     pretty_exceptions_enable=False,
@@ -69,15 +85,25 @@ def root(
                 raise typer.BadParameter(text, param_hint="--plugin") from None
 
 
-_heading = {name: heading for heading, names in HEADINGS.items() for name in names}
-for _name in sorted(COMMANDS, key=[*_heading].index):
-    _request, _home = COMMANDS[_name]
-    app.command(_name, rich_help_panel=_heading[_name])(command(_request, _home))
+def _add(to: typer.Typer, name: str, request: type[Any], home: str, **how: Any) -> None:
+    """Add a command; where commands are listed, the first line of its help is shown."""
+    run = command(request, home)
+    to.command(name, short_help=(run.__doc__ or "").partition("\n")[0], **how)(run)
+
+
+for _name in (name for name in COMMANDS if name not in GROUPS):
+    _add(app, _name, *COMMANDS[_name], rich_help_panel=_heading[_name])
 for _group, (_help, _commands) in GROUPS.items():
-    _typer = typer.Typer(help=_help, no_args_is_help=True)
+    _alone = COMMANDS.get(_group)
+    _typer = typer.Typer(
+        help=_help,
+        no_args_is_help=_alone is None,
+        invoke_without_command=_alone is not None,
+        subcommand_metavar="COMMAND [ARGS]..." if _alone is None else "[COMMAND [ARGS]...]",
+    )
     for _name, (_request, _home) in _commands.items():
-        _typer.command(_name)(command(_request, _home))
-    _typer.callback()(lambda: None)
+        _add(_typer, _name, _request, _home)
+    _typer.callback()((lambda: None) if _alone is None else command_of_group(*_alone))
     app.add_typer(_typer, name=_group, rich_help_panel=_heading[_group])
 
 

@@ -1,4 +1,4 @@
-"""``simnav cite``: how to cite simnav, or results."""
+"""``simnav campaign cite``: how to cite simnav, or results."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""``simnav claim``: under which conditions does a claim hold?"""
+"""``simnav paper claim``: under which conditions does a claim hold?"""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def show(out: Output, request: ClaimCommand) -> None:
         out.print("a condition is sufficient; it does not say what the authors did")
     if not request.holds_if and answer.paper:
         out.print(f"stored, computed on {stored.computed_on(answer.claim)}; "
-                  f"again: simnav claim {answer.claim} --holds-if all")  # fmt: skip
+                  f"again: simnav paper claim {answer.claim} --holds-if all")  # fmt: skip
     if written is not None:
         out.print(f"figure:  {written}")
 
@@ -71,4 +71,4 @@ def _list(out: Output, paper: str) -> None:
     columns = ["claim", "as printed", "answer", "conditions"]
     out.print(tables.Fitted("Claims of the papers", columns, rows, ["claim", "answer", "as printed", "conditions"],
                             always=2))  # fmt: skip
-    out.print("simnav claim NAME shows an answer; simnav claim NAME --holds-if CONDITION computes one")
+    out.print("simnav paper claim NAME shows an answer; simnav paper claim NAME --holds-if CONDITION computes one")

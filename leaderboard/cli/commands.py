@@ -54,7 +54,7 @@ from simnav.leaderboard.requests import (
 if TYPE_CHECKING:
     from simnav.leaderboard.campaign.request import Estimators
 
-__all__ = ["COMMANDS", "GROUPS", "HEADINGS", "Features", "Topic"]
+__all__ = ["COMMANDS", "GROUPS", "HEADINGS", "MOVED", "Features", "Topic"]
 
 _FIGURE = "Write a figure: .png, .svg or .pdf."
 
@@ -79,7 +79,7 @@ class Features(StrEnum):
 
 @request
 class ListCommand:
-    """List scenarios, estimators, kinds of instruments, kinds of faults, or IMUs by name."""
+    """List scenarios, estimators, kinds of instruments, kinds of faults, or IMUs."""
 
     topic: Topic | None = option(
         default=None,
@@ -108,6 +108,7 @@ class RunCommand(RunRequest):
     stanford: Path | None = option(
         default=None, help="Write Stanford diagrams, error beside protection level: .png, .svg or .pdf."
     )
+    animate: Path | None = option(default=None, help="Write a moving picture of the run: .gif.")
     alert_limit: float = option(
         default=25.0,
         least=0.01,
@@ -134,8 +135,9 @@ class SimulateCommand(RecordRequest):
 
 @request
 class CheckCommand:
-    """Test an estimator against the contract: causality, shapes, determinism, missing instruments.
-    Of a scenario with a log (a TOML file): read all recordings, and show what stops or disturbs a run.
+    """Test an estimator against the contract, or the log of a scenario.
+    Of an estimator: causality, shapes, determinism, missing instruments. Of a scenario with a log (a TOML file): read
+    all recordings, and show what stops or disturbs a run.
     """
 
     estimator: str = option(
@@ -313,10 +315,6 @@ COMMANDS: Mapping[str, tuple[type[Any], str]] = {
     "dataset": (DatasetRequest, "dataset"),
     "score": (ScoreCommand, "score"),
     "export": (ExportRequest, "export"),
-    "inspect": (InspectCommand, "inspect"),
-    "align": (AlignCommand, "align"),
-    "tune-noise": (TuneNoiseRequest, "tune_noise"),
-    "recordings": (RecordingsRequest, "recordings"),
     "check": (CheckCommand, "check"),
     "bench": (BenchCommand, "bench"),
     "new-estimator": (NewEstimatorCommand, "new_estimator"),
@@ -327,41 +325,78 @@ COMMANDS: Mapping[str, tuple[type[Any], str]] = {
     "leaderboard": (SiteRequest, "leaderboard"),
     "warmup": (WarmupCommand, "warmup"),
     "bound": (BoundCommand, "bound"),
-    "allan": (AllanCommand, "allan"),
-    "realism": (RealismCommand, "realism"),
-    "reproduce": (ReproduceRequest, "reproduce"),
-    "claim": (ClaimCommand, "claim"),
-    "reference": (ReferenceCommand, "reference"),
-    "rescore": (RescoreRequest, "rescore"),
-    "seal": (SealRequest, "seal"),
-    "verify": (VerifyCommand, "verify"),
-    "cite": (CiteCommand, "cite"),
-    "merge": (MergeRequest, "merge"),
     "submit": (SubmitRequest, "submit"),
     "tune": (TuneCommand, "tune"),
 }
 
-#: Heading of the help -> the commands below it.
+#: Heading of the help -> the commands and groups below it.
 HEADINGS: Mapping[str, Sequence[str]] = {
     "Every day": ("list", "show", "recommend", "run", "evaluate", "check", "new-estimator", "simulate", "sweep",
                   "campaign", "leaderboard"),
-    "Logs and programs of others": ("inspect", "align", "tune-noise", "recordings", "export", "score"),
-    "Study and publish": ("tune", "train", "dataset", "bench", "robustness", "bound", "allan", "realism", "reproduce",
-                          "claim", "rescore", "merge", "submit", "verify", "seal", "cite"),
-    "Maintain": ("standard", "reference", "warmup"),
+    "Logs and programs of others": ("log", "export", "score"),
+    "Study and publish": ("tune", "dataset", "bench", "robustness", "bound", "paper", "submit"),
+    "Maintain": ("standard", "warmup"),
 }  # fmt: skip
 
-#: Name of a group -> its help, and its commands.
+#: Name of a group -> its help, and its commands. A group whose name is in `COMMANDS` runs that command, too.
 GROUPS: Mapping[str, tuple[str, Mapping[str, tuple[type[Any], str]]]] = {
+    "campaign": (
+        "Run estimators on scenarios and seeds; started again, the campaign continues. Merge, check and cite results.",
+        {
+            "merge": (MergeRequest, "merge"),
+            "rescore": (RescoreRequest, "rescore"),
+            "verify": (VerifyCommand, "verify"),
+            "seal": (SealRequest, "seal"),
+            "cite": (CiteCommand, "cite"),
+        },
+    ),
+    "log": (
+        "Read logs of real voyages: what they hold, how their instruments fit together, and their noise.",
+        {
+            "inspect": (InspectCommand, "inspect"),
+            "align": (AlignCommand, "align"),
+            "tune-noise": (TuneNoiseRequest, "tune_noise"),
+            "allan": (AllanCommand, "allan"),
+            "realism": (RealismCommand, "realism"),
+            "recordings": (RecordingsRequest, "recordings"),
+        },
+    ),
+    "paper": (
+        "Repeat the comparisons of papers, and search for the conditions under which their claims hold.",
+        {
+            "reproduce": (ReproduceRequest, "reproduce"),
+            "claim": (ClaimCommand, "claim"),
+            "train-anfis": (TrainAnfisCommand, "train"),
+        },
+    ),
     "standard": (
-        "Run, check and publish the result that comes with simnav.",
+        "For maintainers: run, check and publish the result that comes with simnav.",
         {
             "run": (StandardRequest, "standard_run"),
             "check": (CheckStandardRequest, "standard_check"),
             "audit": (AuditRequest, "standard_audit"),
             "draw": (DrawRequest, "standard_draw"),
             "publish": (PublishRequest, "standard_publish"),
+            "reference": (ReferenceCommand, "reference"),
         },
     ),
-    "train": ("Train the parameters of an estimator.", {"anfis": (TrainAnfisCommand, "train")}),
+}
+
+#: Former name of a command -> where it is now.
+MOVED: Mapping[str, str] = {
+    "inspect": "log inspect",
+    "align": "log align",
+    "tune-noise": "log tune-noise",
+    "allan": "log allan",
+    "realism": "log realism",
+    "recordings": "log recordings",
+    "merge": "campaign merge",
+    "rescore": "campaign rescore",
+    "verify": "campaign verify",
+    "seal": "campaign seal",
+    "cite": "campaign cite",
+    "reproduce": "paper reproduce",
+    "claim": "paper claim",
+    "train": "paper train-anfis",
+    "reference": "standard reference",
 }

@@ -16,7 +16,7 @@ from simnav.leaderboard.results.errors import RequestError
 
 from .console import session
 
-__all__ = ["command", "parameters", "requested"]
+__all__ = ["command", "command_of_group", "parameters", "requested"]
 
 _Json = Annotated[bool, typer.Option("--json", help="Print one JSON document, for machines.")]
 _Debug = Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")]
@@ -130,6 +130,38 @@ def command(request: type[Any], home: str) -> Callable[..., None]:
     run.__annotations__ = {p.name: p.annotation for p in taken}
     run.__doc__ = (request.__doc__ or "").partition("\n\n")[0]
     return run
+
+
+def command_of_group(request: type[Any], home: str) -> Callable[..., None]:
+    """The function of a group that is a command itself: it runs where no command of the group is named.
+
+    Parameters
+    ----------
+    request : type
+        As of `command`; without arguments, which the parser would take for commands.
+    home : str
+        As of `command`.
+    """
+    run = command(request, home)
+
+    def alone(context: typer.Context, **given: Any) -> None:
+        named = context.invoked_subcommand
+        if named is None:
+            run(**given)
+            return
+        for parameter in context.command.params:
+            source = context.get_parameter_source(parameter.name or "")
+            if source is not None and source.name == "COMMANDLINE":
+                where = f"{context.command_path} {named}"
+                raise typer.BadParameter(
+                    f"options of '{where}' stand after it", param_hint=max(parameter.opts, key=len)
+                )
+
+    own = inspect.Parameter("context", inspect.Parameter.KEYWORD_ONLY, annotation=typer.Context)
+    vars(alone)["__signature__"] = inspect.Signature([own, *inspect.signature(run).parameters.values()])
+    alone.__annotations__ = {"context": typer.Context, **run.__annotations__}
+    alone.__doc__ = run.__doc__
+    return alone
 
 
 def _is_argument(request: type[Any], name: str) -> bool:

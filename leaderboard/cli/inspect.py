@@ -1,4 +1,4 @@
-"""``simnav inspect``: what the files of a log hold, and a scenario to begin with."""
+"""``simnav log inspect``: what the files of a log hold, and a scenario to begin with."""
 
 from __future__ import annotations
 

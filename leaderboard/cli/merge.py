@@ -1,4 +1,4 @@
-"""``simnav merge``: the results of several folders in one."""
+"""``simnav campaign merge``: the results of several folders in one."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""``simnav realism``: whether simulated errors are like real ones."""
+"""``simnav log realism``: whether simulated errors are like real ones."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""``simnav recordings``: public recordings of real voyages, as scenarios."""
+"""``simnav log recordings``: public recordings of real voyages, as scenarios."""
 
 from __future__ import annotations
 

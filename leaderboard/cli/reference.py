@@ -1,4 +1,4 @@
-"""``simnav reference``: measure the fixed figures that the errors of scenarios are divided by."""
+"""``simnav standard reference``: measure the fixed figures that the errors of scenarios are divided by."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""``simnav reproduce``: the comparison of a paper, repeated."""
+"""``simnav paper reproduce``: the comparison of a paper, repeated."""
 
 from __future__ import annotations
 
@@ -46,5 +46,5 @@ def show(out: Output, request: ReproduceRequest) -> None:
         out.print(f"with our settings: {gain_text(answer.ours)}: {answer.standing}",
                   f"verdict: {answer.sentence_of_verdict}")  # fmt: skip
     if found.count("undecided") and not (request.stored or request.holds_if):
-        out.print(f"more runs for undecided rows: simnav reproduce {about.key} --until-decided")
+        out.print(f"more runs for undecided rows: simnav paper reproduce {about.key} --until-decided")
     out.print(f"table:   {table}", f"figures: {len(paths)} as PNG in {folder}", f"page:    {written}")

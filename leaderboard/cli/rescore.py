@@ -1,4 +1,4 @@
-"""``simnav rescore``: scores from the trials that a campaign kept."""
+"""``simnav campaign rescore``: scores from the trials that a campaign kept."""
 
 from __future__ import annotations
 

@@ -27,6 +27,9 @@ def show(out: Output, request: RunCommand) -> None:
     figures = (("--plot", request.plot), ("--plot-lags", request.plot_lags), ("--stanford", request.stanford))
     for option, path in figures:
         require_figure(option, path)
+    if request.animate is not None and request.animate.suffix.lower() != ".gif":
+        raise RequestError(f"--animate {request.animate}: the file should end in .gif")
+    for option, path in (*figures, ("--animate", request.animate)):
         if path is not None and not absolute(path).parent.is_dir():
             raise RequestError(f"{option} {path}: there is no folder {path.parent}")
     chosen = scenario_of(request.scenario)
@@ -35,6 +38,9 @@ def show(out: Output, request: RunCommand) -> None:
     drawn = None
     if request.plot is not None and any(len(e.trial) for e in report.estimators):
         drawn = save_as(report.plot(), absolute(request.plot))
+    moving = None
+    if request.animate is not None and any(len(e.trial) for e in report.estimators):
+        moving = report.animate(absolute(request.animate))
     delays = None
     if request.plot_lags is not None and any("_lag_" in name for e in report.estimators for name in e.scores):
         delays = save_as(report.plot_lags(), absolute(request.plot_lags))
@@ -46,6 +52,8 @@ def show(out: Output, request: RunCommand) -> None:
     elif request.stanford is not None:
         out.remark("no Stanford diagram: no estimator gave a covariance or a protection level")
     document = {**report.to_dict(), "plot": None if drawn is None else str(drawn)}
+    if request.animate is not None:
+        document["animate"] = None if moving is None else str(moving)
     if request.plot_lags is not None:
         document["plot_lags"] = None if delays is None else str(delays)
     if request.stanford is not None:
@@ -65,6 +73,8 @@ def show(out: Output, request: RunCommand) -> None:
         out.remark(f"{', '.join(doubtful)}: the self-test says that the measurements contradict the estimate")
     if drawn is not None:
         out.print(f"figure: {drawn}")
+    if moving is not None:
+        out.print(f"moving picture: {moving}")
     if delays is not None:
         out.print(f"error against delay: {delays}")
     if shown is not None:

@@ -1,4 +1,4 @@
-"""``simnav seal``: the key of sealed seeds, and its commitment."""
+"""``simnav campaign seal``: the key of sealed seeds, and its commitment."""
 
 from __future__ import annotations
 

@@ -22,5 +22,5 @@ def show(out: Output, request: SubmitRequest) -> None:
         f"bundle:  {made.path} ({', '.join(made.estimators)}; {made.results} results, {made.failed} failed)",
         f"sha256:  {made.digest}",
         *(f"remark:  {text}" for text in made.remarks),
-        f"next:    simnav verify {made.path}",
+        f"next:    simnav campaign verify {made.path}",
     )

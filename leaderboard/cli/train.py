@@ -1,4 +1,4 @@
-"""``simnav train``: trains the parameters of an estimator."""
+"""``simnav paper train-anfis``: trains the parameters of an estimator."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def show(out: Output, request: TrainAnfisCommand) -> None:
             features, data["training"], data["validation"], passes,
             lambda k, error, check: progress(k + 1, passes, f"RMSE {error:.4f}, validation {check:.4f}"),
         )  # fmt: skip
-    command = f"simnav train anfis --features {features} --seeds {seeds}" + (
+    command = f"simnav paper train-anfis --features {features} --seeds {seeds}" + (
         f" --passes {passes}" if passes != 200 else ""
     )
     parameters.record.update({

@@ -1,4 +1,4 @@
-"""``simnav tune-noise``: noise figures for the datasheets of a log."""
+"""``simnav log tune-noise``: noise figures for the datasheets of a log."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""``simnav verify``: seals, submissions, and a sample of results that is repeated."""
+"""``simnav campaign verify``: seals, submissions, and a sample of results that is repeated."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def show(out: Output, request: VerifyCommand) -> None:
     lines += [f"incomplete: {text}" for text in done.missing]
     lines += [f"not confirmed: {text}" for text in done.unconfirmed]
     if done.unknown:
-        lines.append(f"{_unknown(done.unknown)} ('simnav --plugin FILE verify ...' loads a file of scores)")
+        lines.append(f"{_unknown(done.unknown)} ('simnav --plugin FILE campaign verify ...' loads a file of scores)")
     same = done.same
     more = f", {len(done.close)} more within {CLOSE:.0e}" if done.close else ""
     lines.append(f"{same} of {done.repeated} repeated runs are the same to the bit{more}")

@@ -1,4 +1,4 @@
-"""The figure of `simnav realism`, from plain arrays."""
+"""The figure of `simnav log realism`, from plain arrays."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Figures of ``simnav train anfis``, membership functions and the learning curve, and of ``simnav tune``."""
+"""Figures of ``simnav paper train-anfis``, membership functions and the learning curve, and of ``simnav tune``."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
-"""The comparisons of papers, repeated: ``simnav reproduce PAPER`` puts our figures beside the paper's, row by row.
+"""The comparisons of papers, repeated: ``simnav paper reproduce PAPER`` puts ours beside the paper's, row by row.
 
-A paper is one TOML file of this folder, or a file of one's own: ``simnav reproduce my_paper.toml``.
+A paper is one TOML file of this folder, or a file of one's own: ``simnav paper reproduce my_paper.toml``.
 
 - `paper`: the description of a paper: citation, methods, tables of figures and claims, and its drawings.
 - `paper_file`: the keys of the file of a paper; `reading`: from the file to the paper.

@@ -1,6 +1,6 @@
 """The tables of ``docs/papers``, written from the stored results.
 
-``python -m simnav.leaderboard.papers.documentation [FOLDER]`` writes them; with a folder, the output of ``simnav
+``python -m simnav.leaderboard.papers.documentation [FOLDER]`` writes them; with a folder, the output of ``simnav paper
 reproduce PAPER --until-decided``, it stores the results of that folder first. Each page has a marked block for each of
 these: ``citation``, ``claims``, ``settings``, ``tables`` and ``contents``; the overview has ``overview``. The figures
 are in ``docs/papers/figures``. The text between the marks is replaced, and everything else is written by hand.
@@ -122,7 +122,7 @@ def _claims(paper: Paper) -> str:
     first, values = claim_sheets(answers)
     days = sorted({computed_on(a.claim) for a in answers})
     images = [f"![{a.sentence}](figures/{paper.key}/claim-{a.claim}.png)" for a in answers if a.dials]
-    again = "`simnav claim NAME --holds-if CONDITION` computes an answer again, also with other values."
+    again = "`simnav paper claim NAME --holds-if CONDITION` computes an answer again, also with other values."
     computed = f"Computed on {', '.join(days)}. {again}"
     parts = [*_markdown(first), computed, *images, f"### {values.title}", *_markdown(values)]
     return "\n\n".join(parts)

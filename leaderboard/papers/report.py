@@ -188,7 +188,7 @@ def whereabouts(found: Reproduction, drawn: Sequence[Drawn]) -> list[Whereabouts
         for place in item.shown:
             of = outcome.get(place)
             if place.endswith(".png") and of is None:
-                place = f"{place} of 'simnav reproduce {found.paper.key}'"
+                place = f"{place} of 'simnav paper reproduce {found.paper.key}'"
             elif of is not None and of.path is None:
                 place = f"{place} (no results of {', '.join(of.missing)})"
             places.append(place)

@@ -5,7 +5,7 @@ rows need, in single precision. Its metadata hold the estimators that stand for 
 provenance of the results.
 
 ``python -m simnav.leaderboard.papers.documentation FOLDER`` writes the files from ``FOLDER/PAPER/results``, where
-FOLDER is the output of ``simnav reproduce PAPER --until-decided``, and then the tables of ``docs/papers``.
+FOLDER is the output of ``simnav paper reproduce PAPER --until-decided``, and then the tables of ``docs/papers``.
 """
 
 from __future__ import annotations

@@ -112,7 +112,7 @@ def require_lower(score: str, why: str) -> None:
 def require_score(score: str | None, results: Iterable[Result]) -> None:
     """Refuse a score, if one was asked for, that no result has: RequestError."""
     if score is not None and not any(math.isfinite(r.scores.get(score, math.nan)) for r in results):
-        raise RequestError(f"no result has the score {score!r}; 'simnav rescore' computes it from kept trials")
+        raise RequestError(f"no result has the score {score!r}; 'simnav campaign rescore' computes it from kept trials")
 
 
 def rank(

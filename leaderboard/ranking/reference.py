@@ -1,10 +1,10 @@
 """The fixed reference figures of scenarios: what their errors are divided by.
 
 A figure is the geometric mean of the error of an oracle over many runs. It is stored with the scenario's version and a
-digest of its content in ``reference.json`` beside this module, which ``simnav reference`` writes. So a ratio to it does
-not depend on who else was run, and a changed scenario does not get the figure of the one before. Of a recorded log
-nobody knows the true noise; its figure is the error of a plain filter, which is a scale and no bound. Where nothing is
-stored, the oracle among the runs stands in; where none ran, the figure is 1 m.
+digest of its content in ``reference.json`` beside this module, which ``simnav standard reference`` writes. So a ratio
+to it does not depend on who else was run, and a changed scenario does not get the figure of the one before. Of a
+recorded log nobody knows the true noise; its figure is the error of a plain filter, which is a scale and no bound.
+Where nothing is stored, the oracle among the runs stands in; where none ran, the figure is 1 m.
 """
 
 from __future__ import annotations

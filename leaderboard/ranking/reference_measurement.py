@@ -1,4 +1,4 @@
-"""Measure the reference figures of scenarios, and store them: what ``simnav reference`` does.
+"""Measure the reference figures of scenarios, and store them: what ``simnav standard reference`` does.
 
 A simulated scenario has the error of ``oracle`` in real time and of ``oracle-rts`` for smoothed output. A recorded one
 has no oracle, because nobody knows the true noise of its instruments: its figure is the error of a plain filter.

@@ -114,7 +114,7 @@ def _fitted(values: Array, label: NDArray[np.int64]) -> Any:
         pipeline = importlib.import_module("sklearn.pipeline")
         scaling = importlib.import_module("sklearn.preprocessing")
     except ImportError:
-        raise SpecError("simnav realism needs scikit-learn: pip install 'simnav[realism]'") from None
+        raise SpecError("simnav log realism needs scikit-learn: pip install 'simnav[realism]'") from None
     model = linear.LogisticRegression(C=_REGULARISATION, class_weight="balanced", max_iter=1000)
     return pipeline.make_pipeline(scaling.StandardScaler(), model).fit(values, label)
 

@@ -147,7 +147,7 @@ class RealismReport:
 
     def toml(self) -> str:
         """The processes that fit the real errors, as tables of a scenario file."""
-        parts = [f"# Fitted to {self.log} by simnav realism."]
+        parts = [f"# Fitted to {self.log} by simnav log realism."]
         parts += [one.fit.to_toml(one.name, one.kind) for one in self.instruments if one.fit and one.kind]
         return "\n".join(parts)
 

@@ -2,7 +2,7 @@
 
 A result that is not admitted is set aside where it is read, with one sentence, so that nothing later meets it. Checked
 are the texts that become names of scenarios, estimators and files, and who may call itself what. Whether the numbers
-are those of a run is another question, which `simnav verify` answers by repeating runs.
+are those of a run is another question, which `simnav campaign verify` answers by repeating runs.
 """
 
 from __future__ import annotations

@@ -60,7 +60,7 @@ class Citation:
         return f"{self.author} ({self.year}). {TITLE}{version}. {self.note}.{place}"
 
     def to_dict(self) -> dict[str, str]:
-        """What ``simnav cite --json`` prints."""
+        """What ``simnav campaign cite --json`` prints."""
         return {"key": self.key, "bibtex": self.bibtex, "text": self.text}
 
 

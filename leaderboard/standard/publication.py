@@ -29,7 +29,7 @@ from simnav.scenario import load
 from . import shipped
 from .history import append
 from .outdated_results import changes, outdated
-from .readme import draw, replaced, tables
+from .readme import PAGE, draw, first_answer, replaced, tables
 from .unsuited_results import unsuited
 
 __all__ = ["Published", "begin", "missing", "publish", "run"]
@@ -192,14 +192,17 @@ def publish(
         )
     ranking = rank(results, requested=requested.read(working))
     of = len(results) + sum(lacking.values())
-    text = replaced(readme, tables(ranking, results, of)) if readme is not None else ""  # fails before all is written
+    texts = {} if readme is None else {readme: replaced(readme, first_answer(ranking, results, of))}
+    if readme is not None and (page := readme.parent / PAGE).is_file():
+        texts[page] = replaced(page, tables(ranking, results, of))  # fails before all is written
     same = working.resolve() == folder.resolve() and all(is_declared(r.recording) for r in found)
     if without or not same:
         write_packed(results, folder)
         requested.copy(folder, [working])
     edition = 0 if lacking else append(history, ranking, results)
+    for file, text in texts.items():
+        write_whole(file, text)
     if readme is not None:
-        write_whole(readme, text)
         draw(ranking, readme.parent)
     size = sum(p.stat().st_size for p in folder.rglob("*") if p.is_file())
     return Published(folder, edition, results, ranking, size, readme, _remarks(results, without))

@@ -1,8 +1,9 @@
-"""The tables of the README, made from results, between two marks."""
+"""The first answer of the README, and the tables of the page of the board, made from results, between two marks."""
 
 from __future__ import annotations
 
 import math
+import os
 import re
 from collections.abc import Sequence
 from pathlib import Path
@@ -20,23 +21,54 @@ from simnav.leaderboard.results.errors import RequestError
 from simnav.leaderboard.results.provenance import distinct
 from simnav.leaderboard.results.result import Result
 
-__all__ = ["BEGIN", "END", "MAP", "PICTURE", "draw", "findings", "marked", "replaced", "tables"]
+__all__ = ["BEGIN", "END", "MAP", "PAGE", "PICTURE", "draw", "findings", "first_answer", "marked", "replaced", "tables"]
 
-#: Picture of the board, from the folder of the README.
+#: Page of the board, from the folder of the README.
+PAGE = "docs/board.md"
+#: Picture of the board, likewise.
 PICTURE = "docs/figures/board.png"
 #: Map of the main track, likewise.
 MAP = "docs/figures/map.png"
 
 BEGIN, END = "<!-- standard result: begin -->", "<!-- standard result: end -->"
 _MAIN = "aided-ins"
+_FIRST = 5  # rows of the table of the README
 _ROWS = 12  # of the table of the main track
 _DRAWN = 24  # of the picture
 _FINDINGS = ("no-imu", "underwater")  # tracks whose sentences stand beside that of the main track
 _BEST = 4  # rows that a cell names
 
 
+def first_answer(ranking: Ranking, results: Sequence[Result], of: int | None = None) -> str:
+    """What is found on the main track in three sentences, and its first rows, as Markdown for the README.
+
+    Parameters
+    ----------
+    ranking : Ranking
+        The board.
+    results : sequence of Result
+        Results from which the ranking is made.
+    of : int, optional
+        How many results there should be: with fewer, the answer is called preliminary.
+    """
+    parts = [*_preliminary(results, of)]
+    main = _main(ranking)
+    if main is not None:
+        if said := findings(main):
+            parts.append("\n".join(f"- {text}" for text in said))
+        parts.append("\n".join([
+            f"| rank | estimator | what it is | × `{main.plain}`, 95 % interval | × oracle |",
+            "|---|---|---|---|---|",
+            *(f"| {r.ranks or MISSING} | `{r.estimator}` | {_description(r)} | {gain_cell(r)} | {ratio(r.score)} |"
+              for r in [r for r in main.rows if r.ranked][:_FIRST]),
+        ]))  # fmt: skip
+    parts += _older(results)
+    parts.append(_origin(results))
+    return "\n\n".join(parts)
+
+
 def tables(ranking: Ranking, results: Sequence[Result], of: int | None = None) -> str:
-    """A table of the tracks, and one of the best rows of the main track, as Markdown.
+    """A table of the tracks, and one of the best rows of the main track, as Markdown for the page of the board.
 
     Parameters
     ----------
@@ -48,14 +80,11 @@ def tables(ranking: Ranking, results: Sequence[Result], of: int | None = None) -
         How many results there should be: with fewer, the tables are called preliminary.
     """
     tracks = [t for t in ranking.tracks if any(r.ranked for r in t.rows)]
-    preliminary = of is not None and len(results) < of
-    parts = [f"**Preliminary: {len(results)} of {of} results.**"] if preliminary else []
+    parts = [*_preliminary(results, of)]
     main = _main(ranking)
     if main is not None:
-        if said := findings(main):
-            parts.append("\n".join(f"- {text}" for text in said))
         if beside_plain(main, main.rows):
-            parts.append(f"![Error of the best rows beside the plain row's on each scenario]({MAP})")
+            parts.append(f"![Error of the best rows beside the plain row's on each scenario]({_from_page(MAP)})")
         parts.append(f"{sentence(main)} {limits(main)}".strip())
     if others := [f"- {sentence(t)}" for t in tracks if t is not main and t.track in _FINDINGS]:
         parts.append("\n".join(others))
@@ -65,12 +94,7 @@ def tables(ranking: Ranking, results: Sequence[Result], of: int | None = None) -
         "fault. Recorded voyages have no oracle: there the plain filter on the same run is the divisor. Smaller is "
         "better."
     )
-    by_row: dict[str, list[Result]] = {}
-    for r in results:  # also those that suit no scenario of a track, and are on no board
-        by_row.setdefault(r.estimator, []).append(r)
-    found = ((f"`{row}`", superseded_by(row.partition("(")[0], own)) for row, own in sorted(by_row.items()))
-    if older := [(row, versions) for row, versions in found if versions]:
-        parts.append(f"Results of an older version, until the next edition: {in_words(older)}.")
+    parts += _older(results)
     if tracks:
         parts.append("\n".join([
             "| track | scenarios | seeds | complete rows | may be the best (95 %) | error beside the plain row's "
@@ -78,7 +102,7 @@ def tables(ranking: Ranking, results: Sequence[Result], of: int | None = None) -
             "|---|---|---|---|---|---|---|---|---|", *map(_track, tracks),
         ]))  # fmt: skip
     if main is not None:
-        parts.append(f"![Scores of the track {main.title} with their 95 % intervals]({PICTURE})")
+        parts.append(f"![Scores of the track {main.title} with their 95 % intervals]({_from_page(PICTURE)})")
         ranked = [r for r in main.rows if r.ranked]
         parts.append(
             f"The {min(_ROWS, len(ranked))} rows of the track *{main.title}* with the smallest scores, "
@@ -93,6 +117,26 @@ def tables(ranking: Ranking, results: Sequence[Result], of: int | None = None) -
         ]))  # fmt: skip
     parts.append(_origin(results))
     return "\n\n".join(parts)
+
+
+def _preliminary(results: Sequence[Result], of: int | None) -> list[str]:
+    """That results are missing, where they are."""
+    return [f"**Preliminary: {len(results)} of {of} results.**"] if of is not None and len(results) < of else []
+
+
+def _older(results: Sequence[Result]) -> list[str]:
+    """Which rows have results of an older version, where there are some."""
+    by_row: dict[str, list[Result]] = {}
+    for r in results:  # also those that suit no scenario of a track, and are on no board
+        by_row.setdefault(r.estimator, []).append(r)
+    found = ((f"`{row}`", superseded_by(row.partition("(")[0], own)) for row, own in sorted(by_row.items()))
+    older = [(row, versions) for row, versions in found if versions]
+    return [f"Results of an older version, until the next edition: {in_words(older)}."] if older else []
+
+
+def _from_page(picture: str) -> str:
+    """Path of a picture from the folder of the page."""
+    return os.path.relpath(picture, Path(PAGE).parent)
 
 
 def findings(track: TrackRanking) -> list[str]:

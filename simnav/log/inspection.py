@@ -89,7 +89,7 @@ class Stream:
         return f"{self.path.name}{inside}"
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain: what ``simnav inspect --json`` prints."""
+        """Plain: what ``simnav log inspect --json`` prints."""
         columns: dict[str, dict[str, Any]] = {}
         for name in self.table.names:
             values = self.table.columns[name]

@@ -30,7 +30,7 @@ _PATIENCE = 10
 def mutations(form: str, number: int, seed: int = 0) -> Counter[str]:
     """How many mutated files of a format were read, refused with one sentence, or ended in something else.
 
-    Each is also looked at as by ``simnav inspect``; only what should not happen there is counted.
+    Each is also looked at as by ``simnav log inspect``; only what should not happen there is counted.
     """
     found: Counter[str] = Counter()
     case = CASES.get(form) or OTHERS[form]

@@ -12,6 +12,7 @@ import pytest
 from typer.main import get_command
 
 from simnav.leaderboard.cli.application import app
+from simnav.leaderboard.cli.commands import MOVED
 
 ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
@@ -41,7 +42,7 @@ def mistake(line: str) -> str | None:
             return None if type(error).__name__ == "Exit" else repr(error)  # --help and --version end it
         return str(error.format_message())
     left = words[0] if hasattr(command, "commands") and words else "--help"
-    return None if left == "COMMAND" or left.startswith("--") else f"no command {left!r}"
+    return None if left == "COMMAND" or left.startswith("-") else f"no command {left!r}"
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(ROOT).as_posix())
@@ -50,7 +51,20 @@ def test_command_lines_are_understood(page: Path):
     assert wrong == {}
 
 
+@pytest.mark.parametrize("folder", ["docs", "estimators", "leaderboard", "scenarios", "simnav"])
+def test_no_text_names_a_command_by_its_old_name(folder: str):
+    """Also where no option follows, and in docstrings and messages, which put a command in quotes or code marks."""
+    old = re.compile(rf"[`']simnav(?: --\S+ \S+)? ({'|'.join(MOVED)})\b")
+    files = [p for end in ("md", "py", "toml", "html", "jinja") for p in (ROOT / folder).rglob(f"*.{end}")]
+    texts = {p.relative_to(ROOT).as_posix(): p.read_text(encoding="utf-8") for p in files}
+    assert len(texts) > 10
+    assert {name: found for name, text in texts.items() if (found := old.findall(text))} == {}
+    assert old.findall("`simnav merge` and 'simnav --plugin a.py verify x'") == ["merge", "verify"]
+
+
 def test_a_wrong_line_would_be_found():
     page = "```\nA=b simnav run ekf --scenario s.toml  # so\n```\nSee `simnav list estimators --jason`."
     assert [mistake(line) is None for line in lines_of(page)] == [False, False]
     assert mistake("run open-sea -e ekf --seed N  # a run") is None
+    assert mistake("campaign -s open-sea -o out") is None
+    assert mistake("merge a b -o c") == "no command 'merge'"

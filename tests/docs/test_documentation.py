@@ -71,7 +71,7 @@ def test_the_site_builds_without_warnings(tmp_path):
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     commands = (tmp_path / "reference" / "commands.html").read_text()
-    for name in ("campaign", "evaluate", "leaderboard", "reproduce", "run", "train anfis"):
+    for name in ("campaign", "evaluate", "campaign merge", "leaderboard", "run", "paper reproduce"):
         assert f"simnav {name}" in commands
     rows = (tmp_path / "reference" / "rows.html").read_text()
     assert "iterate_above_deg" in rows

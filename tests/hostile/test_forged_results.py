@@ -76,11 +76,11 @@ def verified(folder: Path, scenario: Scenario) -> Verification:
 def uses(folder: Path) -> None:
     """Everything that opens a folder of results, whatever it says of it."""
     for words in (
-        ["verify", str(folder)],
+        ["campaign", "verify", str(folder)],
         ["leaderboard", str(folder), "--output", str(folder.parent / "site")],
-        ["rescore", str(folder)],
-        ["cite", str(folder)],
-        ["merge", str(folder), "--output", str(folder.parent / "merged")],
+        ["campaign", "rescore", str(folder)],
+        ["campaign", "cite", str(folder)],
+        ["campaign", "merge", str(folder), "--output", str(folder.parent / "merged")],
     ):
         CliRunner().invoke(app, words)
     with warnings.catch_warnings():
@@ -208,11 +208,11 @@ def test_what_is_proven_and_what_is_claimed_is_said(
     assert found.summary.startswith("proven: status, note, parameters, draws and scores of the runs")
     assert "only claimed: commit, dirty, cpu, system, confinement" in found.summary
     monkeypatch.setattr("simnav.leaderboard.cli.verify.verify", SimpleNamespace(of=lambda _: found))
-    assert CliRunner().invoke(app, ["verify", str(folder)]).exit_code == 0
+    assert CliRunner().invoke(app, ["campaign", "verify", str(folder)]).exit_code == 0
     for change, code in ((fields(made_cpu="a faster one"), 3), (fields(made_commit="main"), 1)):
         forge(folder, change)
         found = verified(folder, scenario)
-        done = CliRunner().invoke(app, ["verify", str(folder), "--json"])
+        done = CliRunner().invoke(app, ["campaign", "verify", str(folder), "--json"])
         assert done.exit_code == code
         assert json.loads(done.stdout)["unconfirmed_fields"] == ["cpu"]
 

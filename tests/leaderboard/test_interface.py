@@ -20,6 +20,8 @@ from simnav import Estimate, Estimator
 from simnav.estimator import registry
 from simnav.leaderboard import requests
 from simnav.leaderboard.cli import app
+from simnav.leaderboard.cli.commands import COMMANDS, GROUPS
+from simnav.leaderboard.cli.derived import command as derived_command
 from simnav.leaderboard.cli.derived import requested
 from simnav.leaderboard.cli.new_estimator import write_estimator
 from simnav.leaderboard.interface import results_of, scenario_of
@@ -134,11 +136,11 @@ CALLS: dict[str, tuple[list[str], Callable[[], Any]]] = {
         ["bound", "open-sea", "-n", "1"],
         lambda: {**simnav.bound("open-sea", runs=1).to_dict(), "csv": None},
     ),
-    "allan": (
-        ["allan", "open-sea", "--duration", "100", "--seed", "2"],
+    "log allan": (
+        ["log", "allan", "open-sea", "--duration", "100", "--seed", "2"],
         lambda: {**simnav.allan("open-sea", duration=100.0, seed=2).to_dict(), "plot": None, "csv": None},
     ),
-    "cite": (["cite"], lambda: simnav.cite().to_dict()),
+    "campaign cite": (["campaign", "cite"], lambda: simnav.cite().to_dict()),
     "sweep": (
         ["sweep", "pond.toml", "--dial", RATE + "=1,2", "-e", "gnss-only", "-n", "1", "--workers", "1", "-o", "swept"],
         lambda: simnav.sweep("pond.toml", {RATE: [1, 2]}, "gnss-only", runs=1, output="swept", workers=1).to_dict(),
@@ -147,15 +149,15 @@ CALLS: dict[str, tuple[list[str], Callable[[], Any]]] = {
 }  # fmt: skip
 
 #: Commands whose calls are compared where their own tests are: they take minutes, or need what another one makes.
-ELSEWHERE = {"claim", "merge", "reference", "reproduce", "rescore", "robustness", "seal", "submit", "tune", "verify"}
-ELSEWHERE |= {"inspect", "realism", "align", "tune-noise", "recordings", "export", "score"}
-ELSEWHERE |= {"show", "train anfis", "dataset"}
-ELSEWHERE |= {"standard run", "standard check", "standard audit", "standard draw", "standard publish"}
+ELSEWHERE = {"campaign merge", "campaign rescore", "campaign seal", "campaign verify", "robustness", "submit", "tune"}
+ELSEWHERE |= {"log inspect", "log realism", "log align", "log tune-noise", "log recordings", "export", "score"}
+ELSEWHERE |= {"paper claim", "paper reproduce", "paper train-anfis", "show", "dataset"}
+ELSEWHERE |= {f"standard {name}" for name in ("run", "check", "audit", "draw", "publish", "reference")}
 
 
 def commands() -> dict[str, Callable[..., Any]]:
-    """Every command with what it runs, those of groups by both words."""
-    found = {}
+    """Every command with what it runs, those of groups by both words, and groups that are commands."""
+    found = {name: derived_command(*COMMANDS[name]) for name in COMMANDS.keys() & GROUPS.keys()}
     groups = [("", app)] + [(f"{g.name} ", g.typer_instance) for g in app.registered_groups]
     for prefix, group in groups:
         for c in group.registered_commands:
@@ -197,30 +199,30 @@ def test_every_command_is_compared() -> None:
 #: Python has the objects themselves (``show``).
 OTHER_NAMES: dict[str, Callable[..., Any] | None] = {
     "list": simnav.names, "simulate": simnav.record, "leaderboard": simnav.site, "new-estimator": write_estimator,
-    "warmup": warmup, "reference": None, "show": None, "train anfis": None, "standard run": simnav.run_standard,
-    "standard draw": simnav.draw_standard,
+    "warmup": warmup, "standard reference": None, "show": None, "paper train-anfis": None,
+    "standard run": simnav.run_standard, "standard draw": simnav.draw_standard,
     "standard check": simnav.check_standard, "standard audit": simnav.audit_standard,
-    "standard publish": simnav.publish_standard, "inspect": simnav.inspect_log, "score": simnav.score_files,
-    "tune-noise": simnav.tune_noise,
+    "standard publish": simnav.publish_standard, "log inspect": simnav.inspect_log, "score": simnav.score_files,
+    "log tune-noise": simnav.tune_noise,
 }  # fmt: skip
 
 #: Options that are no argument of the call: what is done with the object that it returns, and files that it writes.
 OF_THE_RESULT = {
     "list": {"topic"},
-    "run": {"plot", "plot_lags", "stanford", "alert_limit"},
+    "run": {"plot", "plot_lags", "stanford", "alert_limit", "animate"},
     "simulate": {"output", "csv"},
     "score": {"plot"},
     "sweep": {"plot"},
     "robustness": {"plot"},
-    "claim": {"plot"},
+    "paper claim": {"plot"},
     "bench": {"every", "output"},  # of all rows: simnav.costs
     "bound": {"csv"},
-    "align": {"plot"},
-    "inspect": {"plot"},
-    "allan": {"plot", "csv"},
-    "realism": {"plot", "fit"},
-    "verify": {"present", "tolerance"},  # of a bundle: simnav.verify_bundle
-    "cite": {"text"},
+    "log align": {"plot"},
+    "log inspect": {"plot"},
+    "log allan": {"plot", "csv"},
+    "log realism": {"plot", "fit"},
+    "campaign verify": {"present", "tolerance"},  # of a bundle: simnav.verify_bundle
+    "campaign cite": {"text"},
     "tune": {"output", "plot", "parameters"},  # parameters that are held are a pair with the estimator
 }
 
@@ -232,7 +234,7 @@ def arguments(function: Callable[..., Any], *, without: Collection[str] = ()) ->
 
 @pytest.mark.parametrize("name", commands())
 def test_every_option_is_an_argument_of_the_call_and_the_other_way_round(name: str) -> None:
-    call = OTHER_NAMES[name] if name in OTHER_NAMES else getattr(simnav, name)
+    call = OTHER_NAMES[name] if name in OTHER_NAMES else getattr(simnav, name.split()[-1])
     if call is None:
         return
     options = arguments(commands()[name], without={"json", "debug", *OF_THE_RESULT.get(name, ())})

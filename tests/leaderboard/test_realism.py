@@ -1,4 +1,4 @@
-"""`simnav realism`: what is like a recording passes, what is not fails, and the fit returns the processes."""
+"""`simnav log realism`: what is like a recording passes, what is not fails, and the fit returns the processes."""
 
 from __future__ import annotations
 
@@ -122,7 +122,7 @@ needs_nbp1406 = pytest.mark.skipif(not (DATA / "nbp1406").is_dir(), reason=f"no 
 
 def test_bad_requests_are_answered_with_a_sentence():
     def said(*words: str) -> str:
-        result = CliRunner().invoke(app, ["realism", *words])
+        result = CliRunner().invoke(app, ["log", "realism", *words])
         assert result.exit_code == 2
         return " ".join(result.stderr.split())
 
@@ -140,7 +140,7 @@ def test_a_velocity_solved_from_beams_is_like_that_of_a_dvl():
     recorded = simnav.load("auv-akit")
     assert ("solution", "dvl") in comparable(beams, recorded)
     assert not any(here in ("beams", "imu") for here, _ in comparable(beams, recorded))
-    result = CliRunner().invoke(app, ["realism", "lawnmower-beams", "auv-akit", "--instrument", "beams=dvl"])
+    result = CliRunner().invoke(app, ["log", "realism", "lawnmower-beams", "auv-akit", "--instrument", "beams=dvl"])
     assert result.exit_code == 2
     assert "did you mean 'solution=dvl'?" in " ".join(result.stderr.split()) or "solution=dvl" in result.stderr
 

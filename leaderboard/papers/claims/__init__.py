@@ -1,4 +1,4 @@
-"""Claims of papers, and the conditions under which they hold: ``simnav claim``.
+"""Claims of papers, and the conditions under which they hold: ``simnav paper claim``.
 
 A claim says that one method is better than another by so much. Papers do not print all of their settings. So the
 question is not only whether a claim holds with the settings that we chose, but which unprinted choice makes it hold.

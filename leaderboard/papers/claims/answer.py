@@ -108,7 +108,7 @@ class Answer(Shown):
         return [tables.Fitted(title, columns, rows, order, always=2)] if rows else []
 
     def to_dict(self) -> dict[str, Any]:
-        """What ``simnav claim --json`` prints, and what is stored."""
+        """What ``simnav paper claim --json`` prints, and what is stored."""
         return {
             **{name: getattr(self, name) for name in (
                 "claim", "paper", "sentence", "gain", "derived", "scenario", "row", "than", "score", "than_score",

@@ -1,7 +1,7 @@
 """The answers that come with simnav: one small JSON file for each claim, with the ratio of every seed.
 
-They are what ``simnav claim NAME --holds-if all --json`` prints. ``python -m simnav.leaderboard.papers.claims.stored
-FILE...`` takes such outputs over. A page needs these files only.
+They are what ``simnav paper claim NAME --holds-if all --json`` prints. ``python -m
+simnav.leaderboard.papers.claims.stored FILE...`` takes such outputs over. A page needs these files only.
 """
 
 from __future__ import annotations
@@ -81,7 +81,7 @@ def _document(name: str, folder: Path) -> dict[str, object] | None:
 
 
 def main(files: Sequence[str]) -> None:
-    """The command of the module: take over the outputs of ``simnav claim``."""
+    """The command of the module: take over the outputs of ``simnav paper claim``."""
     for file in files:
         made = Answer.from_dict(json.loads(Path(file).read_text(encoding="utf-8")))
         print(f"{made.claim}: {made.sentence_of_verdict} ({save(made)})")

@@ -300,7 +300,7 @@ def test_bad_files_are_named_with_their_field(tmp_path: Path, change: dict, mess
 
 
 def test_files_that_are_none(tmp_path: Path):
-    with pytest.raises(ValueError, match=r"none\.json: No such file.*simnav train anfis"):
+    with pytest.raises(ValueError, match=r"none\.json: No such file.*simnav paper train-anfis"):
         make("anfis-fgo", file=str(tmp_path / "none.json"))
     path = tmp_path / "text.json"
     path.write_text("hello")

@@ -74,7 +74,7 @@ def test_a_new_score_after_a_campaign(here: Path, monkeypatch: pytest.MonkeyPatc
         ("coverage_95", "score = 'coverage_95' is not better when lower; a ranking is by errors"),
         (
             "smoothed_horizontal_rmse",
-            "no result has the score 'smoothed_horizontal_rmse'; 'simnav rescore'",
+            "no result has the score 'smoothed_horizontal_rmse'; 'simnav campaign rescore'",
         ),
     ):
         with pytest.raises(RequestError, match=re.escape(says)):
@@ -140,7 +140,7 @@ def test_thinned_covariances_leave_scores_that_use_them_as_they_are(here: Path) 
 
 def test_the_command_says_what_the_call_says(here: Path) -> None:
     campaign(keep_trials=True)
-    words = ["rescore", "out", "--score", "cep50,r95", "-s", "pond.toml", "--json"]
+    words = ["campaign", "rescore", "out", "--score", "cep50,r95", "-s", "pond.toml", "--json"]
     told = CliRunner().invoke(app, words)
     assert told.exit_code == 0, told.stderr
     called = simnav.rescore("out", "cep50,r95", scenarios="pond.toml").to_dict()
@@ -177,10 +177,10 @@ def test_scores_of_a_plug_in_and_of_kept_trials_are_verified(here: Path, forget_
     assert all("north_spread" in text for text in known.close)
     forget_scores()
     assert (simnav.verify("out", **wanted).passed, simnav.verify("out", **wanted).unknown) == (True, ("north_spread",))
-    words = ["verify", "out", "-s", "pond.toml", *(w for e in ESTIMATORS for w in ("-e", e))]
+    words = ["campaign", "verify", "out", "-s", "pond.toml", *(w for e in ESTIMATORS for w in ("-e", e))]
     said = CliRunner().invoke(app, words)
     assert said.exit_code == 0, said.output
-    assert "not known here: north_spread ('simnav --plugin FILE verify" in " ".join(said.stdout.split())
+    assert "not known here: north_spread ('simnav --plugin FILE campaign verify" in " ".join(said.stdout.split())
     simnav.rescore("out", "cep50,r95", scenarios="pond.toml")
     again = simnav.verify("out", **wanted)
     assert again.passed

@@ -97,7 +97,7 @@ def test_a_key_is_a_secret_and_stays_one(tmp_path: Path, key: Path) -> None:
     assert len(seeds) == 100
     assert all(0 <= s < 2**63 for s in seeds)
     assert read_seal(key).seed("a-v1", 7) == seal.seed("a-v1", 7)
-    with pytest.raises(RequestError, match=r"absent cannot be read: No such file or directory; 'simnav seal .*' makes"):
+    with pytest.raises(RequestError, match=r"absent cannot be read: No such file .*; 'simnav campaign seal .*' makes"):
         read_seal(tmp_path / "absent")
     (tmp_path / "short").write_text("secret")
     with pytest.raises(RequestError, match="holds 6 bytes; a key has 16 to 4096"):
@@ -140,24 +140,24 @@ def test_random_keys_of_all_usual_forms_are_taken(tmp_path: Path) -> None:
 
 def test_the_commitment_is_known_before_a_public_value_is_mixed_in(tmp_path: Path) -> None:
     file = tmp_path / "key"
-    made = CliRunner().invoke(app, ["seal", str(file), "--json"])
+    made = CliRunner().invoke(app, ["campaign", "seal", str(file), "--json"])
     assert made.exit_code == 0, made.output
     before = json.loads(made.stdout)
     assert file.stat().st_mode & 0o777 == 0o600
     assert before["commitment"] == before["seal"] == read_seal(file).hash
     assert file.read_text().strip() not in made.stdout
     first = [read_seal(file).seed("a-v1", n) for n in range(5)]
-    after = json.loads(CliRunner().invoke(app, ["seal", str(file), "--public", "7 12 33", "--json"]).stdout)
+    after = json.loads(CliRunner().invoke(app, ["campaign", "seal", str(file), "--public", "7 12 33", "--json"]).stdout)
     mixed = read_seal(file)
     assert after["commitment"] == before["commitment"] == mixed.commitment
     assert after["seal"] == mixed.hash != mixed.commitment
     assert mixed.public == "7 12 33"
     assert not set(first) & {mixed.seed("a-v1", n) for n in range(5)}
     assert file.stat().st_mode & 0o777 == 0o600
-    again = CliRunner().invoke(app, ["seal", str(file), "--public", "8 12 33"])
+    again = CliRunner().invoke(app, ["campaign", "seal", str(file), "--public", "8 12 33"])
     assert again.exit_code == 2
     assert "has the public value '7 12 33' already" in " ".join(again.output.split())
-    checked = CliRunner().invoke(app, ["seal", str(file)])
+    checked = CliRunner().invoke(app, ["campaign", "seal", str(file)])
     assert f"commitment: {mixed.commitment}" in checked.stdout
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -13,7 +14,7 @@ import pytest
 from typer.testing import CliRunner
 
 from simnav.leaderboard import cli
-from simnav.leaderboard.cli.commands import COMMANDS, GROUPS, HEADINGS
+from simnav.leaderboard.cli.commands import COMMANDS, GROUPS, HEADINGS, MOVED
 from tests.cases import POND
 
 SCENARIO = (
@@ -163,7 +164,26 @@ def test_show_takes_a_file_as_all_commands_do(here):
 
 def test_every_command_stands_under_one_heading_of_the_help():
     named = [name for names in HEADINGS.values() for name in names]
-    assert sorted(named) == sorted([*COMMANDS, *GROUPS])
+    assert sorted(named) == sorted({*COMMANDS, *GROUPS})
+    shown = [line.split()[1] for line in call("--help").stdout.splitlines() if re.match(r"│ [a-z]", line)]
+    assert shown == named
+    assert len(named) <= 24
+
+
+def test_old_names_say_where_the_command_went(tmp_path):
+    for old, new in MOVED.items():
+        assert old not in {*COMMANDS, *GROUPS}
+        assert f"simnav {new} " in " ".join(call(*new.split(), "--help").stdout.split())
+        assert f"'simnav {old}' is 'simnav {new}' now" in " ".join(call(old, code=2).stderr.split())
+    run = entry("merge", "a", "b", "--output", "c", cwd=tmp_path)
+    assert (run.returncode, run.stdout) == (2, "")
+    assert run.stderr == "simnav: 'simnav merge' is 'simnav campaign merge' now\n"
+
+
+def test_options_of_a_campaign_are_none_of_its_commands(tmp_path):
+    run = entry("campaign", "-s", "pond.toml", "merge", "a", "-o", "b", cwd=tmp_path)
+    said = "simnav: Invalid value for --scenario: options of 'simnav campaign merge' stand after it\n"
+    assert (run.returncode, run.stderr) == (2, said)
 
 
 def test_list_names_the_keys_of_instruments_and_faults():
@@ -185,11 +205,9 @@ def test_list_loads_no_heavy_library():
 
 
 def test_every_command_has_help_and_json():
-    commands = {c.name or c.callback.__name__ for c in cli.app.registered_commands}
-    assert commands >= {"list", "run", "simulate", "check", "new-estimator", "evaluate", "campaign", "leaderboard",
-                        "warmup"}  # fmt: skip
-    for name in commands:
-        assert "--json" in call(name, "--help").stdout
+    below = [[group, name] for group, (_, commands) in GROUPS.items() for name in commands]
+    for words in [*([name] for name in COMMANDS), *below]:
+        assert "--json" in call(*words, "--help").stdout
 
 
 # -- run -------------------------------------------------------------------------------------------------

@@ -1,4 +1,4 @@
-"""The command ``simnav train anfis``."""
+"""The command ``simnav paper train-anfis``."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ def _few_voyages(monkeypatch):
 @pytest.mark.usefixtures("_few_voyages")
 def test_it_writes_a_file_that_the_rows_can_use(tmp_path: Path):
     path = tmp_path / "mine.json"
-    arguments = ["train", "anfis", "--features", "recent", "--seeds", "1", "--passes", "4", "--out", str(path)]
+    arguments = ["paper", "train-anfis", "--features", "recent", "--seeds", "1", "--passes", "4", "--out", str(path)]
     done = CliRunner().invoke(cli.app, arguments)
     assert done.exit_code == 0, done.output
     record = Parameters.load(path).record
-    assert record["command"] == "simnav train anfis --features recent --seeds 1 --passes 4"
+    assert record["command"] == "simnav paper train-anfis --features recent --seeds 1 --passes 4"
     assert record["training_seeds"] == [anfis_training.FIRST_TRAINING_SEED] * 2
     assert record["fixes"] == 1140
     for words in ("pass", "kept", "reconstruction", "none is ever scored", f"{record['validation_rmse']:.4f}"):
@@ -45,7 +45,7 @@ def test_it_writes_a_file_that_the_rows_can_use(tmp_path: Path):
 def test_json_has_every_pass(tmp_path: Path):
     path = tmp_path / "motion.json"
     done = CliRunner().invoke(
-        cli.app, ["train", "anfis", "--features", "motion", "-n", "1", "--passes", "3", "-o", str(path), "--json"]
+        cli.app, ["paper", "train-anfis", "--features", "motion", "-n", "1", "--passes", "3", "-o", str(path), "--json"]
     )
     assert done.exit_code == 0, done.output
     document = json.loads(done.stdout)
@@ -64,7 +64,7 @@ def test_json_has_every_pass(tmp_path: Path):
 )
 def test_mistakes(tmp_path: Path, monkeypatch, arguments: list[str], message: str):
     monkeypatch.chdir(tmp_path)
-    done = CliRunner().invoke(cli.app, ["train", "anfis", *arguments])
+    done = CliRunner().invoke(cli.app, ["paper", "train-anfis", *arguments])
     assert done.exit_code == 2
     assert message in " ".join(done.output.split())
 

@@ -261,9 +261,9 @@ def test_pages_count_claims_and_draw_them(tmp_path):
 
 
 def test_the_command_shows_and_lists(tmp_path):
-    listed = json.loads(RUNNER.invoke(app, ["claim", "--json"]).stdout)
+    listed = json.loads(RUNNER.invoke(app, ["paper", "claim", "--json"]).stdout)
     assert [c["claim"] for c in listed["claims"]] == [c.name for c in claims()]
-    shown = RUNNER.invoke(app, ["claim", "guo-sw-fgo", "--plot", str(tmp_path / "c.png")])
+    shown = RUNNER.invoke(app, ["paper", "claim", "guo-sw-fgo", "--plot", str(tmp_path / "c.png")])
     assert "verdict:" in shown.stdout
     assert (tmp_path / "c.png").exists()
 

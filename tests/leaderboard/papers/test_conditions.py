@@ -1,4 +1,4 @@
-"""``simnav reproduce PAPER --holds-if``: all claims of a paper are searched, and its page has the answers."""
+"""``simnav paper reproduce PAPER --holds-if``: all claims of a paper are searched, and its page has the answers."""
 
 from __future__ import annotations
 

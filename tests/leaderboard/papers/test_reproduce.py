@@ -620,7 +620,7 @@ def tiny(tmp_path, monkeypatch):
 
 
 def call(*words: str):
-    return CliRunner().invoke(app, ["reproduce", *words], env={"COLUMNS": "200"})
+    return CliRunner().invoke(app, ["paper", "reproduce", *words], env={"COLUMNS": "200"})
 
 
 @pytest.mark.skipif(os.name != "posix", reason="isolation without fork takes seconds a run")

@@ -89,7 +89,7 @@ def test_a_file_that_is_none_is_refused(tmp_path: Path, content: str):
 
 
 def test_the_figures_that_ship_are_of_known_oracles_and_of_scenarios_as_they_are():
-    """After a change of a scenario: ``simnav reference -s NAME``."""
+    """After a change of a scenario: ``simnav standard reference -s NAME``."""
     for scenario, scores in reference.stored().items():
         assert {r.content for r in scores.values()} == {load(scenario.rpartition("-v")[0]).content_hash()}
         assert set(scores) <= set(reference.ORACLES)

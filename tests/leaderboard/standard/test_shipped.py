@@ -53,10 +53,11 @@ def test_its_versions_are_those_of_today_or_the_readme_says_which_are_older() ->
     assert [row for row in found.rows if f"`{row}`" not in said] == []
 
 
-def test_the_readme_and_the_history_are_made_from_it(results: list[Result], ranking: Ranking) -> None:
+def test_the_readme_the_board_and_the_history_are_made_from_it(results: list[Result], ranking: Ranking) -> None:
     lacking = sum(missing(read_profile(standard.PROFILE), results).values())
     text = readme.marked(ROOT / "README.md")
-    assert text == readme.tables(ranking, results, len(results) + lacking)
+    assert text == readme.first_answer(ranking, results, len(results) + lacking)
+    assert readme.marked(ROOT / readme.PAGE) == readme.tables(ranking, results, len(results) + lacking)
     assert ("Preliminary" in text) == bool(lacking)
     if lacking:
         return

@@ -54,6 +54,8 @@ def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("standard")
     (folder / "small.toml").write_text(PROFILE)
     (folder / "README.md").write_text(README)
+    (folder / readme.PAGE).parent.mkdir()
+    (folder / readme.PAGE).write_text(README)
     done = run(folder, folder / "work")
     assert (done.summary.computed, done.summary.left) == (4, 0)
     publish(folder, folder / "work")
@@ -88,16 +90,17 @@ def test_what_is_published_is_small_complete_and_current(home: Path) -> None:
     assert (done.exit_code, done.stdout.strip()) == (0, "the standard result has the versions of today")
 
 
-def test_the_readme_has_its_tables_and_the_rest_of_it_stays(home: Path) -> None:
+def test_the_readme_and_the_page_have_their_tables_and_the_rest_of_them_stays(home: Path) -> None:
     results = store.load(home / "shipped", series=False)
-    text = (home / "README.md").read_text()
-    assert text.startswith("# A board\n")
-    assert text.endswith("The end.\n")
-    assert readme.marked(home / "README.md") == readme.tables(rank(results), results)
-    assert f"({readme.PICTURE})" in text
+    for name, made in (("README.md", readme.first_answer), (readme.PAGE, readme.tables)):
+        text = (home / name).read_text()
+        assert text.startswith("# A board\n")
+        assert text.endswith("The end.\n")
+        assert readme.marked(home / name) == made(rank(results), results)
+        assert "| `dead-reckoning` |" in text
+    assert "(figures/board.png)" in text
     assert (home / readme.PICTURE).stat().st_size > 5000
     assert "| Generalisation | 1 | 2 | 2 | not enough data | " in text
-    assert "| `dead-reckoning` |" in text
     with pytest.raises(RequestError, match=r"lacks the marks of the standard result"):
         readme.replaced(home / "small.toml", "")
 

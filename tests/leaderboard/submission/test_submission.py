@@ -135,7 +135,7 @@ def test_it_holds_to_the_bit_and_on_sealed_seeds_and_runs_confined(
     key = tmp_path / "key"
     key.write_text("8f3c5a0e7d19b264c1f07ae9365bd482")
     key.chmod(0o600)
-    done = CliRunner().invoke(app, ["verify", str(made), "--present", "--key", str(key), "--json"])
+    done = CliRunner().invoke(app, ["campaign", "verify", str(made), "--present", "--key", str(key), "--json"])
     told = json.loads(done.stdout)
     assert (done.exit_code, told["findings"], told["different"]) == (0, [], [])
     assert (told["repeated"], told["identical"], told["close"], told["passed"]) == (2, 2, 0, True)
@@ -278,7 +278,7 @@ def test_a_change_that_renews_the_hashes_does_not_hold(
     made: Path, tmp_path: Path, change: Callable[[Path], None], said: tuple[str, ...]
 ) -> None:
     bad = changed(made, tmp_path / "bad.zip", change, hashes=True)
-    done = CliRunner().invoke(app, ["verify", str(bad), "--present"])
+    done = CliRunner().invoke(app, ["campaign", "verify", str(bad), "--present"])
     assert done.exit_code == 1
     for text in said:
         assert text in " ".join(done.stdout.split())
@@ -288,7 +288,7 @@ def test_a_change_that_renews_the_hashes_does_not_hold(
 @pytest.mark.usefixtures("here")
 def test_a_score_of_a_plug_in_that_is_not_here_is_named_and_left_out(made: Path, tmp_path: Path) -> None:
     bundle = changed(made, tmp_path / "own.zip", with_the_score_of_a_plug_in, hashes=True)
-    done = CliRunner().invoke(app, ["verify", str(bundle), "--present"])
+    done = CliRunner().invoke(app, ["campaign", "verify", str(bundle), "--present"])
     assert done.exit_code == 0, done.stdout
     assert "not known here: my_score" in done.stdout
     assert "2 of 2 repeated runs are the same to the bit" in done.stdout
