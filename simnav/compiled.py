@@ -41,6 +41,7 @@ __all__ = [
     "kernels",
     "prune",
     "ready",
+    "register",
 ]
 
 #: The array type of kernels, and of everything else in simnav: float64.
@@ -362,7 +363,7 @@ def kernel(
     """
     if function is None:
         return partial(kernel, fastmath=fastmath, borrows=borrows, passed=passed)
-    return _kept(Kernel(function, True, fastmath, borrows, passed))
+    return register(Kernel(function, True, fastmath, borrows, passed))
 
 
 @overload
@@ -385,10 +386,14 @@ def helper(
     """
     if function is None:
         return partial(helper, fastmath=fastmath, borrows=borrows)
-    return _kept(Kernel(function, False, fastmath, borrows))
+    return register(Kernel(function, False, fastmath, borrows))
 
 
-def _kept(made: Kernel[Parameters, Returned]) -> Kernel[Parameters, Returned]:
+Made = TypeVar("Made", bound="Kernel[..., Any]")
+
+
+def register(made: Made) -> Made:
+    """Count a kernel among those that are compiled in advance (`kernels`)."""
     _kernels.append(made)
     return made
 

@@ -23,13 +23,12 @@ from functools import cached_property
 from types import SimpleNamespace
 from typing import Any, ClassVar, dataclass_transform
 
-from simnav.compiled import Kernel
+from simnav.compiled import Kernel, register
 from simnav.kernel_types import hints_of, numba_type
 
 __all__ = ["Record"]
 
 _types: dict[type[Any], Any] = {}
-_constructors: dict[type[Any], Kernel[..., Any]] = {}
 
 
 @dataclass_transform(kw_only_default=True, eq_default=False)
@@ -37,11 +36,13 @@ class Record:
     """The base of all records; the fields of a subclass are its annotations, and are given by name."""
 
     numba_fields: ClassVar[tuple[str, ...]] = ()
+    constructor: ClassVar[Constructor]
 
     def __init_subclass__(cls) -> None:
         super().__init_subclass__()
         dataclasses.dataclass(eq=False, kw_only=True)(cls)
         cls.numba_fields = tuple(field.name for field in dataclasses.fields(cls))  # type: ignore[arg-type]
+        cls.constructor = register(Constructor(cls))
 
     @classmethod
     def numba_type(cls) -> Any:
@@ -76,7 +77,7 @@ class Record:
     def _meminfo(self) -> Any:
         """The structure in compiled code, which Numba asks an object for."""
         values = [getattr(self, name) for name in self.numba_fields]
-        return _constructor(type(self))(*(v.compile() if isinstance(v, Kernel) else v for v in values))._meminfo
+        return self.constructor(*(v.compile() if isinstance(v, Kernel) else v for v in values))._meminfo
 
     @cached_property
     def in_python(self) -> Any:
@@ -107,20 +108,27 @@ def _type_of(cls: type[Record]) -> Any:
     return _types[cls]
 
 
-def _constructor(cls: type[Record]) -> Kernel[..., Any]:
+class Constructor(Kernel[..., Any]):
     """The kernel that makes the structure of a record of its fields; the cache keeps it as if the module held it."""
-    from numba.experimental.structref import new
 
-    if cls in _constructors:
-        return _constructors[cls]
-    names, module = cls.numba_fields, sys.modules[cls.__module__]
-    lines = [f"def constructor({', '.join(names)}):", "    record = new(record_type)"]
-    lines += [f"    record.{name} = {name}" for name in names] + ["    return record"]
-    space: dict[str, Any] = {"new": new, "record_type": _type_of(cls), "__name__": cls.__module__}
-    exec(compile("\n".join(lines), module.__file__ or "<record>", "exec"), space)  # names of fields only
-    function = space["constructor"]
-    function.__qualname__ = f"{cls.__qualname__}.constructor"
-    hints = hints_of(cls)
-    function.__annotations__ = {name: hints[name] for name in names} | {"return": cls}
-    _constructors[cls] = Kernel(function, typed=True)
-    return _constructors[cls]
+    def __init__(self, record: type[Record]):
+        names, module = record.numba_fields, sys.modules.get(record.__module__)
+        lines = [f"def constructor({', '.join(names)}):", "    record = new(record_type)"]
+        lines += [f"    record.{name} = {name}" for name in names] + ["    return record"]
+        space: dict[str, Any] = {"__name__": record.__module__}
+        file = getattr(module, "__file__", None) or "<record>"
+        exec(compile("\n".join(lines), file, "exec"), space)  # names of fields only
+        function = space["constructor"]
+        function.__qualname__ = f"{record.__qualname__}.constructor"
+        function.__annotations__ = dict.fromkeys((*names, "return"), Any)
+        super().__init__(function, typed=True)
+        self.record = record
+
+    @cached_property
+    def signature(self) -> Any:
+        """The signature of Numba, from the annotations of the record, which can be resolved when it is first used."""
+        from numba.experimental.structref import new
+
+        self.function.__globals__.update(new=new, record_type=self.record.numba_type())
+        hints = hints_of(self.record)
+        return self.record.numba_type()(*(numba_type(hints[name]) for name in self.record.numba_fields))

@@ -21,8 +21,6 @@ ALL = "simnav"
 _EQUATIONS = ("simnav.sensors.gnss_observation", "simnav.sensors.observation", "simnav.world.depth_grid")
 #: A window finds the chain of its model in a registry, and names none.
 _CHAINS = ("simnav.estimators.solvers.window", "simnav.estimators.models.chains")
-#: The step of a filter with an adaptation refers to the rules of all adaptations. A filter without any never calls it.
-_STEP = "simnav.estimators.adaptations.adaptive_step"
 
 
 def reachable_kernels(modules: Iterable[str]) -> list[Kernel[..., Any]]:
@@ -53,22 +51,15 @@ def _imported(name: str) -> str:
 
 def _reached(modules: Iterable[str]) -> set[str]:
     """Modules of simnav, and those that their contents come from."""
-    found = _with_contents(set(modules), {_STEP})
-    rules = {rule.__module__ for rule in getattr(sys.modules.get(_STEP), "RULES", ())}
-    return _with_contents({*found, _STEP}) if found & rules else found
-
-
-def _with_contents(found: set[str], without: Iterable[str] = ()) -> set[str]:
-    """Modules, and those that their contents come from, but for those that are left out."""
-    todo, seen = list(found), found.union(without)
+    found = set(modules)
+    todo = list(found)
     while todo:
         module = todo.pop()
         contents = list(vars(sys.modules.get(module, sys)).values())
         contents += [sys.modules.get(_CHAINS[1], sys)] if module == _CHAINS[0] else []
         for value in contents:
             name = value.__name__ if isinstance(value, types.ModuleType) else getattr(value, "__module__", None)
-            if isinstance(name, str) and name.startswith("simnav.") and name not in seen:
+            if isinstance(name, str) and name.startswith("simnav.") and name not in found:
                 found.add(name)
-                seen.add(name)
                 todo.append(name)
     return found
