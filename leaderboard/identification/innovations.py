@@ -13,7 +13,7 @@ from simnav.estimator import UnsuitableScenario
 from simnav.estimators.models.suitable import Suitable
 from simnav.estimators.solvers.innovations import InnovationKeeper
 from simnav.log.table import LogError
-from simnav.recording import Recording
+from simnav.recording import Recording, packets
 from simnav.types import Array, Estimate, InitialState, Instruments, Measurements
 
 from .assumption import Assumption
@@ -24,6 +24,8 @@ __all__ = ["Innovations", "Likelihood", "StateValues", "Stream", "common", "run_
 _HEADING_SIGMA = radians(0.01)
 #: Stamps that differ by less belong to one reading [s].
 _SAME = 1e-6
+#: Steps of the filter [s]; its innovations are those of the row, whose steps are shorter.
+_STEP = 60.0
 #: Sets of delays of which the steps are kept.
 _KEPT = 8
 
@@ -142,7 +144,8 @@ class Likelihood:
         self._known = {(): self._cut(self._recording)}
 
     def _cut(self, recording: Recording) -> list[Measurements]:
-        return [m for m in recording.steps() if m.time <= self._until + _SAME]
+        data, last = recording.data, min(self._until, recording.data.end)
+        return list(packets(data, np.append(np.arange(data.start + _STEP, last, _STEP), last)))
 
     def _delayed(self, delays: Mapping[str, float]) -> list[Measurements]:
         """The steps with stamps put back; those of the last few sets of delays are kept."""

@@ -1,0 +1,92 @@
+"""What a log does not tell, in sentences."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import combinations
+
+import numpy as np
+
+from simnav.scenario import Scenario
+from simnav.types import Array
+
+from .choices import fitted_aids
+from .estimates import Estimated
+from .innovations import Innovations
+from .search import Fitted
+
+__all__ = ["neighbours", "remarks"]
+
+#: From this correlation on two estimates cannot be told apart.
+_ALIKE = 0.9
+#: From this correlation of neighbours on, innovations are not white.
+_NOT_WHITE = 0.2
+
+
+def neighbours(white: Array) -> float:
+    """The mean correlation of neighbouring innovations over the components, from (n, d) normalised ones."""
+    centred = white - white.mean(axis=0)
+    return float(np.mean(np.sum(centred[1:] * centred[:-1], axis=0) / np.maximum(np.sum(centred**2, axis=0), 1e-300)))
+
+
+def remarks(scenario: Scenario, fitted: Fitted, found: Sequence[Estimated], after: Innovations) -> list[str]:
+    """Sentences about an error model.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        The scenario.
+    fitted : Fitted
+        The fit.
+    found : sequence of Estimated
+        Its estimates.
+    after : mapping of str to Stream
+        Innovations with the datasheets to use.
+    """
+    said = []
+    sizes = [e for e in found if not e.told and not e.constant]
+    said += [f"{e.label}: the log does not tell it; anything up to {e.high:.2g} fits" for e in sizes]
+    constants = dict[str, list[str]]()
+    for e in found:
+        if not e.told and e.constant:
+            constants.setdefault(e.key, []).append(e.part)
+    for key, parts in constants.items():
+        which = f" ({', '.join(parts)})" if all(parts) else ""
+        said.append(f"{key}{which}: the motion of this log does not tell it, so the scenario's figure stays")
+    said += [f"{a} and {b} cannot be told apart (correlation {r:+.2f})" for a, b, r in _alike(fitted)]
+    for name, sheet in fitted.maximum.assumed.instruments.items():
+        if sheet.bias_instability.any() and name in after:
+            said.append(f"{name}: a coloured error fits; a constant bias is in it, because ekf has one state for both")
+        if name in after and abs(r := neighbours(after[name].white)) > _NOT_WHITE:
+            said.append(f"{name}: neighbouring innovations still correlate by {r:.2f}; the model of its error lacks something")
+    fits = fitted_aids(scenario, fitted.maximum.assumed)
+    others = [n for n in fitted.maximum.assumed.instruments if n not in fits]
+    if others:
+        said.append(
+            f"{', '.join(others)}: used as the datasheet says, not fitted (channels, readings that state their sigma, "
+            "or figures of their own)"
+        )
+    return said
+
+
+def _alike(fitted: Fitted) -> list[tuple[str, str, float]]:
+    """Pairs of numbers that correlate."""
+    maximum, states = fitted.maximum, fitted.states
+    names = [p.label for p in maximum.parameters]
+    pairs = _pairs(names, maximum.covariance)
+    labels, rows = [], list[int]()
+    for label in states.value:
+        at = states.place[label]
+        labels += [f"{label} [{k}]" if at.stop - at.start > 1 else label for k in range(at.stop - at.start)]
+        rows += range(at.start, at.stop)
+    return pairs + _pairs(labels, states.covariance[np.ix_(rows, rows)])
+
+
+def _pairs(names: Sequence[str], covariance: Array) -> list[tuple[str, str, float]]:
+    sigma = np.sqrt(np.maximum(covariance.diagonal(), 1e-300))
+    correlation = covariance / np.outer(sigma, sigma)
+    return [
+        (names[i], names[j], float(correlation[i, j]))
+        for i, j in combinations(range(len(names)), 2)
+        if abs(correlation[i, j]) > _ALIKE
+    ]
