@@ -15,7 +15,7 @@ from simnav.types import KINDS, Datasheet, ImuDatasheet, TriadDatasheet
 
 from .assumption import HEADING, Assumption, Parameter
 
-__all__ = ["coloured", "fitted_aids", "heading", "in_run", "places", "sizes", "with_wide_states"]
+__all__ = ["coloured", "fitted_aids", "heading", "in_run", "places", "sizes", "with_wide_states", "without_bias"]
 
 #: Prior standard deviation of the logarithm of a size, and of a correlation time.
 _SIZE, _TIME = 3.0, 2.0
@@ -124,13 +124,19 @@ def coloured(scenario: Scenario, assumed: Assumption) -> Iterator[tuple[str, lis
     for name, sheet in fitted_aids(scenario, assumed).items():
         if not _has(scenario.aids[name], "bias_instability") or sheet.bias_instability.any():
             continue
+        white = without_bias(assumed, name)
         changes = [
-            {"bias_instability": part * sheet.sigma, "correlation_time": time, "bias": np.zeros(len(sheet.bias))}
+            {"bias_instability": part * sheet.sigma, "correlation_time": time}
             for part in _PARTS
             for time in _BEGINS
             if time > 2.0 / sheet.rate
         ]
-        yield name, [assumed.with_sheet(name, lambda s, c=c: replace(s, **c)) for c in changes]  # type: ignore[misc]
+        yield name, [white.with_sheet(name, lambda s, c=c: replace(s, **c)) for c in changes]  # type: ignore[misc]
+
+
+def without_bias(assumed: Assumption, name: str) -> Assumption:
+    """The assumption that an instrument has no constant bias."""
+    return assumed.with_sheet(name, lambda s: replace(s, bias=np.zeros(len(s.bias))))
 
 
 def in_run(assumed: Assumption) -> Iterator[tuple[str, Assumption]]:

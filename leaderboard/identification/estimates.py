@@ -112,9 +112,9 @@ class _Constant:
 
 def _constants(fitted: Fitted) -> Iterator[_Constant]:
     instruments, states = fitted.maximum.assumed.instruments, fitted.states
-    for label, value in states.value.items():
+    for label, place in states.place.items():
         name, _, figure = label.partition(".")
-        sigma = states.sigma(label)
+        value, sigma = states.value[place], states.sigma(label)
         if name in instruments and figure in ("bias", "scale", "misalignment"):
             sheet = instruments[name]
             prior = np.broadcast_to(getattr(sheet, figure), value.shape)
@@ -206,9 +206,9 @@ def replaced(scenario: Scenario, fitted: Fitted) -> dict[str, dict[str, Any]]:
             if s < _TOLD_PART * p.spread and abs(value) > _CONTRADICTS * sigma:
                 table.put(HEADING, "error", {2: float(np.hypot(value, s))})
         elif p.figure == "delay":
-            if scenario.log is not None and p.instrument in scenario.log.instruments and abs(x) > _CORRECTED * s:
-                before = getattr(scenario.log.instruments[p.instrument], "offset", 0.0)
-                table.put(p.instrument, "delay", before - value)
+            channel = None if scenario.log is None else scenario.log.instruments.get(p.instrument)
+            if channel is not None and channel.source == "file" and abs(value) > _CORRECTED * s:
+                table.put(p.instrument, "delay", channel.offset - value)
         elif p.figure == "lever_arm":
             if s < _TOLD_PART * p.spread and abs(p.value(x) - _stated(scenario, p)) > _CORRECTED * s:
                 table.put(p.instrument, p.figure, {p.components[0]: value})

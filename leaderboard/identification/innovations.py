@@ -80,16 +80,16 @@ class StateValues:
 
     Attributes
     ----------
-    value : mapping of str to (k,) array
-        Blocks of states, ``INSTRUMENT.NAME``, SI units.
     place : mapping of str to slice
-        Where they are in the covariance.
-    covariance : (n, n) array
-        Of all states.
+        Where the blocks of states, ``INSTRUMENT.NAME``, are in the rest.
+    value : (m,) array
+        The states, SI units.
+    covariance : (m, m) array
+        Their covariance.
     """
 
-    value: Mapping[str, Array]
     place: Mapping[str, slice]
+    value: Array
     covariance: Array
 
     def sigma(self, label: str) -> Array:
@@ -184,10 +184,16 @@ class Likelihood:
         }  # fmt: skip
 
     def states(self, assumed: Assumption) -> StateValues:
-        """The constant errors at the end of the run."""
+        """The constant errors at the end of the run; their covariance is that under the assumption."""
         solver, estimate = self.run(assumed)
         values = {n: v for n, (v, _) in (estimate.states or {}).items()}
-        return StateValues(values, {n: solver.model.blocks.at[n] for n in values}, solver.covariance.copy())
+        rows, place = list[int](), dict[str, slice]()
+        for name, value in values.items():
+            place[name] = slice(len(rows), len(rows) + len(value))
+            at = solver.model.blocks.at[name]
+            rows += range(at.start, at.stop)
+        everything = np.concatenate([*values.values(), np.empty(0)])
+        return StateValues(place, everything, solver.covariance[np.ix_(rows, rows)])
 
 
 def common(first: Stream, second: Stream) -> tuple[Array, Array]:

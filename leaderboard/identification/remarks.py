@@ -21,6 +21,7 @@ __all__ = ["neighbours", "remarks"]
 _ALIKE = 0.9
 #: From this correlation of neighbours on, innovations are not white.
 _NOT_WHITE = 0.2
+_AXES = ("forward", "starboard", "down")
 
 
 def neighbours(white: Array) -> float:
@@ -73,16 +74,9 @@ def _alike(fitted: Fitted) -> list[tuple[str, str, float]]:
     """Pairs of numbers that correlate."""
     maximum, states = fitted.maximum, fitted.states
     names = [p.label for p in maximum.parameters]
-    pairs = _pairs(names, maximum.covariance)
-    labels, rows = [], list[int]()
-    for label in states.value:
-        at = states.place[label]
-        labels += [f"{label} [{k}]" if at.stop - at.start > 1 else label for k in range(at.stop - at.start)]
-        rows += range(at.start, at.stop)
-    return pairs + _pairs(labels, states.covariance[np.ix_(rows, rows)])
-
-
-def _pairs(names: Sequence[str], covariance: Array) -> list[tuple[str, str, float]]:
+    for label, at in states.place.items():
+        names += [f"{label} ({k})" if at.stop - at.start > 1 else label for k in _AXES[: at.stop - at.start]]
+    covariance = np.block([[maximum.covariance, fitted.cross], [fitted.cross.T, states.covariance]])
     sigma = np.sqrt(np.maximum(covariance.diagonal(), 1e-300))
     correlation = covariance / np.outer(sigma, sigma)
     return [

@@ -13,9 +13,9 @@ from simnav.leaderboard.figures.innovation_figure import InnovationPanel, innova
 from simnav.leaderboard.ranking import tables
 from simnav.leaderboard.results.shown import Shown
 from simnav.log.table import LogError
+from simnav.recording import Recording
 from simnav.scenario import Scenario
 from simnav.scenario.writing import toml_text
-from simnav.source import record
 
 from .assumption import Assumption
 from .estimates import Estimated, estimates, replaced
@@ -138,15 +138,15 @@ class Identification(Shown):
         return innovation_figure(panels, f"{self.scenario}: innovations before and after")
 
 
-def identify(scenario: Scenario, seed: int = 0, until: float | None = None) -> Identification:
+def identify(scenario: Scenario, recording: Recording, until: float | None = None) -> Identification:
     """Fit the error model of a log.
 
     Parameters
     ----------
     scenario : Scenario
-        With a ``[log]``, or simulated.
-    seed : int
-        Number of the recording, or seed of the run.
+        With a ``[log]``, or simulated; with its values drawn (`Scenario.drawn`).
+    recording : Recording
+        One of the scenario.
     until : float, optional
         Readings after this time are not used [s]. Default: 1200 s.
 
@@ -155,8 +155,6 @@ def identify(scenario: Scenario, seed: int = 0, until: float | None = None) -> I
     LogError
         If the log has too few readings, or the plain filter cannot run on it.
     """
-    recording = record(scenario, seed)
-    drawn = scenario.drawn(seed)
     seconds = min(recording.duration, _LONGEST if until is None else until)
     likelihood, given = Likelihood(recording, seconds), Assumption(recording.instruments)
     before = likelihood.innovations(given, heading=False)
@@ -165,13 +163,13 @@ def identify(scenario: Scenario, seed: int = 0, until: float | None = None) -> I
         raise LogError(
             f"{scenario.id}: the filter used {readings} readings in {seconds:g} s; an error model needs {_LEAST} or more"
         )
-    fitted = search(drawn, likelihood, given)
-    found, changes = estimates(drawn, fitted), replaced(drawn, fitted)
-    table = _with(drawn.to_toml(), changes, drawn)
+    fitted = search(scenario, likelihood, given)
+    found, changes = estimates(scenario, fitted), replaced(scenario, fitted)
+    table = _with(scenario.to_toml(), changes, scenario)
     to_use = Scenario.from_toml(table, source=f"the identified {scenario.id}")
     shift = {n: d for n, d in fitted.maximum.assumed.delays.items() if f"log.instruments.{n}" in changes}
     after = likelihood.innovations(Assumption(to_use.instruments_sheet(), shift), heading=False)
-    said = remarks(drawn, fitted, found, after)
+    said = remarks(scenario, fitted, found, after)
     if seconds < recording.duration and until is None:
         said.append(f"of {recording.duration:g} s the first {seconds:g} s were used; --until takes another length")
     return Identification(scenario.id, seconds, found, said, before, after, changes, table)

@@ -17,7 +17,7 @@ from simnav.scenario import Scenario
 from simnav.types import Array
 
 from . import choices
-from .assumption import Assumption, Parameter
+from .assumption import Assumption, Parameter, with_all
 from .innovations import Likelihood, StateValues
 from .scoring import Maximum, log_likelihood, maximise
 
@@ -40,14 +40,14 @@ class Fitted:
     maximum : Maximum
         Sizes, lever arms, delays and heading.
     states : StateValues
-        Biases, scale factors and mountings.
-    priors : Assumption
-        With the sigmas that these had.
+        Biases, scale factors and mountings, with what is not known of the former in their covariance.
+    cross : (p, m) array
+        Covariance of the numbers of the maximum and the states.
     """
 
     maximum: Maximum
     states: StateValues
-    priors: Assumption
+    cross: Array
 
 
 def search(scenario: Scenario, likelihood: Likelihood, given: Assumption) -> Fitted:
@@ -80,7 +80,20 @@ def search(scenario: Scenario, likelihood: Likelihood, given: Assumption) -> Fit
         *(_at(p, assumed) for p in others),
     ]
     found = maximise(likelihood, assumed, everything)
-    return Fitted(found, likelihood.states(found.assumed), found.assumed)
+    return _with_states(likelihood, found, assumed)
+
+
+def _with_states(likelihood: Likelihood, found: Maximum, begun: Assumption) -> Fitted:
+    """The states at a maximum. Each of its numbers moves them: to first order that adds to their covariance."""
+    states = likelihood.states(found.assumed)
+    jacobian = np.zeros((len(found.x), len(states.value)))
+    for i, parameter in enumerate(found.parameters):
+        beside = found.x.copy()
+        beside[i] += parameter.step
+        moved = likelihood.states(with_all(begun, found.parameters, beside))
+        jacobian[i] = (moved.value - states.value) / parameter.step
+    cross = found.covariance @ jacobian
+    return Fitted(found, replace(states, covariance=states.covariance + jacobian.T @ cross), cross)
 
 
 def _at(parameter: Parameter, assumed: Assumption) -> Parameter:
@@ -101,8 +114,10 @@ def _coloured(scenario: Scenario, likelihood: Likelihood, assumed: Assumption) -
         imu = ("gyroscope", "accelerometer")
         for name, begins in choices.coloured(scenario, assumed):
             best = max(begins, key=lambda a: log_likelihood(likelihood.innovations(a)))
+            # A wide prior of a bias costs some likelihood, which is no sign of colour.
+            white = log_likelihood(likelihood.innovations(choices.without_bias(assumed, name)))
             looked = maximise(likelihood, best, choices.sizes(scenario, best, (name, *imu)), _LOOK)
-            found.append((looked.log_likelihood - value - _COLOURED, looked))
+            found.append((looked.log_likelihood - max(value, white) - _COLOURED, looked))
         for name, begin in choices.in_run(assumed):
             looked = maximise(likelihood, begin, choices.sizes(scenario, begin, imu), _LOOK)
             found.append((looked.log_likelihood - value - _IN_RUN, looked))
