@@ -55,9 +55,7 @@ class KeptInnovation(NamedTuple):
 
 
 @kernel(passed=True)
-def correct_and_keep(
-    dynamics: Dynamics, choice: Choice, readings: Readings, k: int, prediction: Prediction
-) -> float:
+def correct_and_keep(dynamics: Dynamics, choice: Choice, readings: Readings, k: int, prediction: Prediction) -> float:
     """As `simnav.estimators.solvers.filter_step.correct`; the innovation goes to row k of ``choice.last``."""
     d, row = prediction.innovation.size, choice.last[k]
     spread = np.empty((d, d))

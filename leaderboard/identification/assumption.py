@@ -69,6 +69,9 @@ class Parameter:
         Whether it is above zero, and fitted as a logarithm.
     part : str
         What the components are called; empty for all.
+    step : float
+        Step of the derivatives; 0: a usual one. Where it is given, they are central differences: the delay of a reading
+        moves it to other samples of the IMU, with other noise, which is in neither side more than in the other.
     """
 
     instrument: str
@@ -78,6 +81,7 @@ class Parameter:
     spread: float
     size: bool = True
     part: str = ""
+    step: float = 0.0
 
     @property
     def label(self) -> str:
@@ -85,9 +89,11 @@ class Parameter:
         return f"{self.instrument}.{self.figure}" + (f" ({self.part})" if self.part else "")
 
     @property
-    def step(self) -> float:
-        """Step of the derivatives by the number that is fitted."""
-        return _STEP if self.size else _PART * self.spread
+    def steps(self) -> tuple[float, float]:
+        """Where the two runs of a derivative by the number that is fitted are."""
+        if self.step:
+            return -self.step, self.step
+        return 0.0, _STEP if self.size else _PART * self.spread
 
     def value(self, x: float) -> float:
         """The value in SI units, from what is fitted: for a size, the logarithm of its ratio to the first value."""

@@ -21,6 +21,8 @@ __all__ = ["coloured", "fitted_aids", "heading", "in_run", "places", "sizes", "w
 _SIZE, _TIME = 3.0, 2.0
 #: Prior standard deviations: lever arm [m], delay [s]; of the heading at the start at least [rad].
 _ARM, _DELAY, _HEADING = 2.0, 0.5, radians(3.0)
+#: Step of the derivatives by a delay, without an IMU, and the least with one: a sample of it [s].
+_DELAY_STEP, _LEAST_STEP = 0.05, 0.005
 #: The smallest size to begin with [SI units]: of readings, of gyroscopes and of accelerometers.
 _LEAST = 1e-4
 _LEAST_OF: dict[str, tuple[float, float]] = {"gyroscope": (1e-6, 1e-7), "accelerometer": (1e-5, 1e-5)}
@@ -152,14 +154,15 @@ def in_run(assumed: Assumption) -> Iterator[tuple[str, Assumption]]:
 
 def places(scenario: Scenario, assumed: Assumption) -> list[Parameter]:
     """Lever arms and delays of the instruments."""
-    found = []
+    found, imu = [], assumed.instruments.imu
+    step = _DELAY_STEP if imu is None else max(_LEAST_STEP, 1.0 / imu.rate)
     for name, sheet in fitted_aids(scenario, assumed).items():
         if _has(scenario.aids[name], "lever_arm"):
             for k, axis in enumerate(("forward", "starboard", "down")):
                 first = float(sheet.lever_arm[k])
                 found.append(Parameter(name, "lever_arm", (k,), first, _ARM, size=False, part=axis))
         if sheet.equation and sheet.equation != WATER_SPEED:
-            found.append(Parameter(name, "delay", (), 0.0, _DELAY, size=False))
+            found.append(Parameter(name, "delay", (), 0.0, _DELAY, size=False, step=step))
     return found
 
 

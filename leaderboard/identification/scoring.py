@@ -113,19 +113,20 @@ def _slope(
     """(p,) slope and (p, p) information of the logarithm of the likelihood."""
     count = len(parameters)
     slope, information = np.zeros(count), np.zeros((count, count))
-    moved = []
-    for i, parameter in enumerate(parameters):
-        beside = x.copy()
-        beside[i] += parameter.step
-        moved.append(likelihood.innovations(with_all(assumed, parameters, beside)))
+    sides = [
+        [found if not h else likelihood.innovations(with_all(assumed, parameters, x + h * unit)) for h in p.steps]
+        for p, unit in zip(parameters, np.eye(count), strict=True)
+    ]
     for name, stream in found.items():
         v, s, w = stream.value, stream.covariance, stream.inverse
         by_value, by_spread = np.zeros((count, *v.shape)), np.zeros((count, *s.shape))
         for i, parameter in enumerate(parameters):
-            if name in moved[i]:
-                here, there = common(stream, moved[i][name])
-                by_value[i, here] = (moved[i][name].value[there] - v[here]) / parameter.step
-                by_spread[i, here] = (moved[i][name].covariance[there] - s[here]) / parameter.step
+            for side, h in zip(sides[i], parameter.steps, strict=True):
+                if name in side and side[name] is not stream:
+                    here, there = common(stream, side[name])
+                    share = np.sign(h) / (parameter.steps[1] - parameter.steps[0])
+                    by_value[i, here] += share * (side[name].value[there] - v[here])
+                    by_spread[i, here] += share * (side[name].covariance[there] - s[here])
         weighted = np.einsum("nij,nj->ni", w, v)
         relative = np.einsum("nij,pnjk->pnik", w, by_spread)
         slope += -np.einsum("ni,pni->p", weighted, by_value)

@@ -88,10 +88,10 @@ def _with_states(likelihood: Likelihood, found: Maximum, begun: Assumption) -> F
     states = likelihood.states(found.assumed)
     jacobian = np.zeros((len(found.x), len(states.value)))
     for i, parameter in enumerate(found.parameters):
-        beside = found.x.copy()
-        beside[i] += parameter.step
+        beside, step = found.x.copy(), parameter.steps[1]
+        beside[i] += step
         moved = likelihood.states(with_all(begun, found.parameters, beside))
-        jacobian[i] = (moved.value - states.value) / parameter.step
+        jacobian[i] = (moved.value - states.value) / step
     cross = found.covariance @ jacobian
     return Fitted(found, replace(states, covariance=states.covariance + jacobian.T @ cross), cross)
 

@@ -104,7 +104,11 @@ def simulated(seed: int) -> tuple[Scenario, Recording, dict[tuple[str, str], flo
     plane, axes = ("horizontal", "vertical"), ("forward", "starboard", "down")
     white, slow = times(0.2, 0.8) * np.array([1.0, 1.6]), times(0.8, 2.5) * np.array([1.0, 1.6])
     time = times(8.0, 40.0)
-    sheets["gnss"] |= {"sigma_m": [white[0], *white], "bias_instability_m": [slow[0], *slow], "correlation_time_s": time}
+    sheets["gnss"] |= {
+        "sigma_m": [white[0], *white],
+        "bias_instability_m": [slow[0], *slow],
+        "correlation_time_s": time,
+    }
     put("instruments.gnss", "sigma_m", plane, white)
     put("instruments.gnss", "bias_instability_m", plane, slow)
     put("instruments.gnss", "correlation_time_s", ("",), time)
@@ -130,7 +134,11 @@ def simulated(seed: int) -> tuple[Scenario, Recording, dict[tuple[str, str], flo
     put("instruments.gyrocompass", "bias_deg", ("",), off)
     gyro, force = times(0.1, 0.6), times(60.0, 400.0)
     turning, pull = rng.normal(0.0, 5.0, 3), rng.normal(0.0, 400.0, 3)
-    sheets["imu"]["gyroscope"] |= {"bias_deg_h": 0.0, "fixed_bias_deg_h": turning.tolist(), "random_walk_deg_sqrt_h": gyro}
+    sheets["imu"]["gyroscope"] |= {
+        "bias_deg_h": 0.0,
+        "fixed_bias_deg_h": turning.tolist(),
+        "random_walk_deg_sqrt_h": gyro,
+    }
     sheets["imu"]["accelerometer"] |= {"bias_ug": 0.0, "fixed_bias_ug": pull.tolist(), "random_walk_ug_sqrt_hz": force}
     put("instruments.imu.gyroscope", "bias_deg_h", axes, turning)
     put("instruments.imu.gyroscope", "random_walk_deg_sqrt_h", ("",), gyro)
