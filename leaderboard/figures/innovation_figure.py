@@ -1,4 +1,4 @@
-"""The figure of innovations before and after a fit, from plain arrays: whether they are white, and of the right size."""
+"""The figure of innovations before and after a fit, from plain arrays: are they white, and of the right size?"""
 
 from __future__ import annotations
 

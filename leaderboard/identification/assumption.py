@@ -1,4 +1,4 @@
-"""What a fit assumes of a log: datasheets, delays of instruments and the heading at the start; and what may vary in it."""
+"""What a fit assumes of a log: datasheets, delays of instruments, heading at the start; and what may vary in it."""
 
 from __future__ import annotations
 

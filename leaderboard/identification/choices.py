@@ -141,15 +141,15 @@ def without_bias(assumed: Assumption, name: str) -> Assumption:
     return assumed.with_sheet(name, lambda s: replace(s, bias=np.zeros(len(s.bias))))
 
 
-def in_run(assumed: Assumption) -> Iterator[tuple[str, Assumption]]:
-    """The triads of an IMU that may have an in-run bias but have none yet, each with an assumption to begin with."""
+def in_run(assumed: Assumption) -> Iterator[Assumption]:
+    """For each triad of an IMU that may have an in-run bias but has none yet, an assumption to begin with."""
     imu = assumed.instruments.imu
     for name, (_, least) in _LEAST_OF.items() if imu is not None else ():
         triad: TriadDatasheet = getattr(imu, name)
         if not triad.bias_instability:
             time = min(triad.correlation_time, _IN_RUN_TIME)
             changed = replace(triad, bias_instability=10.0 * least, correlation_time=time)
-            yield name, assumed.with_imu(lambda i, n=name, c=changed: replace(i, **{n: c}))  # type: ignore[misc]
+            yield assumed.with_imu(lambda i, n=name, c=changed: replace(i, **{n: c}))  # type: ignore[misc]
 
 
 def places(scenario: Scenario, assumed: Assumption) -> list[Parameter]:

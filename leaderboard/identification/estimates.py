@@ -213,11 +213,11 @@ def replaced(scenario: Scenario, fitted: Fitted) -> dict[str, dict[str, Any]]:
             if s < _TOLD_PART * p.spread and abs(p.value(x) - _stated(scenario, p)) > _CORRECTED * s:
                 table.put(p.instrument, p.figure, {p.components[0]: value})
         elif p.figure in ("bias_instability", "correlation_time") or s < _TOLD_SIZE or _outside(scenario, p, x, s):
-            table.put(p.instrument, p.figure, {k: value for k in p.components} if p.components else value)
+            table.put(p.instrument, p.figure, dict.fromkeys(p.components, value) if p.components else value)
     for name, sheet in sheets.items():
-        if name in scenario.aids and sheet.bias_instability.any() and "bias" in type(scenario.aids[name]).model_fields:
-            if np.any(scenario.aids[name].figure("bias")):
-                table.put(name, "bias", dict.fromkeys(range(len(sheet.bias)), 0.0))
+        aid = scenario.aids.get(name)
+        if aid is not None and sheet.bias_instability.any() and np.any(aid.figure("bias")):
+            table.put(name, "bias", dict.fromkeys(range(len(sheet.bias)), 0.0))
     for name in _TRIADS:
         if sheets.imu is not None and any(p.instrument == name and p.figure == "bias_instability" for p, _, _ in found):
             table.put(name, "correlation_time", getattr(sheets.imu, name).correlation_time)

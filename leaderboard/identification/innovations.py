@@ -8,6 +8,7 @@ from functools import cached_property
 from math import inf, radians
 
 import numpy as np
+from numpy.typing import NDArray
 
 from simnav.estimator import UnsuitableScenario
 from simnav.estimators.models.suitable import Suitable
@@ -51,7 +52,7 @@ class Stream:
     @cached_property
     def inverse(self) -> Array:
         """(n, d, d) inverses of the covariances."""
-        return np.linalg.inv(self.covariance)
+        return np.asarray(np.linalg.inv(self.covariance), dtype=np.float64)
 
     @cached_property
     def nis(self) -> Array:
@@ -141,7 +142,7 @@ class Likelihood:
         streams = {n: replace(s.as_delivered(), arrival=np.empty(0)) for n, s in data.aids.items()}
         self._recording = replace(recording, data=replace(data, aids=streams))
         self._until, self.start = until, recording.start
-        self._known = {(): self._cut(self._recording)}
+        self._known: dict[tuple[tuple[str, float], ...], list[Measurements]] = {(): self._cut(self._recording)}
 
     def _cut(self, recording: Recording) -> list[Measurements]:
         data, last = recording.data, min(self._until, recording.data.end)
@@ -163,7 +164,7 @@ class Likelihood:
         return self._cut(replace(self._recording, data=replace(data, aids=aids)))
 
     def run(self, assumed: Assumption, heading: bool = True) -> tuple[InnovationKeeper, Estimate]:
-        """The filter and its last estimate (`run_filter`); ``heading``: with the assumed heading at the start in place of its sigma."""
+        """The filter and its last estimate; ``heading``: with the assumed heading at the start, and hardly a sigma."""
         start = self.start
         if heading:
             attitude, covariance = start.attitude.copy(), start.covariance.copy()
@@ -186,20 +187,21 @@ class Likelihood:
     def states(self, assumed: Assumption) -> StateValues:
         """The constant errors at the end of the run; their covariance is that under the assumption."""
         solver, estimate = self.run(assumed)
+        blocks = solver.model.blocks  # type: ignore[attr-defined]  # both models of `Suitable` have them
         values = {n: v for n, (v, _) in (estimate.states or {}).items()}
         rows, place = list[int](), dict[str, slice]()
         for name, value in values.items():
             place[name] = slice(len(rows), len(rows) + len(value))
-            at = solver.model.blocks.at[name]
+            at = blocks.at[name]
             rows += range(at.start, at.stop)
         everything = np.concatenate([*values.values(), np.empty(0)])
         return StateValues(place, everything, solver.covariance[np.ix_(rows, rows)])
 
 
-def common(first: Stream, second: Stream) -> tuple[Array, Array]:
+def common(first: Stream, second: Stream) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     """Masks of the readings of two streams that both have."""
     a, b = np.round(first.time / _SAME).astype(np.int64), np.round(second.time / _SAME).astype(np.int64)
     if len(a) == len(b) and (a == b).all():
-        every = np.ones(len(a), np.bool_)
+        every: NDArray[np.bool_] = np.ones(len(a), np.bool_)
         return every, every
     return np.isin(a, b), np.isin(b, a)

@@ -59,9 +59,7 @@ def remarks(scenario: Scenario, fitted: Fitted, found: Sequence[Estimated], afte
         if sheet.bias_instability.any() and name in after:
             said.append(f"{name}: a coloured error fits; a constant bias is in it, because ekf has one state for both")
         if name in after and abs(r := neighbours(after[name].white)) > _NOT_WHITE:
-            said.append(
-                f"{name}: neighbouring innovations still correlate by {r:.2f}; the model of its error lacks something"
-            )
+            said.append(f"{name}: neighbouring innovations still correlate by {r:.2f}; its model lacks something")
     fits = fitted_aids(scenario, fitted.maximum.assumed)
     others = [n for n in fitted.maximum.assumed.instruments if n not in fits]
     if others:

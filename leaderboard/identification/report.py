@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -161,7 +161,7 @@ def identify(scenario: Scenario, recording: Recording, until: float | None = Non
     readings = sum(len(s.time) for s in before.values())
     if readings < _LEAST:
         raise LogError(
-            f"{scenario.id}: the filter used {readings} readings in {seconds:g} s; an error model needs {_LEAST} or more"
+            f"{scenario.id}: the filter used {readings} readings in {seconds:g} s; {_LEAST} or more are needed"
         )
     fitted = search(scenario, likelihood, given)
     found, changes = estimates(scenario, fitted), replaced(scenario, fitted)

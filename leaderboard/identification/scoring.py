@@ -103,7 +103,7 @@ def maximise(
         if not moved:
             break
         slope, information = _slope(likelihood, assumed, parameters, x, found)
-    covariance = np.linalg.inv(information + np.diag(weight))
+    covariance: Array = np.asarray(np.linalg.inv(information + np.diag(weight)), dtype=np.float64)
     return Maximum(tuple(parameters), x, covariance, value, with_all(assumed, parameters, x))
 
 

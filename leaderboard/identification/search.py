@@ -8,7 +8,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -118,7 +117,7 @@ def _coloured(scenario: Scenario, likelihood: Likelihood, assumed: Assumption) -
             white = log_likelihood(likelihood.innovations(choices.without_bias(assumed, name)))
             looked = maximise(likelihood, best, choices.sizes(scenario, best, (name, *imu)), _LOOK)
             found.append((looked.log_likelihood - max(value, white) - _COLOURED, looked))
-        for name, begin in choices.in_run(assumed):
+        for begin in choices.in_run(assumed):
             looked = maximise(likelihood, begin, choices.sizes(scenario, begin, imu), _LOOK)
             found.append((looked.log_likelihood - value - _IN_RUN, looked))
         gain, best_found = max(found, key=lambda pair: pair[0], default=(-1.0, None))

@@ -21,6 +21,7 @@ from simnav.recording import Recording
 from simnav.scenario import Scenario
 from simnav.scenario.reading import parse
 from simnav.source import record
+from simnav.types import Array
 
 __all__ = ["TOLD", "main", "simulated"]
 
@@ -82,8 +83,8 @@ rate_hz = 1.0
 sigma_deg = 0.3
 """
 
-#: Keys of constant errors in the truth, and the name of the figure of the estimates.
-_LOG, _G = "log.instruments", 9.80665e-6
+#: Table of the delays among the estimates.
+_LOG = "log.instruments"
 
 
 def simulated(seed: int) -> tuple[Scenario, Recording, dict[tuple[str, str], float]]:
@@ -104,11 +105,8 @@ def simulated(seed: int) -> tuple[Scenario, Recording, dict[tuple[str, str], flo
     plane, axes = ("horizontal", "vertical"), ("forward", "starboard", "down")
     white, slow = times(0.2, 0.8) * np.array([1.0, 1.6]), times(0.8, 2.5) * np.array([1.0, 1.6])
     time = times(8.0, 40.0)
-    sheets["gnss"] |= {
-        "sigma_m": [white[0], *white],
-        "bias_instability_m": [slow[0], *slow],
-        "correlation_time_s": time,
-    }
+    sheets["gnss"] |= {"sigma_m": [white[0], *white], "bias_instability_m": [slow[0], *slow]}
+    sheets["gnss"]["correlation_time_s"] = time
     put("instruments.gnss", "sigma_m", plane, white)
     put("instruments.gnss", "bias_instability_m", plane, slow)
     put("instruments.gnss", "correlation_time_s", ("",), time)
@@ -134,12 +132,9 @@ def simulated(seed: int) -> tuple[Scenario, Recording, dict[tuple[str, str], flo
     put("instruments.gyrocompass", "bias_deg", ("",), off)
     gyro, force = times(0.1, 0.6), times(60.0, 400.0)
     turning, pull = rng.normal(0.0, 5.0, 3), rng.normal(0.0, 400.0, 3)
-    sheets["imu"]["gyroscope"] |= {
-        "bias_deg_h": 0.0,
-        "fixed_bias_deg_h": turning.tolist(),
-        "random_walk_deg_sqrt_h": gyro,
-    }
-    sheets["imu"]["accelerometer"] |= {"bias_ug": 0.0, "fixed_bias_ug": pull.tolist(), "random_walk_ug_sqrt_hz": force}
+    triads = sheets["imu"]["gyroscope"], sheets["imu"]["accelerometer"]
+    triads[0].update(bias_deg_h=0.0, fixed_bias_deg_h=turning.tolist(), random_walk_deg_sqrt_h=gyro)
+    triads[1].update(bias_ug=0.0, fixed_bias_ug=pull.tolist(), random_walk_ug_sqrt_hz=force)
     put("instruments.imu.gyroscope", "bias_deg_h", axes, turning)
     put("instruments.imu.gyroscope", "random_walk_deg_sqrt_h", ("",), gyro)
     put("instruments.imu.accelerometer", "bias_ug", axes, pull)
@@ -168,24 +163,23 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument("--runs", type=int, default=24)
     parser.add_argument("--seed", type=int, default=0)
     chosen = parser.parse_args(arguments)
-    rows: dict[str, list[tuple[bool, bool, float]]] = {}
+    rows: dict[str, list[Array]] = {}
     missing = 0
     for seed in range(chosen.seed, chosen.seed + chosen.runs):
         told, recording, true = simulated(seed)
-        found = identify(told, recording)
-        compared = list(_compared(found, true))
+        compared = list(_compared(identify(told, recording), true))
         missing += len(true) - len(compared)
-        for label, known, inside, error in compared:
-            rows.setdefault(label, []).append((known, inside, error))
+        for label, *fit in compared:
+            rows.setdefault(label, []).append(np.array(fit, dtype=np.float64))
         outside = [f"{label} ({error:+.1f})" for label, _, inside, error in compared if not inside]
         print(f"seed {seed}: {len(compared)} figures, outside: {', '.join(outside) or 'none'}", flush=True)
     print(f"\n{'figure':58s} fits told inside  mean error in half intervals")
     for label, fits in rows.items():
-        known, inside, error = (np.array(x, dtype=np.float64) for x in zip(*fits, strict=True))
-        print(f"{label:58s} {len(fits):4d} {int(known.sum()):4d} {inside.mean():6.2f}  {error.mean():+.2f}")
-    every = np.array([fit[:2] for fits in rows.values() for fit in fits], dtype=np.bool_)
-    print(f"all: {every[:, 1].mean():.3f} of {len(every)}; told by the log: {every[every[:, 0], 1].mean():.3f} of "
-          f"{int(every[:, 0].sum())}; figures that were not found: {missing}")  # fmt: skip
+        known, inside, error = np.array(fits).T
+        print(f"{label:58s} {len(fits):4d} {known.sum():4.0f} {inside.mean():6.2f}  {error.mean():+.2f}")
+    known, inside, _ = np.concatenate([np.array(fits) for fits in rows.values()]).T
+    print(f"all: {inside.mean():.3f} of {len(inside)}; told by the log: {inside[known == 1.0].mean():.3f} of "
+          f"{known.sum():.0f}; figures that were not found: {missing}")  # fmt: skip
 
 
 if __name__ == "__main__":
