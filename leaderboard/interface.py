@@ -19,7 +19,7 @@ from .arguments import results_of, scenario_of, scenarios_of
 from .claiming import claim
 from .costing import bench, costs
 from .inspection import allan, bound, cite, merge, rank, realism, reproduce, rescore, seal, verify
-from .logs import align, export, inspect_log, recordings, score_files, tune_noise
+from .logs import align, export, identify, inspect_log, recordings, score_files, tune_noise
 from .requests import ScenarioLike, Scenarios
 from .running import campaign, check, evaluate, make, record, robustness, run, sweep, tune
 
@@ -40,6 +40,7 @@ __all__ = [
     "costs",
     "evaluate",
     "export",
+    "identify",
     "inspect_log",
     "make",
     "merge",

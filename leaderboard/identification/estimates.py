@@ -117,7 +117,7 @@ def _constants(fitted: Fitted) -> Iterator[_Constant]:
         value, sigma = states.value[place], states.sigma(label)
         if name in instruments and figure in ("bias", "scale", "misalignment"):
             sheet = instruments[name]
-            prior = np.broadcast_to(getattr(sheet, figure), value.shape)
+            prior = np.broadcast_to(np.atleast_1d(getattr(sheet, figure))[: len(value)], value.shape)
             if figure != "bias" or not sheet.bias_instability.any():
                 yield _Constant(name, figure, value, sigma, prior)
         elif figure.removesuffix("_bias") in _TRIADS:

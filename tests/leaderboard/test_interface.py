@@ -148,7 +148,7 @@ CALLS: dict[str, tuple[list[str], Callable[[], Any]]] = {
 
 #: Commands whose calls are compared where their own tests are: they take minutes, or need what another one makes.
 ELSEWHERE = {"claim", "merge", "reference", "reproduce", "rescore", "robustness", "seal", "submit", "tune", "verify"}
-ELSEWHERE |= {"inspect", "realism", "align", "tune-noise", "recordings", "export", "score"}
+ELSEWHERE |= {"inspect", "realism", "align", "tune-noise", "identify", "recordings", "export", "score"}
 ELSEWHERE |= {"show", "train anfis"}
 ELSEWHERE |= {"standard run", "standard check", "standard audit", "standard draw", "standard publish"}
 
@@ -213,6 +213,7 @@ OF_THE_RESULT = {
     "sweep": {"plot"},
     "robustness": {"plot"},
     "claim": {"plot"},
+    "identify": {"plot", "output"},
     "bench": {"every", "output"},  # of all rows: simnav.costs
     "bound": {"csv"},
     "align": {"plot"},
