@@ -153,11 +153,11 @@ def in_run(assumed: Assumption) -> Iterator[Assumption]:
 
 
 def places(scenario: Scenario, assumed: Assumption) -> list[Parameter]:
-    """Lever arms and delays of the instruments."""
+    """Delays of the instruments, and with an IMU their lever arms."""
     found, imu = [], assumed.instruments.imu
     step = _DELAY_STEP if imu is None else max(_LEAST_STEP, 1.0 / imu.rate)
     for name, sheet in fitted_aids(scenario, assumed).items():
-        if _has(scenario.aids[name], "lever_arm"):
+        if _has(scenario.aids[name], "lever_arm") and imu is not None:
             for k, axis in enumerate(("forward", "starboard", "down")):
                 first = float(sheet.lever_arm[k])
                 found.append(Parameter(name, "lever_arm", (k,), first, _ARM, size=False, part=axis))

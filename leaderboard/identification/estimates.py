@@ -20,7 +20,7 @@ from simnav.types import Array
 from .assumption import HEADING, Parameter
 from .search import Fitted
 
-__all__ = ["Estimated", "estimates", "replaced"]
+__all__ = ["AXES", "Estimated", "estimates", "replaced"]
 
 #: Half a 95 % interval, in standard deviations.
 _HALF = 1.96
@@ -29,10 +29,12 @@ _HALF = 1.96
 _TOLD_SIZE, _TOLD_PART = 1.0, 0.5
 #: A lever arm or delay is corrected from so many standard deviations on.
 _CORRECTED = 3.0
+#: A number of which so much of the prior is left is not in the model at all.
+_ABSENT = 0.95
 #: A heading at the start that is so many sigmas off contradicts the scenario.
 _CONTRADICTS = 2.0
 _TRIADS = ("gyroscope", "accelerometer")
-_AXES = ("forward", "starboard", "down")
+AXES = ("forward", "starboard", "down")
 
 
 @dataclass(frozen=True)
@@ -129,12 +131,16 @@ def _constants(fitted: Fitted) -> Iterator[_Constant]:
 
 def _parts(constant: _Constant) -> tuple[str, ...]:
     n = len(constant.value)
-    return _AXES[:n] if n > 1 else ("",)
+    return AXES[:n] if n > 1 else ("",)
 
 
 def _fitted(fitted: Fitted) -> Iterator[tuple[Parameter, float, float]]:
+    """The numbers that were fitted, with their standard deviations; those that the filter does not use are left out."""
     maximum = fitted.maximum
-    yield from zip(maximum.parameters, maximum.x.tolist(), np.sqrt(maximum.covariance.diagonal()).tolist(), strict=True)
+    sigma = np.sqrt(maximum.covariance.diagonal()).tolist()
+    for parameter, x, s in zip(maximum.parameters, maximum.x.tolist(), sigma, strict=True):
+        if s < _ABSENT * parameter.spread or not parameter.size:
+            yield parameter, x, s
 
 
 def estimates(scenario: Scenario, fitted: Fitted) -> list[Estimated]:
@@ -199,6 +205,7 @@ def replaced(scenario: Scenario, fitted: Fitted) -> dict[str, dict[str, Any]]:
     """The figures of a scenario that the fit replaces: by path of the table, then by key, in the units of the keys."""
     table, sheets = _Table(scenario), fitted.maximum.assumed.instruments
     found = list(_fitted(fitted))
+    changed = {p.instrument for p, _, _ in found if p.figure == "bias_instability"}
     for p, x, s in found:
         value = p.value(x)
         if p.instrument == HEADING:
@@ -207,13 +214,14 @@ def replaced(scenario: Scenario, fitted: Fitted) -> dict[str, dict[str, Any]]:
                 table.put(HEADING, "error", {2: float(np.hypot(value, s))})
         elif p.figure == "delay":
             channel = None if scenario.log is None else scenario.log.instruments.get(p.instrument)
-            if channel is not None and channel.source == "file" and abs(value) > _CORRECTED * s:
+            if channel is not None and channel.source == "file" and _corrects(fitted, p, value, s):
                 table.put(p.instrument, "delay", channel.offset - value)
         elif p.figure == "lever_arm":
-            if s < _TOLD_PART * p.spread and abs(p.value(x) - _stated(scenario, p)) > _CORRECTED * s:
+            if s < _TOLD_PART * p.spread and _corrects(fitted, p, value - _stated(scenario, p), s):
                 table.put(p.instrument, p.figure, {p.components[0]: value})
-        elif p.figure in ("bias_instability", "correlation_time") or s < _TOLD_SIZE or _outside(scenario, p, x, s):
-            table.put(p.instrument, p.figure, dict.fromkeys(p.components, value) if p.components else value)
+        elif s < _TOLD_SIZE or p.instrument in changed or _outside(scenario, p, x, s):
+            used = value if s < _TOLD_SIZE else p.value(x + s)  # not too small where the log allows more
+            table.put(p.instrument, p.figure, dict.fromkeys(p.components, used) if p.components else used)
     for name, sheet in sheets.items():
         aid = scenario.aids.get(name)
         if aid is not None and sheet.bias_instability.any() and np.any(aid.figure("bias")):
@@ -224,6 +232,11 @@ def replaced(scenario: Scenario, fitted: Fitted) -> dict[str, dict[str, Any]]:
     for c in _constants(fitted):
         _put_constant(scenario, table, c)
     return table.finished()
+
+
+def _corrects(fitted: Fitted, p: Parameter, difference: float, s: float) -> bool:
+    """Whether a lever arm or delay differs by more than chance, of an instrument whose model suffices."""
+    return p.instrument not in fitted.coloured and abs(difference) > _CORRECTED * s
 
 
 def _stated(scenario: Scenario, p: Parameter) -> float:

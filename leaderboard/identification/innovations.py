@@ -19,7 +19,7 @@ from simnav.types import Array, Estimate, InitialState, Instruments, Measurement
 
 from .assumption import Assumption
 
-__all__ = ["Innovations", "Likelihood", "StateValues", "Stream", "common", "run_filter"]
+__all__ = ["Innovations", "Likelihood", "StateValues", "Stream", "common", "neighbours", "run_filter"]
 
 #: Sigma of the heading at the start, where the heading itself is fitted [rad].
 _HEADING_SIGMA = radians(0.01)
@@ -196,6 +196,12 @@ class Likelihood:
             rows += range(at.start, at.stop)
         everything = np.concatenate([*values.values(), np.empty(0)])
         return StateValues(place, everything, solver.covariance[np.ix_(rows, rows)])
+
+
+def neighbours(white: Array) -> float:
+    """The mean correlation of neighbouring innovations over the components, from (n, d) normalised ones."""
+    centred = white - white.mean(axis=0)
+    return float(np.mean(np.sum(centred[1:] * centred[:-1], axis=0) / np.maximum(np.sum(centred**2, axis=0), 1e-300)))
 
 
 def common(first: Stream, second: Stream) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:

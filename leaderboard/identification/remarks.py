@@ -8,29 +8,18 @@ from itertools import combinations
 import numpy as np
 
 from simnav.scenario import Scenario
-from simnav.types import Array
 
 from .choices import fitted_aids
-from .estimates import Estimated
-from .innovations import Innovations
+from .estimates import AXES, Estimated
 from .search import Fitted
 
-__all__ = ["neighbours", "remarks"]
+__all__ = ["remarks"]
 
 #: From this correlation on two estimates cannot be told apart.
 _ALIKE = 0.9
-#: From this correlation of neighbours on, innovations are not white.
-_NOT_WHITE = 0.2
-_AXES = ("forward", "starboard", "down")
 
 
-def neighbours(white: Array) -> float:
-    """The mean correlation of neighbouring innovations over the components, from (n, d) normalised ones."""
-    centred = white - white.mean(axis=0)
-    return float(np.mean(np.sum(centred[1:] * centred[:-1], axis=0) / np.maximum(np.sum(centred**2, axis=0), 1e-300)))
-
-
-def remarks(scenario: Scenario, fitted: Fitted, found: Sequence[Estimated], after: Innovations) -> list[str]:
+def remarks(scenario: Scenario, fitted: Fitted, found: Sequence[Estimated]) -> list[str]:
     """Sentences about an error model.
 
     Parameters
@@ -41,8 +30,6 @@ def remarks(scenario: Scenario, fitted: Fitted, found: Sequence[Estimated], afte
         The fit.
     found : sequence of Estimated
         Its estimates.
-    after : mapping of str to Stream
-        Innovations with the datasheets to use.
     """
     said = []
     sizes = [e for e in found if not e.told and not e.constant]
@@ -56,10 +43,13 @@ def remarks(scenario: Scenario, fitted: Fitted, found: Sequence[Estimated], afte
         said.append(f"{key}{which}: the motion of this log does not tell it, so the scenario's figure stays")
     said += [f"{a} and {b} cannot be told apart (correlation {r:+.2f})" for a, b, r in _alike(fitted)]
     for name, sheet in fitted.maximum.assumed.instruments.items():
-        if sheet.bias_instability.any() and name in after:
+        if sheet.bias_instability.any():
             said.append(f"{name}: a coloured error fits; a constant bias is in it, because ekf has one state for both")
-        if name in after and abs(r := neighbours(after[name].white)) > _NOT_WHITE:
-            said.append(f"{name}: neighbouring innovations still correlate by {r:.2f}; its model lacks something")
+        if name in fitted.coloured:
+            said.append(
+                f"{name}: neighbouring innovations still correlate by {fitted.coloured[name]:.2f}, so its model lacks "
+                "something: its intervals are too narrow, and its lever arm and delay stay as they are"
+            )
     fits = fitted_aids(scenario, fitted.maximum.assumed)
     others = [n for n in fitted.maximum.assumed.instruments if n not in fits]
     if others:
@@ -74,13 +64,17 @@ def _alike(fitted: Fitted) -> list[tuple[str, str, float]]:
     """Pairs of numbers that correlate."""
     maximum, states = fitted.maximum, fitted.states
     names = [p.label for p in maximum.parameters]
+    known = fitted.maximum.assumed.instruments
+    used = list(range(len(names)))
     for label, at in states.place.items():
-        names += [f"{label} ({k})" if at.stop - at.start > 1 else label for k in _AXES[: at.stop - at.start]]
+        if label.partition(".")[0] in (*known, known.imu.name if known.imu else ""):
+            used += range(len(maximum.x) + at.start, len(maximum.x) + at.stop)
+        names += [f"{label} ({k})" if at.stop - at.start > 1 else label for k in AXES[: at.stop - at.start]]
     covariance = np.block([[maximum.covariance, fitted.cross], [fitted.cross.T, states.covariance]])
     sigma = np.sqrt(np.maximum(covariance.diagonal(), 1e-300))
     correlation = covariance / np.outer(sigma, sigma)
     return [
         (names[i], names[j], float(correlation[i, j]))
-        for i, j in combinations(range(len(names)), 2)
+        for i, j in combinations(used, 2)
         if abs(correlation[i, j]) > _ALIKE
     ]

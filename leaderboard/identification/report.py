@@ -19,8 +19,8 @@ from simnav.scenario.writing import toml_text
 
 from .assumption import Assumption
 from .estimates import Estimated, estimates, replaced
-from .innovations import Innovations, Likelihood
-from .remarks import neighbours, remarks
+from .innovations import Innovations, Likelihood, neighbours
+from .remarks import remarks
 from .scoring import log_likelihood
 from .search import search
 
@@ -169,7 +169,7 @@ def identify(scenario: Scenario, recording: Recording, until: float | None = Non
     to_use = Scenario.from_toml(table, source=f"the identified {scenario.id}")
     shift = {n: d for n, d in fitted.maximum.assumed.delays.items() if f"log.instruments.{n}" in changes}
     after = likelihood.innovations(Assumption(to_use.instruments_sheet(), shift), heading=False)
-    said = remarks(scenario, fitted, found, after)
+    said = remarks(scenario, fitted, found)
     if seconds < recording.duration and until is None:
         said.append(f"of {recording.duration:g} s the first {seconds:g} s were used; --until takes another length")
     return Identification(scenario.id, seconds, found, said, before, after, changes, table)

@@ -8,6 +8,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,7 +18,7 @@ from simnav.types import Array
 
 from . import choices
 from .assumption import Assumption, Parameter, with_all
-from .innovations import Likelihood, StateValues
+from .innovations import Likelihood, StateValues, neighbours
 from .scoring import Maximum, log_likelihood, maximise
 
 __all__ = ["Fitted", "search"]
@@ -26,6 +27,8 @@ __all__ = ["Fitted", "search"]
 _TRIES, _POOR = np.linspace(-2.5, 2.5, 11), np.radians(5.0)
 #: By so much a coloured error of an instrument, or an in-run bias of a triad, makes a log more likely.
 _COLOURED, _IN_RUN = 6.0, 3.0
+#: From this correlation of neighbours on, innovations are not white.
+_NOT_WHITE = 0.2
 #: Steps of scoring for a first look.
 _LOOK = 4
 
@@ -42,11 +45,14 @@ class Fitted:
         Biases, scale factors and mountings, with what is not known of the former in their covariance.
     cross : (p, m) array
         Covariance of the numbers of the maximum and the states.
+    coloured : mapping of str to float
+        Correlation of neighbouring innovations of the instruments where it is still large.
     """
 
     maximum: Maximum
     states: StateValues
     cross: Array
+    coloured: Mapping[str, float]
 
 
 def search(scenario: Scenario, likelihood: Likelihood, given: Assumption) -> Fitted:
@@ -92,7 +98,9 @@ def _with_states(likelihood: Likelihood, found: Maximum, begun: Assumption) -> F
         moved = likelihood.states(with_all(begun, found.parameters, beside))
         jacobian[i] = (moved.value - states.value) / step
     cross = found.covariance @ jacobian
-    return Fitted(found, replace(states, covariance=states.covariance + jacobian.T @ cross), cross)
+    correlations = {n: neighbours(s.white) for n, s in likelihood.innovations(found.assumed).items()}
+    coloured = {n: r for n, r in correlations.items() if abs(r) > _NOT_WHITE}
+    return Fitted(found, replace(states, covariance=states.covariance + jacobian.T @ cross), cross, coloured)
 
 
 def _at(parameter: Parameter, assumed: Assumption) -> Parameter:
