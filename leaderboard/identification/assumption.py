@@ -115,10 +115,10 @@ class Parameter:
         return replace(imu, **{self.instrument: replace(triad, **{self.figure: value})})  # type: ignore[arg-type]
 
     def _sheet(self, sheet: Datasheet, value: float) -> Datasheet:
-        new: float | Array = value
-        if self.components:
-            new = getattr(sheet, self.figure).copy()
-            new[list(self.components)] = value
+        if not self.components:
+            return replace(sheet, **{self.figure: value})  # type: ignore[arg-type]
+        new: Array = getattr(sheet, self.figure).copy()
+        new[list(self.components)] = value
         return replace(sheet, **{self.figure: new})  # type: ignore[arg-type]
 
 

@@ -256,7 +256,7 @@ def _put_constant(scenario: Scenario, table: _Table, c: _Constant) -> None:
     told = c.sigma < _TOLD_PART * c.prior
     size = np.hypot(c.value, c.sigma)
     stated = np.array([_now(spec, c.figure, (k,)) for k in range(len(told))])
-    if not told.any() or not (stated.any() or (told & (np.abs(c.value) > _HALF * c.sigma)).any()):
+    if not told.any():
         return
     if c.instrument in _TRIADS:
         common = float(np.sqrt(np.mean(size[told] ** 2)))

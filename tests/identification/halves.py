@@ -11,6 +11,7 @@ from __future__ import annotations
 import argparse
 
 import numpy as np
+from scipy.stats import chi2
 
 from simnav.estimator import make
 from simnav.geometry.earth import relative_position
@@ -22,19 +23,24 @@ from simnav.trial import run_trial
 __all__ = ["horizontal", "main"]
 
 
-def horizontal(scenario: Scenario, seed: int, since: float) -> tuple[float, float, float]:
-    """Horizontal RMSE [m], mean horizontal NEES over its expectation, and the share of epochs in the 95 % region."""
+def horizontal(scenario: Scenario, seed: int, since: float) -> list[tuple[float, float, float]]:
+    """Of horizontal position and velocity: RMSE [m], [m/s], NEES over its expectation, share in the 95 % region."""
     recording = record(scenario, seed)
     trial = run_trial(make("ekf" if recording.instruments.imu is not None else "ship-ekf"), recording)
     truth = recording.data.truth
     late = truth.time > since
-    error = relative_position(trial.position, truth.position)[late, :2]
     assert trial.covariance is not None
-    covariance = trial.covariance[late, :2, :2]
-    nees = np.einsum("ni,nij,nj->n", error, np.linalg.inv(covariance), error)
-    known = np.isfinite(nees)
-    rmse = float(np.sqrt(np.mean(np.sum(error[known] ** 2, axis=1))))
-    return rmse, float(nees[known].mean()) / 2.0, float(np.mean(nees[known] < 5.991))
+    found = []
+    for first, error in (
+        (0, relative_position(trial.position, truth.position)),
+        (3, trial.velocity - truth.velocity),
+    ):
+        error, part = error[late, :2], slice(first, first + 2)
+        nees = np.einsum("ni,nij,nj->n", error, np.linalg.inv(trial.covariance[late, part, part]), error)
+        known = np.isfinite(nees)
+        rmse = float(np.sqrt(np.mean(np.sum(error[known] ** 2, axis=1))))
+        found.append((rmse, float(nees[known].mean()) / 2.0, float(np.mean(nees[known] < chi2.ppf(0.95, 2)))))
+    return found
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -48,10 +54,12 @@ def main(arguments: list[str] | None = None) -> None:
     found = identify(before, record(before, 0), half)
     print(found.toml)
     after = Scenario.from_toml(found.table, source="fitted")
-    print("recording   RMSE [m] before, after   NEES/2 before, after   in the 95 % region before, after")
+    print("recording               RMSE before, after   NEES/2 before, after   in the 95 % region before, after")
     for seed in range(chosen.others + 1):
-        pairs = zip(*(horizontal(s, seed, half if seed == 0 else 0.0) for s in (before, after)), strict=True)
-        print(f"{seed:9d}   " + "   ".join(f"{a:8.2f} {b:8.2f}   " for a, b in pairs), flush=True)
+        pairs = [horizontal(s, seed, half if seed == 0 else 0.0) for s in (before, after)]
+        for name, first, second in zip(("position", "velocity"), *pairs, strict=True):
+            figures = "   ".join(f"{a:8.3g} {b:8.3g}   " for a, b in zip(first, second, strict=True))
+            print(f"{seed:9d} {name}   {figures}", flush=True)
 
 
 if __name__ == "__main__":
