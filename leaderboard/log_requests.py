@@ -11,7 +11,10 @@ from simnav.leaderboard.campaign.options import PathLike
 from .calls import option, request
 from .requests import ScenarioLike, Scenarios
 
-__all__ = ["AlignRequest", "ExportRequest", "InspectRequest", "RecordingsRequest", "ScoreRequest", "TuneNoiseRequest"]
+__all__ = [
+    "AlignRequest", "ExportRequest", "IdentifyRequest", "InspectRequest", "RecordingsRequest", "ScoreRequest",
+    "TuneNoiseRequest",
+]  # fmt: skip
 
 _SCENARIO = "Name, versioned id, or path of a TOML file."
 _SCENARIO_MORE = "Or the `simnav.scenario.Scenario` itself."
@@ -94,6 +97,17 @@ class TuneNoiseRequest:
     seed: int = option(default=0, help="Number of the recording.", least=0)
     innovations: bool = option(
         "--innovations", default=False, help="Also those with which the innovations of a filter are as it expects."
+    )
+
+
+@request
+class IdentifyRequest:
+    """Fit the error model of a log's instruments, by maximum likelihood of the innovations of a filter over it."""
+
+    scenario: ScenarioLike = option(help=_SCENARIO, more=_SCENARIO_MORE, argument=True, metavar="SCENARIO")
+    seed: int = option(default=0, help="Number of the recording; of a simulated scenario the seed.", least=0)
+    until: float | None = option(
+        "--until", default=None, cli=float | None, metavar="SECONDS", help="Use the log up to here. Default: 1200 s."
     )
 
 

@@ -10,10 +10,11 @@ from typing import TYPE_CHECKING
 from simnav.leaderboard.results.errors import RequestError, mistakes
 
 from .arguments import absolute, scenario_of, scenarios_of
-from .calls import call, whole_number
+from .calls import call, finite_number, whole_number
 from .log_requests import (
     AlignRequest,
     ExportRequest,
+    IdentifyRequest,
     InspectRequest,
     RecordingsRequest,
     ScoreRequest,
@@ -26,10 +27,11 @@ if TYPE_CHECKING:
     from simnav.log.noise_figures import Figure
     from simnav.scenario import Scenario
 
+    from .identification.report import Identification
     from .recordings import PublicRecordings
     from .single_run import ScoreReport
 
-__all__ = ["align", "export", "inspect_log", "recordings", "score_files", "tune_noise"]
+__all__ = ["align", "export", "identify", "inspect_log", "recordings", "score_files", "tune_noise"]
 
 
 @call(ScoreRequest)
@@ -219,6 +221,33 @@ def tune_noise(request: TuneNoiseRequest) -> list[Figure]:
     with mistakes(ValueError, OSError):
         found = noise_figures(scenario, align(scenario, seed), seed)
         return found + innovation_figures(scenario, seed) if request.innovations else found
+
+
+@call(IdentifyRequest)
+def identify(request: IdentifyRequest) -> Identification:
+    """Fit the error model of a log's instruments.
+
+    Returns
+    -------
+    simnav.leaderboard.identification.report.Identification
+        Estimates with 95 % intervals, what the log does not tell, innovations before and after, and the scenario with
+        the datasheets to use.
+
+    Raises
+    ------
+    RequestError
+        If the log cannot be used, or a filter cannot run on it.
+    """
+    from simnav.source import record
+
+    from .identification.report import identify
+
+    scenario, seed = scenario_of(request.scenario), whole_number("seed", request.seed, 0)
+    until = None if request.until is None else finite_number("until", request.until)
+    if until is not None and until <= 0.0:
+        raise RequestError(f"until = {until:g}: it should be a time of the log above 0 s")
+    with mistakes(ValueError, OSError):
+        return identify(scenario.drawn(seed), record(scenario, seed), until)
 
 
 def _recorded(given: str | Path | Scenario) -> Scenario:

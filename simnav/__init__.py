@@ -36,7 +36,7 @@ if TYPE_CHECKING:
         seal,
         verify,
     )
-    from simnav.leaderboard.logs import align, export, inspect_log, recordings, score_files, tune_noise
+    from simnav.leaderboard.logs import align, export, identify, inspect_log, recordings, score_files, tune_noise
     from simnav.leaderboard.publishing import (
         audit_standard,
         check_standard,
@@ -113,6 +113,7 @@ __all__ = [
     "draw_standard",
     "evaluate",
     "export",
+    "identify",
     "inspect_log",
     "load",
     "load_plugin",
@@ -195,7 +196,7 @@ _HOMES = {
         "seal",
         "verify",
     ),
-    "leaderboard.logs": ("align", "export", "inspect_log", "recordings", "score_files", "tune_noise"),
+    "leaderboard.logs": ("align", "export", "identify", "inspect_log", "recordings", "score_files", "tune_noise"),
     "leaderboard.recommending": ("recommend",),
     "leaderboard.results.errors": ("RequestError",),
     "leaderboard.running": ("campaign", "check", "evaluate", "make", "record", "robustness", "run", "sweep", "tune"),

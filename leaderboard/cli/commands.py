@@ -15,6 +15,7 @@ from simnav.leaderboard.error_requests import AllanRequest, RealismRequest
 from simnav.leaderboard.log_requests import (
     AlignRequest,
     ExportRequest,
+    IdentifyRequest,
     InspectRequest,
     RecordingsRequest,
     ScoreRequest,
@@ -216,6 +217,20 @@ class AlignCommand(AlignRequest):
 
 
 @request
+class IdentifyCommand(IdentifyRequest):
+    """Fit the error model of a log's instruments: noise, colour, bias, scale, mounting, lever arm, delay, heading.
+
+    It prints the estimates with 95 % intervals, what the log does not tell, and the figures of the datasheets to use.
+    """
+
+    _: KW_ONLY
+    plot: Path | None = option(
+        default=None, help="Write a figure of the innovations before and after: .png, .svg or .pdf."
+    )
+    output: Path | None = option("--output", "-o", default=None, help="Write the scenario to use to this TOML file.")
+
+
+@request
 class InspectCommand(InspectRequest):
     """Show what the files of a log hold, and write a scenario to begin with."""
 
@@ -356,6 +371,7 @@ GROUPS: Mapping[str, tuple[str, Mapping[str, tuple[type[Any], str]]]] = {
             "inspect": (InspectCommand, "inspect"),
             "align": (AlignCommand, "align"),
             "tune-noise": (TuneNoiseRequest, "tune_noise"),
+            "identify": (IdentifyCommand, "identify"),
             "allan": (AllanCommand, "allan"),
             "realism": (RealismCommand, "realism"),
             "recordings": (RecordingsRequest, "recordings"),

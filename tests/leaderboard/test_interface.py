@@ -150,7 +150,16 @@ CALLS: dict[str, tuple[list[str], Callable[[], Any]]] = {
 
 #: Commands whose calls are compared where their own tests are: they take minutes, or need what another one makes.
 ELSEWHERE = {"campaign merge", "campaign rescore", "campaign seal", "campaign verify", "robustness", "submit", "tune"}
-ELSEWHERE |= {"log inspect", "log realism", "log align", "log tune-noise", "log recordings", "export", "score"}
+ELSEWHERE |= {
+    "log inspect",
+    "log realism",
+    "log align",
+    "log tune-noise",
+    "log identify",
+    "log recordings",
+    "export",
+    "score",
+}
 ELSEWHERE |= {"paper claim", "paper reproduce", "paper train-anfis", "show", "dataset"}
 ELSEWHERE |= {f"standard {name}" for name in ("run", "check", "audit", "draw", "publish", "reference")}
 
@@ -215,6 +224,7 @@ OF_THE_RESULT = {
     "sweep": {"plot"},
     "robustness": {"plot"},
     "paper claim": {"plot"},
+    "log identify": {"plot", "output"},
     "bench": {"every", "output"},  # of all rows: simnav.costs
     "bound": {"csv"},
     "log align": {"plot"},
