@@ -105,7 +105,8 @@ class Recommendation(Shown):
     row, plain : Candidate or None
         The row that should be taken, and the plain row; None without evidence.
     as_good : tuple of Candidate
-        Rows that may be taken, too: no row is told from them and better. The cheapest first.
+        Rows that may be taken, too: no row is told from them and better. The cheapest first; where it is undecided,
+        the one with the smallest error.
     compared : int
         Number of rows that were compared.
     groups : tuple of TroubleGroup
@@ -193,7 +194,7 @@ def recommendation(
     plain = candidates.get(over.plain) or _candidate(found, over.plain, score, epoch)
     allowed = {n: c for n, c in candidates.items() if limit is None or c.milliseconds <= limit}
     if not allowed:
-        return none(f"no row with a stored cost takes {limit:g} ms or less")
+        return none("no row is ranked" if limit is None else f"no row with a stored cost takes {limit:g} ms or less")
     best = [c for c in allowed.values() if not allowed.keys() & set(c.result.worse_than)]
     better = [c for c in best if over.plain in c.result.better_than and not over.insufficient]
     decided = bool(better) or over.plain not in allowed
@@ -202,7 +203,7 @@ def recommendation(
     if better and row.result.scenarios_high < 1.0:
         confidence = "beyond these scenarios"
     rest = [c for c in better or best if c is not row]
-    rest.sort(key=lambda c: c.cost if better and math.isfinite(c.cost) else c.result.to_reference)
+    rest.sort(key=lambda c: (math.isnan(c.cost), c.cost) if better else (False, c.result.to_reference))
     return Recommendation(
         tuple(instruments), tuple(chosen), without, limit, confidence, over.insufficient, row, plain, tuple(rest),
         len(candidates), groups,

@@ -72,7 +72,8 @@ def _sure(answer: Recommendation, row: Candidate) -> list[str]:
     said = [f"The evidence is {scenarios} scenario{'s' * (scenarios != 1)} with {runs} each."]
     if answer.confidence == "undecided":
         why = f"they cannot be ordered, for {answer.why}" if answer.why else "that is what a test of all at once says"
-        said.append(f"None of {answer.compared} rows is told from the plain row and better: {why}.")
+        rows = f"{answer.compared} rows" if answer.limit is None else f"the rows within {answer.limit:g} ms"
+        said.append(f"None of {rows} is told from the plain row and better: {why}.")
     else:
         said.append(f"A test of {answer.compared} rows at once tells it from the plain row.")
     low, high = row.result.scenarios_low, row.result.scenarios_high

@@ -4,16 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
 from simnav.leaderboard.ranking import reference
+from simnav.leaderboard.ranking.ranking import rank
 from simnav.leaderboard.ranking.recommendation import Recommendation, recommendation
+from simnav.leaderboard.ranking.reports import StandardReport
 from simnav.leaderboard.ranking.track_runs import runs_of_tracks
 from simnav.leaderboard.ranking.trouble_profile import GroupRow, TrackProfile, profile_table, profiles
 from simnav.leaderboard.results.result import Result
+from simnav.leaderboard.site.report import SiteReport
 
 ROWS = ("oracle", "ekf", "robust", "vb-akf", "even", "poor", "bad")
 #: Errors of rows [m] in three scenarios with fixes that lie, and one with an outage. `robust` is good at lies and bad
@@ -99,6 +103,16 @@ def test_groups_that_separate_nobody_say_so_once() -> None:
     assert caption is not None
     assert caption.count(found.silence) == 1
     assert profile(made(ERRORS)).silence == ""
+
+
+def test_reports_have_the_profiles() -> None:
+    results = made(ERRORS)
+    site = SiteReport(Path("index.html"), results, rank(results), profiles=profiles(results))
+    (document,) = (p for p in site.to_dict()["profiles"] if p["track"] == "aided-ins")
+    assert [g["trouble"] for g in document["groups"]] == ["lying-fixes", "outage"]
+    titles = [table.title for table in site.shown()]
+    assert titles[-1] == "Aided INS: error beside the plain row's, by kind of trouble"
+    assert [p.track for p in StandardReport(results, site.ranking).profiles] == [p.track for p in site.profiles]
 
 
 # -- the choice ----------------------------------------------------------------------------------------------
