@@ -1,7 +1,7 @@
 """The estimates of a fit in the units of a scenario file, and the figures of datasheets that follow from them.
 
 A size that the log tells takes the place of the datasheet's. A constant error x with the standard deviation s is a
-state of the row, whose sigma in the datasheet becomes sqrt(x^2 + s^2). A lever arm or a delay that differs from the
+state of the row, whose sigma in the datasheet becomes sqrt(x^2 + s^2) where that is more. A lever arm or a delay that differs from the
 datasheet by three standard deviations or more is corrected.
 """
 
@@ -251,18 +251,17 @@ def _outside(scenario: Scenario, p: Parameter, x: float, s: float) -> bool:
 
 
 def _put_constant(scenario: Scenario, table: _Table, c: _Constant) -> None:
-    """The sigma of a constant error, of the components that the log tells."""
+    """The sigma of a constant error, of the components that the log tells: one small value makes no sigma smaller."""
     _, spec, _, _ = _place(scenario, c.instrument, c.figure)
-    told = c.sigma < _TOLD_PART * c.prior
+    stated = np.array([_now(spec, c.figure, (k,)) for k in range(len(c.value))])
     size = np.hypot(c.value, c.sigma)
-    stated = np.array([_now(spec, c.figure, (k,)) for k in range(len(told))])
-    if not told.any():
+    told = c.sigma < _TOLD_PART * c.prior
+    if c.instrument in _TRIADS and told.any():
+        size = np.full(len(size), np.sqrt(np.mean(size[told] ** 2)))
+    larger = told & (size > stated)
+    if not larger.any():
         return
-    if c.instrument in _TRIADS:
-        common = float(np.sqrt(np.mean(size[told] ** 2)))
-        if told.all() or common > stated[0]:
-            table.put(c.instrument, c.figure, common)
-    elif len(told) == 1:
+    if c.instrument in _TRIADS or len(size) == 1:
         table.put(c.instrument, c.figure, float(size[0]))
     else:
-        table.put(c.instrument, c.figure, {k: float(size[k]) for k in range(len(told)) if told[k]})
+        table.put(c.instrument, c.figure, {k: float(size[k]) for k in np.flatnonzero(larger).tolist()})
