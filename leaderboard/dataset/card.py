@@ -3,19 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
 
 from simnav.leaderboard.results.citation import citation
 from simnav.leaderboard.results.provenance import here
 from simnav.scenario import Scenario
 
-from .manifest import FILE, Manifest
+from .manifest import FILE, Manifest, SplitReport
 from .parts import PART
 from .schemas import schemas
 from .splits import FIRST_SEEDS, TEST
-
-if TYPE_CHECKING:
-    from .making import SplitReport
 
 __all__ = ["card"]
 

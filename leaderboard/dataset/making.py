@@ -16,29 +16,10 @@ from simnav.leaderboard.results.files import write_whole
 from simnav.scenario import Scenario
 
 from .card import card
-from .manifest import Manifest
+from .manifest import Manifest, SplitReport
 from .parts import WrittenPart, part_numbers, voyages_in, write_part
 
-__all__ = ["DatasetReport", "SplitReport", "make"]
-
-
-@dataclass(frozen=True)
-class SplitReport:
-    """A split of a data set.
-
-    Attributes
-    ----------
-    voyages : int
-        How many there are.
-    duration : float
-        Length of all of them together [s].
-    size : int
-        Of the files [bytes].
-    """
-
-    voyages: int
-    duration: float
-    size: int
+__all__ = ["DatasetReport", "make"]
 
 
 @dataclass(frozen=True)

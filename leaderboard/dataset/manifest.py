@@ -15,11 +15,30 @@ from simnav.simulation.version import SIMULATOR_VERSION
 
 from .splits import SPLITS, TEST, streams_of
 
-__all__ = ["FILE", "FORMAT", "Manifest"]
+__all__ = ["FILE", "FORMAT", "Manifest", "SplitReport"]
 
 #: Version of the files of a data set. It is increased when their form changes.
 FORMAT = 1
 FILE = "dataset.json"
+
+
+@dataclass(frozen=True)
+class SplitReport:
+    """A split of a data set.
+
+    Attributes
+    ----------
+    voyages : int
+        How many there are.
+    duration : float
+        Length of all of them together [s].
+    size : int
+        Of the files [bytes].
+    """
+
+    voyages: int
+    duration: float
+    size: int
 
 
 @dataclass(frozen=True)

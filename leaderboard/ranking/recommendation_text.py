@@ -4,15 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from typing import TYPE_CHECKING
 
 from . import tables
+from .recommended import Answer, Candidate
 from .summary import spread
 from .trouble_profile import BAD
 from .troubles import troubles, within
-
-if TYPE_CHECKING:
-    from .recommendation import Candidate, Recommendation
 
 __all__ = ["sentences"]
 
@@ -21,7 +18,7 @@ _TIMES = 2.0  # from this ratio on it is written as a multiple
 _WORDS = {4: "four", 5: "five", 6: "six", 7: "seven", 8: "eight", 9: "nine"}
 
 
-def sentences(answer: Recommendation) -> list[str]:
+def sentences(answer: Answer) -> list[str]:
     """The answer: which row and why, what it costs, how sure that is, where else it was run, and what is not known."""
     gaps = [_gap(answer)] if answer.without_evidence else []
     if answer.row is None or answer.plain is None:
@@ -37,7 +34,7 @@ def sentences(answer: Recommendation) -> list[str]:
     return [*said, *gaps]
 
 
-def _choice(answer: Recommendation, row: Candidate, plain: Candidate) -> str:
+def _choice(answer: Answer, row: Candidate, plain: Candidate) -> str:
     where = f"With {_listed(answer.troubles)}"
     if row is plain:
         return f"{where}, take `{row.estimator}`, the plain row: no row is shown to be better."
@@ -66,7 +63,7 @@ def _cost(row: Candidate, plain: Candidate) -> list[str]:
     return [f"It takes {tables.number(row.cost, 2)} times the processor time of `{plain.estimator}`, {time}."]
 
 
-def _sure(answer: Recommendation, row: Candidate) -> list[str]:
+def _sure(answer: Answer, row: Candidate) -> list[str]:
     scenarios = sum(len(g.scenarios) for g in answer.groups)
     runs = f"{spread(g.units for g in answer.groups)} {answer.groups[0].unit}s"
     said = [f"The evidence is {scenarios} scenario{'s' * (scenarios != 1)} with {runs} each."]
@@ -95,7 +92,7 @@ def _sure(answer: Recommendation, row: Candidate) -> list[str]:
     return said
 
 
-def _gap(answer: Recommendation) -> str:
+def _gap(answer: Answer) -> str:
     return f"No evidence for these instruments with: {', '.join(_titles(answer.without_evidence))}."
 
 

@@ -160,7 +160,7 @@ ELSEWHERE |= {
     "export",
     "score",
 }
-ELSEWHERE |= {"paper claim", "paper reproduce", "paper train-anfis", "show", "dataset"}
+ELSEWHERE |= {"paper claim", "paper reproduce", "paper train-anfis", "show", "dataset", "recommend"}
 ELSEWHERE |= {f"standard {name}" for name in ("run", "check", "audit", "draw", "publish", "reference")}
 
 
