@@ -1,8 +1,8 @@
 """The estimates of a fit in the units of a scenario file, and the figures of datasheets that follow from them.
 
 A size that the log tells takes the place of the datasheet's. A constant error x with the standard deviation s is a
-state of the row, whose sigma in the datasheet becomes sqrt(x^2 + s^2) where that is more. A lever arm or a delay that differs from the
-datasheet by three standard deviations or more is corrected.
+state of the row, whose sigma in the datasheet becomes sqrt(x^2 + s^2) where that is more. A lever arm or a delay that
+differs from the datasheet by three standard deviations or more is corrected.
 """
 
 from __future__ import annotations
