@@ -1,7 +1,7 @@
 """How long the compiler needs for the kernels, each without the kernels that it calls.
 
     python -m tests.benchmarks.compiling             # processor time of all kernels, and the longest
-    python -m tests.benchmarks.compiling --copies    # with a copy of each kernel in its callers, as Numba does by itself
+    python -m tests.benchmarks.compiling --copies    # with a copy of each kernel in its callers, as by Numba alone
 
 It compiles into an empty cache of its own, in one process.
 """
