@@ -102,7 +102,7 @@ class ShipChain(MovingChain):
     def observe(self, first: int, row: NDArray[np.int64], states: Columns, prefix: str, jacobian: Array) -> None:
         """As `Chain.observe`."""
         aids = self.aids
-        _linearise_aids(
+        _linearise_aids.unchecked(
             first, _Measured(row, aids["instrument"], aids["value"]), self._codes, self._aids,
             states[f"{prefix}position"], states[f"{prefix}x"], aids["residual"], jacobian,
         )  # fmt: skip

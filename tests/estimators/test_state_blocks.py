@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from simnav.environment import EstimatorAgent, NavigationEnv
-from simnav.estimator import find, make, names
+from simnav.estimator import find, make, names, unsuitable
 from simnav.estimators.bound import bound_of_run
 from simnav.estimators.models.inertial import InertialModel
 from simnav.estimators.models.inertial_chain import InertialChain
@@ -221,7 +221,11 @@ def test_the_bound_has_them(plugins, any_case):
 def test_other_rows_run_and_stay_honest(plugins, runs, row, any_case):
     """A model without calibration states counts them as noise, local filters have each their own."""
     for recording in recordings(runs, plugins, any_case)[:2]:
-        trial = run_trial(make(row), recording)
+        estimator = make(row)
+        trial = run_trial(estimator, recording)
+        if row == "gtsam-isam2" and unsuitable(estimator, recording.instruments):  # its factors know no such position
+            assert trial.status == "unsuitable"
+            continue
         assert trial.status == "ok", trial.reason
         e, P = errors(trial, recording), trial.covariance
         k = -1

@@ -76,11 +76,16 @@ def test_a_plug_in_that_is_refused_is_named(plugins, tmp_path):
 
 
 def test_who_leaves_an_instrument_out_is_named(plugins, tmp_path):
-    """GTSAM's factors are made from compiled equations: `simnav run` says that the beacon has none."""
+    """GTSAM's factors are made from compiled equations: the beacon has none. Without a fix nothing is left to it."""
     text = (plugins / "lagoon.toml").read_text().partition("[[fault]]")[0].replace("120.0", "4.0")
     for name in ("beacon.py", "echo.py"):
         (tmp_path / name).write_text((plugins / name).read_text())
-    (tmp_path / "short.toml").write_text(text)
-    words = " ".join(call("run", tmp_path / "short.toml", "-e", "ekf,gtsam-fixed-lag").stderr.split())
+    (tmp_path / "alone.toml").write_text(text)
+    (tmp_path / "short.toml").write_text(text + "[instruments.terrain_fix]\nrate_hz = 1.0\nsigma_m = 3.0\n")
+    alone, words = (
+        " ".join(call("run", tmp_path / name, "-e", "ekf,gtsam-fixed-lag").stderr.split())
+        for name in ("alone.toml", "short.toml")
+    )
+    assert "gtsam-fixed-lag: unsuitable: it uses no instrument that gives a position" in alone
     assert "gtsam-fixed-lag shows no innovation of transponder (beacon): most likely it leaves it out" in words
     assert "ekf shows" not in words

@@ -15,7 +15,9 @@ import simnav
 from simnav.environment.seeds import FIRST_TRAINING_SEED, training_seed
 from simnav.estimators.training import anfis_training
 from simnav.leaderboard import cli
+from simnav.leaderboard.campaign.entrant import Entrant
 from simnav.leaderboard.campaign.seal import read_seal
+from simnav.leaderboard.campaign.training_runs import require_unseen
 from simnav.leaderboard.dataset import manifest, parts
 from simnav.leaderboard.dataset.splits import FIRST_SEEDS, SPLITS
 from simnav.leaderboard.dataset.tables import from_tables, to_tables
@@ -208,18 +210,11 @@ def test_the_card_says_what_it_is(made):
     assert set(learned) == {"train", "validation"}
 
 
-def test_an_estimator_that_learned_from_it_is_not_scored_on_it(made, tmp_path):
-    class Learned(simnav.Estimator):
-        learned_from = tuple(map(tuple, json.loads((made / "dataset.json").read_text())["learned_from"].values()))
-
-        def reset(self, start, instruments):
-            self._start = start
-
-        def update(self, measurements):
-            return simnav.Estimate(measurements.end, self._start.position)
-
-    with pytest.raises(RequestError, match="has learned from the random streams of seed 3298534883328 of training-"):
-        simnav.evaluate(Learned, SHIPS, runs=1, seed=FIRST_SEEDS["validation"])
+def test_an_estimator_that_learned_from_it_is_not_scored_on_it(made):
+    ranges = tuple(map(tuple, json.loads((made / "dataset.json").read_text())["learned_from"].values()))
+    learned, first = Entrant("learned", {}, "learned", False, "", learned_from=ranges), FIRST_SEEDS["validation"]
+    with pytest.raises(RequestError, match=r"'learned' has learned from .* seed 3298534883328 of training-"):
+        require_unseen([learned], [SHIPS], range(first, first + 1))
 
 
 @pytest.mark.parametrize(

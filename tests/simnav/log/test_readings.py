@@ -73,10 +73,8 @@ WRONG = {
 
 
 #: One kind of mistake of each sort; with ``SIMNAV_ALL_READINGS=1`` all are tried, which takes five minutes of one core.
-SOME = (
-    "gyroscope z", "dvl forward, left, up", "dvl late", "reference: latitude for longitude", "compass anticlockwise",
-    "attitude of east, north, up",
-)  # fmt: skip
+SOME = "gyroscope z", "dvl late", "reference: latitude for longitude", "compass anticlockwise"
+ALL = bool(os.environ.get("SIMNAV_ALL_READINGS"))
 
 
 @pytest.fixture(scope="module")
@@ -96,7 +94,7 @@ def test_a_log_that_is_right(log):
     assert report.passed, report
 
 
-@pytest.mark.parametrize("wrong", WRONG if os.environ.get("SIMNAV_ALL_READINGS") else SOME)
+@pytest.mark.parametrize("wrong", WRONG if ALL else SOME)
 def test_a_wrong_reading_is_found_with_the_line_to_write(log, wrong):
     old, new, table, key, right = WRONG[wrong]
     assert old in SCENARIO
@@ -163,7 +161,7 @@ def test_correlated_samples_say_less():
     assert effective_samples(np.ones(4000)) < 5.0
 
 
-@pytest.mark.parametrize("name", ["car-kitti", "ship-nbp1406", "auv-akit"])
+@pytest.mark.parametrize("name", ["car-kitti", "ship-nbp1406", *(["auv-akit"] if ALL else [])])
 def test_the_recordings_of_the_catalogue_are_right(monkeypatch, name):
     monkeypatch.setenv("SIMNAV_DATA", str(DATA))
     if name != "car-kitti" and not (DATA / name.partition("-")[2]).is_dir():
