@@ -58,15 +58,6 @@ class Filter(Record):
 
 
 @kernel
-def norm(vector: Vector) -> float:
-    """The Euclidean norm of a vector."""
-    square = 0.0
-    for a in range(vector.size):
-        square += vector[a] * vector[a]
-    return sqrt(square)
-
-
-@kernel
 def filter_step(f: Filter, readings: Readings, samples: Samples, count: int, until: float) -> None:
     """Use the readings of a step, each at its own time, and propagate to the end of the step.
 
@@ -93,7 +84,10 @@ def filter_step(f: Filter, readings: Readings, samples: Samples, count: int, unt
         readings.inflation[k], readings.rejected[k], readings.wrong[k] = 1.0, False, False
         if not f.predict(f.dynamics, readings, k, prediction):
             continue
-        readings.size[k] = norm(prediction.innovation)
+        square = 0.0
+        for a in range(d):
+            square += prediction.innovation[a] * prediction.innovation[a]
+        readings.size[k] = sqrt(square)
         f.choose(f.choice, f.dynamics.covariance, readings, k, prediction)
         if readings.rejected[k]:
             continue
