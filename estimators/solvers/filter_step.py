@@ -18,7 +18,7 @@ from simnav.estimators.adaptations.choice import Choice
 from simnav.estimators.algebra.joseph import joseph_update
 from simnav.estimators.models.filtering import Dynamics, Prediction, Readings
 from simnav.estimators.models.propagation import Samples
-from simnav.kernel_types import Matrix, Vector
+from simnav.kernel_types import Matrix
 from simnav.records import Record
 
 __all__ = ["Filter", "correct", "filter_step", "inflate_all", "use_nominal"]
