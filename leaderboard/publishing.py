@@ -181,7 +181,7 @@ def submit(request: SubmitRequest) -> Submission:
     if confinement == "none":
         remarks.append("the results were computed without confinement, which no board accepts")
     tried = [r for r in found if r.tried]
-    failed = sum(r.outcome != "ok" for r in tried)
+    failed = sum(r.status != "ok" for r in tried)
     return Submission(target, digest, tuple(r.label for r in rows), name, len(found), failed, tuple(remarks))
 
 

@@ -136,8 +136,8 @@ class Summary:
 
     @property
     def failed(self) -> int:
-        """Results computed now that are failures (an unsuitable scenario is none)."""
-        return self.computed - self.statuses.get("ok", 0) - self.statuses.get("unsuitable", 0)
+        """Results computed now that are failures (an unsuitable scenario and a lost run are none)."""
+        return self.computed - sum(self.statuses.get(status, 0) for status in ("ok", "lost", "unsuitable"))
 
 
 def combined(summaries: Sequence[Summary]) -> Summary:

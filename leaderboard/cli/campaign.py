@@ -34,4 +34,4 @@ def show(out: Output, request: CampaignRequest) -> None:
     out.print(f"results: {summary.folder} ({summary.computed} computed, {summary.skipped} were there, "
               f"{tables.duration(summary.seconds)})",
               f"next:    simnav leaderboard {quote(str(summary.folder))}")  # fmt: skip
-    out.code = 0 if any(r.outcome == "ok" for r in report.results) else FAILED
+    out.code = 0 if any(r.status == "ok" for r in report.results) else FAILED

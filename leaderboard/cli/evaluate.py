@@ -27,5 +27,5 @@ def show(out: Output, request: EvaluateRequest) -> None:
         own = [r for r in report.results if r.estimator == label]
         if own and all(r.status == "unsuitable" for r in own):
             raise RequestError(f"{label} does not suit {', '.join(sorted(report.scenarios))}: {own[0].reason}")
-        if any(r.tried and r.outcome != "ok" for r in own):
+        if any(r.tried and r.status != "ok" for r in own):
             out.code = FAILED

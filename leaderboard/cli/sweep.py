@@ -34,7 +34,7 @@ def show(out: Output, request: SweepCommand) -> None:
     summary = made.summary
     out.print(f"results: {summary.folder} ({summary.computed} computed, {summary.skipped} were there, "
               f"{tables.duration(summary.seconds)})")  # fmt: skip
-    out.code = 0 if any(r.outcome == "ok" for r in made.results) else FAILED
+    out.code = 0 if any(r.status == "ok" for r in made.results) else FAILED
 
 
 def _draw(sweep: Sweep, path: Path) -> Path:

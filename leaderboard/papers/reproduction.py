@@ -254,15 +254,15 @@ def finding_of(
     names = tuple(labels[m] for m in methods)
     all_runs = [results.get((scenario, name), ()) for name in names]
     for name, runs in zip(names, all_runs, strict=True):
-        if not any(r.outcome == "ok" for r in runs):
+        if not any(r.status == "ok" for r in runs):
             reasons = [f"{name}: {r.why}" for r in runs] or [f"{name}: no run"]
             unsuitable = bool(runs) and not any(r.tried for r in runs)
             return Finding(table, row, None, "unsuitable" if unsuitable else "failed", reasons[0], names, len(runs))
-    failures = [sum(r.outcome != "ok" for r in runs) for runs in all_runs]
+    failures = [sum(r.status != "ok" for r in runs) for runs in all_runs]
     failed = sum(failures)
     scores = [row.score, (row.than_score or row.score) if isinstance(row, Gain) else row.score]
     values = [
-        {r.seed: value_of(r, score) for r in runs if r.outcome == "ok"}
+        {r.seed: value_of(r, score) for r in runs if r.status == "ok"}
         for runs, score in zip(all_runs, scores, strict=False)
     ]
     if isinstance(row, Gain):

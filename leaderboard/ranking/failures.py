@@ -1,4 +1,4 @@
-"""Runs that failed: how many of each kind, and a table with the first reason."""
+"""Runs that failed or are lost: how many of each kind, and a table with the first reason."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ def failures(results: Sequence[Result]) -> dict[str, int]:
 
 
 def failure_table(results: Sequence[Result]) -> list[Table]:
-    """A table with a line for each estimator, scenario and status that failed; none where nothing did."""
+    """A table with a line for each estimator, scenario and status that is not ok; none where there is none."""
     found: dict[tuple[str, str, str], list[Result]] = {}
     for r in _failed(results):
         found.setdefault((r.estimator, r.scenario, r.outcome), []).append(r)
     rows = [[*key, len(failed), failed[0].why] for key, failed in found.items()]
     columns = ["estimator", "scenario", "status", "runs", "reason of the first"]
-    return [tables.table("Failures", columns, rows, numeric=["runs"])] if rows else []
+    return [tables.table("Failed and lost runs", columns, rows, numeric=["runs"])] if rows else []
 
 
 def _failed(results: Sequence[Result]) -> list[Result]:

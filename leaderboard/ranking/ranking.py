@@ -4,9 +4,9 @@
 (`simnav.leaderboard.ranking.scenario_runs`). The score of a row is the geometric mean over its runs; each scenario
 counts the same (`simnav.leaderboard.ranking.statistics`). It never improves when a run gets worse or fails.
 
-**Failures count.** A failed run (error, timeout, out of memory, diverged, lost, invalid output, no position at all) has
-the ratio `FAILURE`; no run has more. An epoch without a position counts with the last position that was given. Nothing
-is dropped.
+**Failures count.** A failed run (error, timeout, out of memory, diverged, invalid output, no position at all) has the
+ratio `FAILURE`; no run has more. A lost run has its own error. An epoch without a position counts with the last
+position that was given. Nothing is dropped.
 
 **Tracks.** There are ranks within a track only. A row is ranked if it has run all scenarios of the track that are on
 the board, with all seeds that the track asks (`simnav.leaderboard.ranking.evidence`); otherwise it is incomplete. One

@@ -66,7 +66,7 @@ class Runs:
     @cached_property
     def good(self) -> list[Result]:
         """Those that ended well."""
-        return [r for r in self.results if r.outcome == "ok"]
+        return [r for r in self.results if r.status == "ok"]
 
     @property
     def failed(self) -> int:
@@ -93,7 +93,7 @@ class Runs:
 
     @cached_property
     def _good(self) -> NDArray[np.bool_]:
-        return np.array([r.outcome == "ok" for r in self.results], dtype=bool)
+        return np.array([r.status == "ok" for r in self.results], dtype=bool)
 
     def scores(self, name: str) -> Array:
         """One score of the runs that ended well; NaN where it does not apply."""

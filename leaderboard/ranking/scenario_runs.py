@@ -240,7 +240,7 @@ class ScenarioRuns:
 def _column(runs: Runs, score: str) -> dict[int, float]:
     """A score by seed; infinite where a run failed or does not have it."""
     pairs = zip(runs.results, runs.column(score).tolist(), strict=True)
-    return {r.seed: v if r.outcome == "ok" and math.isfinite(v) else math.inf for r, v in pairs if r.tried}
+    return {r.seed: v if r.status == "ok" and math.isfinite(v) else math.inf for r, v in pairs if r.tried}
 
 
 def _ratio(error: float, divisor: float) -> float:

@@ -155,7 +155,7 @@ def _row(runs: Runs, mine: Runs | None) -> StandingRow:
 
 def _errors(runs: Runs) -> dict[object, float]:
     """Horizontal RMSE by seed [m]; infinite where the run failed."""
-    return {r.seed: r.scores.get("horizontal_rmse", math.nan) if r.outcome == "ok" else math.inf for r in runs.tried}
+    return {r.seed: r.scores.get("horizontal_rmse", math.nan) if r.status == "ok" else math.inf for r in runs.tried}
 
 
 def standing_table(stand: Standing) -> tables.Fitted:

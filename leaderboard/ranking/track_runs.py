@@ -89,7 +89,7 @@ def _families(track: Track, runs: Mapping[str, Mapping[str, Runs]]) -> list[list
                 with np.errstate(invalid="ignore"):
                     values = np.log(errors).tolist()
                 logs.setdefault(label, {}).update(
-                    {(s, r.seed): x for r, x in zip(found.results, values, strict=True) if r.outcome == "ok"}
+                    {(s, r.seed): x for r, x in zip(found.results, values, strict=True) if r.status == "ok"}
                 )
     return families(logs, _comes_with_simnav)
 

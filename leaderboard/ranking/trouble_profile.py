@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 __all__ = ["BAD", "GroupRow", "TrackProfile", "TroubleGroup", "group_of", "profile_table", "profiles", "ranked_group"]
 
-#: A run is bad if it is lost, or its error is more than so many times that of the plain row in the same run.
+#: A run is bad if it fails, is lost, or has an error of more than so many times that of the plain row in the same run.
 BAD = 5.0
 
 
@@ -235,7 +235,7 @@ def _beside_plain(name: str, every: Iterable[ScenarioRuns]) -> list[_Beside]:
         plain = {r.seed: t.log(t.plain, r.seed) for r in t.cells[t.plain].runs.tried}
         mine = t.cells[name]
         for run, log, capped in zip(mine.runs.tried, mine.logs.tolist(), mine.capped.tolist(), strict=True):
-            bad = math.isinf(log) or log - plain[run.seed] > math.log(BAD)
+            bad = run.outcome != "ok" or math.isinf(log) or log - plain[run.seed] > math.log(BAD)
             found.append(_Beside(t.name, capped - plain[run.seed], bad))
     return found
 

@@ -107,7 +107,7 @@ def gather(over_all: Iterable[Result], single: Collection[Result]) -> Gathered:
         if not (has_series(read, "time") or has_series(read, "quantiles")):
             continue
         for result in every[id(series)]:
-            if result.outcome != "ok":
+            if result.status != "ok":
                 continue
             if result in wanted:
                 found.curves[result] = _curves(read, times)

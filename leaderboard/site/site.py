@@ -388,7 +388,7 @@ class _Site:
             Fact("Estimators", len(self.estimators)),
             Fact("Seeds a scenario", spread(len(s.seeds) for s in self.scenarios.values())),
             Fact("Runs", len(tried)),
-            Fact("Failed runs", sum(r.outcome != "ok" for r in tried)),
+            Fact("Failed runs", sum(r.status != "ok" for r in tried)),
         ]
 
     def export(self, name: str) -> None:

@@ -272,7 +272,7 @@ def _profile(
             return None
         ratios = [_ratio(of[k], beside[k]) for k in seeds]
         ratio = math.exp(sum(map(math.log, ratios)) / len(ratios))
-        failed = sum(of[k].outcome != "ok" for k in seeds)
+        failed = sum(of[k].status != "ok" for k in seeds)
         versions, count = (of[seeds[0]].estimator_version, beside[seeds[0]].estimator_version), len(seeds)
         points += [ProfilePoint(name, s.factor, ratio, failed) for name in ([s.instrument] if s.instrument else names)]
     points.sort(key=lambda p: (names.index(p.instrument), p.factor))
@@ -281,7 +281,7 @@ def _profile(
 
 def _ratio(of: Result, beside: Result) -> float:
     """Error over error, between 1/1000 and 1000; a failed run counts as the worst."""
-    a, b = (float(r.scores.get(SCORE, math.nan)) if r.outcome == "ok" else math.nan for r in (of, beside))
+    a, b = (float(r.scores.get(SCORE, math.nan)) if r.status == "ok" else math.nan for r in (of, beside))
     if not (math.isfinite(a) and a > 0.0):
         return FAILURE
     if not (math.isfinite(b) and b > 0.0):

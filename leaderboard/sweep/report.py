@@ -163,7 +163,7 @@ class Sweep(Shown):
         }
         for r in self.results:
             if r.tried:
-                value = float(r.scores.get(self.score, math.nan)) if r.outcome == "ok" else math.inf
+                value = float(r.scores.get(self.score, math.nan)) if r.status == "ok" else math.inf
                 found[r.estimator, where[r.scenario]][r.seed] = math.inf if math.isnan(value) else value
         return found
 

@@ -191,7 +191,7 @@ def _point(value: Choice, setting: Setting, results: dict[tuple[str, str, int], 
                 raise RequestError(f"{r.estimator} cannot run on {r.scenario}: {r.reason}")
             if r.status == "error" and " lag " in r.reason:  # not a failure of the method
                 raise RequestError(f"{r.estimator} on {r.scenario}: {r.reason}")
-        if row.outcome != "ok" or than.outcome != "ok":
+        if row.status != "ok" or than.status != "ok":
             failed += 1
             continue
         a, b = value_of(row, setting.score), value_of(than, setting.than_score)

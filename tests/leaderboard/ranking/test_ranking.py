@@ -413,15 +413,15 @@ def test_the_worst_of_what_a_row_states_is_shown():
     assert "consistent 1.00 (horizontal only)" in cells
 
 
-def test_a_lost_run_counts_as_a_failure():
+def test_a_lost_run_is_counted_and_has_its_own_error():
     results = campaign(SIMPLE, seeds=12)
     lost = changed(results, "good", [0, 1], scores={"beyond_sigma": 0.11})
-    failed = changed(results, "good", [0, 1], status="diverged")
     kept = changed(results, "good", [0, 1], scores={"beyond_sigma": 0.1})
     assert row(ranked(lost), "good", "one-v1").statuses == {"lost": 2, "ok": 10}
-    assert [row(ranked(r), "good").failed for r in (lost, failed, kept)] == [4, 4, 0]
-    assert row(ranked(lost), "good").score == row(ranked(failed), "good").score > 1.5
+    assert [row(ranked(r), "good").failed for r in (lost, kept)] == [0, 0]
+    assert row(ranked(lost), "good").score == row(ranked(results), "good").score
     assert failures.failures(lost) == {"lost": 4}
+    assert failures.failures(kept) == {}
     (reason, *_) = failures.failure_table(lost)[0].columns[4].cells
     assert str(reason) == "an error is beyond 100 times its stated sigma at 11 % of the epochs"
 
