@@ -57,6 +57,7 @@ def _reached(modules: Iterable[str]) -> set[str]:
         module = todo.pop()
         contents = list(vars(sys.modules.get(module, sys)).values())
         contents += [sys.modules.get(_CHAINS[1], sys)] if module == _CHAINS[0] else []
+        contents += [part for value in contents if isinstance(value, tuple) for part in value]  # functions of a model
         for value in contents:
             name = value.__name__ if isinstance(value, types.ModuleType) else getattr(value, "__module__", None)
             if isinstance(name, str) and name.startswith("simnav.") and name not in found:

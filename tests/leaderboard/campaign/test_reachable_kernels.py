@@ -25,7 +25,7 @@ def beginning() -> Recording:
 @pytest.mark.parametrize("name", [n for n in first_of_each_solver() if not find(n).reference])
 def test_what_a_row_calls_is_loaded(name: str, beginning: Recording, monkeypatch: pytest.MonkeyPatch) -> None:
     called: set[Kernel[..., Any]] = set()
-    plain, unchecked = Kernel.__call__, Kernel.unchecked.fget
+    plain, unchecked, compiled = Kernel.__call__, Kernel.unchecked.fget, Kernel.compile
     assert unchecked is not None
 
     def watched(self: Kernel[..., Any], *args: Any) -> Any:
@@ -37,6 +37,12 @@ def test_what_a_row_calls_is_loaded(name: str, beginning: Recording, monkeypatch
         called.add(self)
         return unchecked(self)
 
+    def handed_over(self: Kernel[..., Any]) -> Any:
+        if self.passed:
+            called.add(self)
+        return compiled(self)
+
+    monkeypatch.setattr(Kernel, "compile", handed_over)
     monkeypatch.setattr(Kernel, "__call__", watched)
     monkeypatch.setattr(Kernel, "unchecked", property(entered))
     estimator = make(name)
@@ -50,6 +56,8 @@ def test_what_a_row_calls_is_loaded(name: str, beginning: Recording, monkeypatch
 def test_of_all_kernels_a_filter_needs_a_part() -> None:
     some = reachable_kernels(["simnav.estimators.rows.kalman"])
     assert 10 < len(some) < 0.6 * len(kernels())
+    models = {f"simnav.estimators.models.{model}_functions" for model in ("inertial", "ship")}
+    assert models <= {k.__module__ for k in some}  # they are named by a tuple of functions only
     of_the_world = {k.__module__ for k in some if k.__module__.startswith("simnav.world")}
     assert of_the_world == {"simnav.world.depth_grid"}  # a chart is in the datasheet, the rest is the simulator's
 
