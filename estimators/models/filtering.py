@@ -11,11 +11,35 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from simnav.kernel_types import FlagVector, IntegerMatrix, IntegerVector, Matrix, Vector
+from simnav.compiled import helper
+from simnav.kernel_types import FlagVector, IntegerVector, Matrix, Vector
 from simnav.records import Record
-from simnav.types import Measurement
+from simnav.types import Array, Measurement
 
-__all__ = ["AidTable", "Dynamics", "ModelFunctions", "Prediction", "Readings", "ReadingsOfSteps", "room_for"]
+__all__ = [
+    "Aid", "AidTable", "Dynamics", "ModelFunctions", "Prediction", "Readings", "ReadingsOfSteps", "aid_of", "aid_table",
+    "room_for",
+]  # fmt: skip
+
+
+class Aid(NamedTuple):
+    """The parameters of an instrument.
+
+    Attributes
+    ----------
+    code : int
+        Its measurement equation, by the number that its model has for it.
+    lever_arm : (3,) array
+        In body axes [m].
+    bias_at, scale_at : int
+        Index in the error state of its first bias, and of its scale factor; -1 for none. Of an inertial model there
+        are three misalignments after a DVL's scale factor, and the current, north and east, after a log's bias.
+    """
+
+    code: int
+    lever_arm: Vector
+    bias_at: int
+    scale_at: int
 
 
 class AidTable(NamedTuple):
@@ -23,17 +47,54 @@ class AidTable(NamedTuple):
 
     Attributes
     ----------
-    codes : (i, 4) array of int
-        Measurement equation, and places in the error; the model knows their meaning.
-    lever_arms : (i, 3) array
+    code, bias_at, scale_at : (i,) array of int
+        As of `Aid`.
+    components : (i,) array of int
+        Number of components that the model predicts; 0 for an instrument that it does not observe.
+    lever_arm : (i, 3) array
         In body axes [m].
-    figures : (i, 9) array
-        Figures of the equation: of an inertial model the elements of the covariance of the white noise.
+    noise : (i, 9) array
+        Figures of the white noise: of an inertial model the elements of its covariance, of a ship
+        `simnav.estimators.models.ship_kernels.SHIP_NOISE`.
     """
 
-    codes: IntegerMatrix
-    lever_arms: Matrix
-    figures: Matrix
+    code: IntegerVector
+    components: IntegerVector
+    bias_at: IntegerVector
+    scale_at: IntegerVector
+    lever_arm: Matrix
+    noise: Matrix
+
+
+def aid_table(aids: Sequence[Aid | None], components: Sequence[int], noise: Sequence[Array]) -> AidTable:
+    """The table of some instruments; None for one that is not observed.
+
+    Parameters
+    ----------
+    aids : sequence of Aid or None
+        Parameters of each instrument.
+    components : sequence of int
+        Number of components of each.
+    noise : sequence of (at most 9,) array
+        Figures of the white noise of each.
+    """
+    i = len(aids)
+    whole: Any = np.int64
+    table = AidTable(
+        np.zeros(i, whole), np.array(components, whole), np.full(i, -1, whole), np.full(i, -1, whole),
+        np.zeros((i, 3)), np.zeros((i, 9)),
+    )  # fmt: skip
+    for row, (aid, figures) in enumerate(zip(aids, noise, strict=True)):
+        if aid is not None:
+            table.code[row], table.lever_arm[row], table.bias_at[row], table.scale_at[row] = aid
+            table.noise[row, : len(figures)] = figures
+    return table
+
+
+@helper
+def aid_of(table: AidTable, row: int) -> Aid:
+    """An instrument of a table."""
+    return Aid(table.code[row], table.lever_arm[row], table.bias_at[row], table.scale_at[row])
 
 
 class Dynamics(Record):

@@ -20,11 +20,11 @@ from simnav.types import Array, InitialState, Instruments
 
 from .chain import Chain, chain_of
 from .columns import Columns
-from .filtering import Dynamics
+from .filtering import Aid, Dynamics
 from .inertial import InertialModel
 from .intermediate_states import IntermediateStates, add_noise, through_one
 from .marginalisation import Reference
-from .measurements import OWN, Aid, State, observe_inertial
+from .measurements import OWN, State, observe_inertial
 from .new_factors import INERTIAL_FACTORS, Growing, InertialStates
 from .preintegrated import add_shift, move_shift, relative_shift, turn_covariance
 from .propagation import correct_inertial

@@ -30,16 +30,17 @@ from simnav.kernel_types import Matrix, Vector
 from simnav.strapdown import mechanize_step
 from simnav.types import Array, Measurement
 
+from .filtering import Aid
 from .inertial import InertialModel
 from .measurements import (
     HEADING,
     NAVIGATION_STATES,
     SPEED_LOG,
-    Aid,
     State,
     observe_inertial,
 )
 from .points import PointModel
+from .propagation import IMU_NOISE
 
 __all__ = ["PIECE", "InertialPoints", "observe_points", "propagate_points"]
 
@@ -221,14 +222,14 @@ class InertialPoints(InertialModel, PointModel):
     def propagate_points(self, errors: Array, until: float) -> Array:
         """Advance the state and the points; return the process noise."""
         noise = np.zeros((self.size, self.size))
-        begin, elapsed = self.time, until - self.time
+        begin, elapsed, imu = self.time, until - self.time, self._noise.view(IMU_NOISE)[0]
         pieces = ceil(elapsed / PIECE - 1e-9)
         for k in range(1, pieces + 1):
             position, velocity, dcm, time = self.position.copy(), self.velocity.copy(), self.dcm.copy(), self.time
             self.propagate(noise, until if k == pieces else begin + elapsed * k / pieces)
             propagate_points.unchecked(
-                position, velocity, dcm, self.velocity, self.dcm, self.time - time, self._noise[2], self._noise[4],
-                errors,
+                position, velocity, dcm, self.velocity, self.dcm, self.time - time, imu.gyroscope_decay,
+                imu.accelerometer_decay, errors,
             )  # fmt: skip
         errors[:, 15:] *= np.exp(-self._decay * elapsed)
         if self.blocks.clocks:

@@ -15,11 +15,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from simnav.structures import filled
 from simnav.types import Array, InitialState, Instruments, Measurement
 
 from .base import Linearised
 from .equations import equation_of
 from .inertial import InertialModel
+from .propagation import IMU_NOISE
 from .state_blocks import StateBlocks
 
 __all__ = ["NineStateModel"]
@@ -60,7 +62,7 @@ class NineStateModel(InertialModel):
         self._unused = super().begin(start, instruments)
         self.size, self.blocks = 9, StateBlocks(9)
         self._full = np.zeros(15)
-        self._noise[:8] = 0.0
+        self._noise = filled(IMU_NOISE, interval=self._noise.view(IMU_NOISE)[0].interval)
         for sheet in instruments.values():
             equation = equation_of(sheet)
             if equation.has_height and np.all(self._gnss > 0.0):

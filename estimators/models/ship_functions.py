@@ -9,11 +9,12 @@ import numpy as np
 from simnav.compiled import helper, kernel
 from simnav.estimators.algebra.joseph import project
 from simnav.kernel_types import Vector
+from simnav.structures import length
 from simnav.types import Array
 
-from .filtering import Dynamics, ModelFunctions, Prediction, Readings
+from .filtering import Dynamics, ModelFunctions, Prediction, Readings, aid_of
 from .propagation import Samples
-from .ship_kernels import advance_ship, correct_ship, observe_ship
+from .ship_kernels import SHIP_NOISE, advance_ship, correct_ship, observe_ship
 
 __all__ = ["SHIP_FUNCTIONS", "SHIP_NUMBERS", "ShipState", "ship_state"]
 
@@ -36,8 +37,8 @@ class ShipState(NamedTuple):
     x: Vector
 
 
-#: Numbers of a flat state before its n states.
-SHIP_NUMBERS = 4
+#: Numbers of a flat state before its n states, and of the noise of an instrument.
+SHIP_NUMBERS, SHIP_NOISE_NUMBERS = 4, length(SHIP_NOISE)
 
 
 @helper
@@ -64,10 +65,10 @@ def predict(dynamics: Dynamics, readings: Readings, k: int, prediction: Predicti
     """Compute what a reading should be, and the covariance of that (`observe_ship`)."""
     row, d, aids, state = readings.instrument[k], readings.components[k], dynamics.aids, ship_state(dynamics.numbers)
     jacobian = np.zeros((d, state.x.size))
+    aid, noise, value = aid_of(aids, row), aids.noise[row, :SHIP_NOISE_NUMBERS], readings.value[k]
     observe_ship(
-        aids.codes[row], aids.figures[row], state.position, state.x, readings.value[k, 0], readings.value[k, d - 1],
-        prediction.innovation, jacobian, prediction.nominal,
-    )  # fmt: skip
+        aid, noise, state.position, state.x, value[0], value[d - 1], prediction.innovation, jacobian, prediction.nominal
+    )
     project(dynamics.covariance, jacobian, prediction.cross, prediction.predicted)
     return True
 

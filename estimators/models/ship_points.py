@@ -12,7 +12,7 @@ from simnav.types import Array, Measurement
 
 from .equations import equation_of
 from .points import PointModel
-from .ship import ShipModel
+from .ship import ShipModel, components_of
 from .ship_kernels import move_ships, read_ships
 
 __all__ = ["ShipPoints"]
@@ -42,9 +42,9 @@ class ShipPoints(ShipModel, PointModel):
 
     def read(self, measurement: Measurement, states: Array) -> Array:
         """(k, m) what an instrument should read at k states; positions in metres from the model's own."""
-        code, aid, m = self.aids[measurement.instrument]
-        readings = np.empty((len(states), m))
-        read_ships(code, aid, states, readings)
+        aid = self.aids[measurement.instrument]
+        readings = np.empty((len(states), components_of(aid)))
+        read_ships(aid, states, readings)
         return readings
 
     def observe_points(self, measurement: Measurement, errors: Array) -> Array:
