@@ -239,6 +239,10 @@ class ReadingsOfSteps:
         self._row = {name: (i, d) for i, (name, d) in enumerate(components.items())}
         self._readings = room_for(8)
 
+    def components(self, instrument: str) -> int:
+        """Number of components of an instrument."""
+        return self._row[instrument][1]
+
     def fill(self, measurements: Sequence[Measurement]) -> Readings:
         """The measurements as arrays; those of the call before are overwritten."""
         into, count = self._readings, len(measurements)

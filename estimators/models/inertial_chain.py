@@ -22,6 +22,7 @@ from .chain import Chain, chain_of
 from .columns import Columns
 from .filtering import Aid, Dynamics
 from .inertial import InertialModel
+from .inertial_functions import INERTIAL_FUNCTIONS
 from .intermediate_states import IntermediateStates, add_noise, through_one
 from .marginalisation import Reference
 from .measurements import OWN, State, observe_inertial
@@ -283,7 +284,7 @@ class InertialChain(Chain):
             bias_at=np.array([aid.bias_at for aid in known], dtype=np.int64),
             scale_at=np.array([aid.scale_at for aid in known], dtype=np.int64),
         )
-        self.functions = None if front.functions() is None else INERTIAL_FACTORS
+        self.functions = INERTIAL_FACTORS if front.functions() is INERTIAL_FUNCTIONS else None
         if self.functions is not None:
             self.dynamics = front.dynamics(covariance, self.names)
         return covariance

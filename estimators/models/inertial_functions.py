@@ -13,10 +13,18 @@ from .filtering import Aid, Dynamics, ModelFunctions, Prediction, Readings, aid_
 from .measurements import State, observe_inertial
 from .propagation import CLOCK, MOTION_NUMBERS, Samples, correct_inertial, motion_of, propagate_inertial, time_of
 
-__all__ = ["INERTIAL_FUNCTIONS", "use_reading"]
+__all__ = ["INERTIAL_FUNCTIONS", "state_of", "use_reading"]
 
 #: Places of position and velocity, and of the attitude, in the error.
 _MOVING = MotionStates(linear=0, linear_end=6, attitude=6, attitude_end=9)
+
+
+@helper
+def state_of(numbers: Array) -> State:
+    """The state at which a reading is predicted, as views of the flat one."""
+    motion = motion_of(numbers)
+    rate = motion.clock.view(CLOCK)[0].rate
+    return State(motion.position, motion.velocity, motion.dcm, rate, motion.bias, numbers[MOTION_NUMBERS:])
 
 
 @kernel(passed=True)
@@ -61,16 +69,13 @@ def use_reading(aid: Aid, value: Array, state: State, covariance: Array, noise: 
 @kernel(passed=True)
 def predict(dynamics: Dynamics, readings: Readings, k: int, prediction: Prediction) -> bool:
     """Compute what a reading should be, and the covariance of that (`observe_inertial`)."""
-    row, aids, numbers = readings.instrument[k], dynamics.aids, dynamics.numbers
+    row, aids = readings.instrument[k], dynamics.aids
     d = aids.components[row]
-    motion = motion_of(numbers)
-    rate, calibration = motion.clock.view(CLOCK)[0].rate, numbers[MOTION_NUMBERS:]
-    state = State(motion.position, motion.velocity, motion.dcm, rate, motion.bias, calibration)
     for a in range(d):
         for b in range(d):
             prediction.nominal[a, b] = aids.noise[row, a * d + b]
     return predict_reading(
-        aid_of(aids, row), readings.value[k, :d], state, dynamics.covariance,
+        aid_of(aids, row), readings.value[k, :d], state_of(dynamics.numbers), dynamics.covariance,
         prediction.innovation, prediction.cross, prediction.predicted,
     )  # fmt: skip
 

@@ -42,7 +42,7 @@ from .filtering import Aid, AidTable, Dynamics, ModelFunctions, aid_table
 from .lever_arms import has_measurement_function, with_lever_arms
 from .measurements import wrap
 from .moving_chain import MovingModel
-from .ship_functions import SHIP_FUNCTIONS, SHIP_NUMBERS, ship_state
+from .ship_functions import SHIP_FUNCTIONS, SHIP_MOTION, SHIP_NUMBERS, ship_state
 from .ship_kernels import (
     BODY_VELOCITY,
     HEADING,
@@ -108,8 +108,7 @@ class ShipModel(MovingModel):
     """
 
     state = ("position", "x")
-    #: True if the kernels of `simnav.estimators.models.ship_functions` may replace its methods.
-    fused: ClassVar[bool] = True
+    equations: ClassVar[ModelFunctions] = SHIP_FUNCTIONS
     moving = (slice(0, 0), slice(0, 0))  # there is no IMU: the process noise covers manoeuvres
 
     def __init__(
@@ -147,13 +146,13 @@ class ShipModel(MovingModel):
 
     def functions(self) -> ModelFunctions | None:
         """As `ErrorModel.functions`; None if an instrument has an equation of its own."""
-        return SHIP_FUNCTIONS if self.fused and not self.own else None
+        return self.equations if not self.own else None
 
     def dynamics(self, covariance: Array, names: Sequence[str]) -> Dynamics:
         """As `ErrorModel.dynamics`."""
         return Dynamics(
             numbers=self.numbers, covariance=covariance, transition=self.transition, process_noise=np.empty((0, 0)),
-            constants=np.array([self.turn_time]), decay=self.decay, density=self.density,
+            constants=self.constants, decay=self.decay, density=self.density,
             first_variances=covariance.diagonal().copy(), correction=np.empty(self.size),
             next_sample=np.zeros(1, np.int64), aids=self.table(names),
         )  # fmt: skip
@@ -200,7 +199,7 @@ class ShipModel(MovingModel):
         self.size = n = self.blocks.size
         variance, decay, density = self.blocks.columns(U)
         self.decay, self.density = np.concatenate([[0.0, 0.0], decay]), np.concatenate([[0.0, 0.0], density])
-        self.transition = np.eye(n)
+        self.transition, self.constants = np.eye(n), filled(SHIP_MOTION, turn_time=self.turn_time)
         self._height_variance = float(start.covariance[2, 2])
         self.numbers = np.zeros(SHIP_NUMBERS + n)
         self._bind()
