@@ -98,7 +98,7 @@ def adkf_noise(settings: Vector, memory: Vector, readings: Readings, k: int, pre
         factor = three_segment(statistic, own.c0, own.c1, own.two)
     else:
         factor = exponential(statistic, own.c0, own.c1, own.two)
-    factor = max(factor, own.smallest)
+    factor = max(factor, float(own.smallest))
     if factor != 1.0:
         for i in range(innovation.size):
             for j in range(innovation.size):

@@ -52,7 +52,7 @@ class FunctionModel(ErrorModel):
         """The instruments in the order of their names (`simnav.estimators.models.filtering.aid_table`)."""
 
     @property
-    def time(self) -> float:  # type: ignore[override]
+    def time(self) -> float:
         """Time of the state [s]."""
         return float(self.numbers[0])
 
