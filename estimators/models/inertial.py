@@ -165,18 +165,19 @@ class InertialModel(ErrorModel):
         self.motion = motion = motion_of.function(self.numbers)
         self.position, self.velocity, self.dcm, self.bias = motion.position, motion.velocity, motion.dcm, motion.bias
         self.calibration = self.numbers[MOTION_NUMBERS:]
-        self._clock = clock = motion.clock.view(CLOCK)[0]
-        self.raw_rate, self.raw_force = clock.rate, clock.mean_force
+        clock = motion.clock.view(CLOCK)
+        self.raw_rate, self.raw_force = clock["rate"][0], clock["mean_force"][0]
+        self._time, self._held = clock["time"], clock["held"]
         self._viewed = State(self.position, self.velocity, self.dcm, self.raw_rate, self.bias, self.calibration)
 
     @property
     def time(self) -> float:
         """Time of the state [s]."""
-        return float(self._clock.time)
+        return float(self._time[0])
 
     @time.setter
     def time(self, time: float) -> None:
-        self._clock.time = time
+        self._time[0] = time
 
     def choose(self, instruments: Instruments, name: str) -> ErrorModel:
         """Itself; UnsuitableScenario without an IMU or without anything to aid it."""
@@ -206,7 +207,7 @@ class InertialModel(ErrorModel):
         self.numbers = np.zeros(MOTION_NUMBERS + n - _NAV)
         self._bind()
         self.position[:], self.velocity[:], self.dcm[:] = start.position, start.velocity, dcm_from_rpy(start.attitude)
-        self._clock.time, self._clock.used = start.time, -1e9
+        self._time[0], self.motion.clock.view(CLOCK)["used"] = start.time, -1e9
         self._jacobians = {name: np.empty((len(noise), n)) for name, noise in self.noise.items()}
         covariance = np.zeros((n, n))
         covariance[:_MOTION, :_MOTION] = start.covariance
@@ -376,7 +377,7 @@ class InertialModel(ErrorModel):
     @property
     def held(self) -> float:
         """Seconds without usable IMU data so far."""
-        return float(self._clock.held)
+        return float(self._held[0])
 
     def measure(self, measurement: Measurement) -> Linearised | None:
         """Linearise one measurement (`simnav.estimators.models.measurements`)."""

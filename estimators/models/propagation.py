@@ -335,6 +335,7 @@ def next_interval(clock: Any, samples: Samples, i: int, t: float, until: float, 
     SampleInterval
     """
     time, interval, rate, force = samples.time, samples.interval, samples.angular_rate, samples.specific_force
+    mean_rate, mean_force, rate_before, extrapolated = clock.mean_rate, clock.mean_force, clock.rate_before, clock.rate
     eps = 1e-7
     n = time.size
     while i < n and (
@@ -348,11 +349,11 @@ def next_interval(clock: Any, samples: Samples, i: int, t: float, until: float, 
         if t <= started + eps or clock.used < started - 0.5 * nominal:
             adjacent = clock.used >= started - 0.5 * nominal
             for r in range(3):
-                clock.rate_before[r] = clock.mean_rate[r] if adjacent else rate[i, r]
+                rate_before[r] = mean_rate[r] if adjacent else rate[i, r]
         ahead = (stop - started) / interval[i] - 0.5
         for r in range(3):
-            clock.mean_rate[r], clock.mean_force[r] = rate[i, r], force[i, r]
-            clock.rate[r] = rate[i, r] + ahead * (rate[i, r] - clock.rate_before[r])
+            mean_rate[r], mean_force[r] = rate[i, r], force[i, r]
+            extrapolated[r] = rate[i, r] + ahead * (rate[i, r] - rate_before[r])
         clock.used = stop
         if stop >= time[i] - eps:
             whole = interval[i]
@@ -404,6 +405,7 @@ def advance_inertial(
     eps = 1e-7
     before = np.empty(9)
     keep = np.empty(6)
+    rate, force = clock.mean_rate, clock.mean_force
     t, i, count = clock.time, first, 0
     nominal = imu.interval
     while t < until - eps:
@@ -429,7 +431,6 @@ def advance_inertial(
                     memory[r] = 0.0
                 held += dt
             else:
-                rate, force = clock.mean_rate, clock.mean_force
                 w0, w1, w2 = rate[0] - bias[0], rate[1] - bias[1], rate[2] - bias[2]
                 f0, f1, f2 = force[0] - bias[3], force[1] - bias[4], force[2] - bias[5]
                 for r in range(6):
