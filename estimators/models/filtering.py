@@ -15,7 +15,16 @@ from simnav.kernel_types import FlagVector, IntegerMatrix, IntegerVector, Matrix
 from simnav.records import Record
 from simnav.types import Measurement
 
-__all__ = ["AidTable", "Dynamics", "ModelFunctions", "Prediction", "Readings", "ReadingsOfSteps", "room_for"]
+__all__ = [
+    "AidTable",
+    "Dynamics",
+    "ModelFunctions",
+    "Prediction",
+    "Readings",
+    "ReadingsOfSteps",
+    "SigmaPoints",
+    "room_for",
+]
 
 
 class AidTable(NamedTuple):
@@ -34,6 +43,27 @@ class AidTable(NamedTuple):
     codes: IntegerMatrix
     lever_arms: Matrix
     figures: Matrix
+
+
+class SigmaPoints(NamedTuple):
+    """The points of a filter that takes its moments from them (`simnav.estimators.models.points`).
+
+    Attributes
+    ----------
+    spread : float
+        Distance of the points from the state, in columns of the square root of the covariance.
+    weight : float
+        Weight of each point.
+    excess : float
+        Weight of the squared mean in a covariance.
+    errors : (2 n, n) array
+        Differences of the points from the state.
+    """
+
+    spread: float
+    weight: float
+    excess: float
+    errors: Matrix
 
 
 class Dynamics(Record):
@@ -57,6 +87,8 @@ class Dynamics(Record):
         Index of the first IMU sample of the step that is not completely used.
     aids : AidTable
         The instruments.
+    points : SigmaPoints
+        None of them where the filter linearises.
     """
 
     numbers: Vector
@@ -70,6 +102,7 @@ class Dynamics(Record):
     correction: Vector
     next_sample: IntegerVector
     aids: AidTable
+    points: SigmaPoints = SigmaPoints(0.0, 0.0, 0.0, np.empty((0, 0)))
 
 
 class Readings(Record):

@@ -13,7 +13,7 @@ from .filtering import Dynamics, ModelFunctions, Prediction, Readings
 from .measurements import Aid, State, observe_inertial
 from .propagation import MOTION_NUMBERS, Samples, correct_inertial, motion_of, propagate_inertial
 
-__all__ = ["INERTIAL_FUNCTIONS", "use_reading"]
+__all__ = ["INERTIAL_FUNCTIONS", "aid_of", "state_of", "use_reading"]
 
 #: Places of position and velocity, and of the attitude, in the error.
 _MOVING = MotionStates(linear=0, linear_end=6, attitude=6, attitude_end=9)
@@ -58,20 +58,32 @@ def use_reading(aid: Aid, value: Array, state: State, covariance: Array, noise: 
         correct_inertial(state.position, state.velocity, state.dcm, state.bias, state.calibration, correction)
 
 
+@helper
+def aid_of(dynamics: Dynamics, readings: Readings, k: int) -> Aid:
+    """The instrument of a reading."""
+    row, aids = readings.instrument[k], dynamics.aids
+    code, _, bias_at, scale_at = aids.codes[row]
+    return Aid(code, aids.lever_arms[row], bias_at, scale_at)
+
+
+@helper
+def state_of(numbers: Array) -> State:
+    """The named blocks of a flat state that a reading depends on."""
+    motion = motion_of(numbers)
+    return State(
+        motion.position, motion.velocity, motion.dcm, motion.clock[12:15], motion.bias, numbers[MOTION_NUMBERS:]
+    )
+
+
 @kernel(passed=True)
 def predict(dynamics: Dynamics, readings: Readings, k: int, prediction: Prediction) -> bool:
     """Compute what a reading should be, and the covariance of that (`observe_inertial`)."""
-    row, aids, numbers = readings.instrument[k], dynamics.aids, dynamics.numbers
-    code, d, bias_at, scale_at = aids.codes[row]
-    motion = motion_of(numbers)
-    state = State(
-        motion.position, motion.velocity, motion.dcm, motion.clock[12:15], motion.bias, numbers[MOTION_NUMBERS:]
-    )
+    row, d = readings.instrument[k], prediction.innovation.size
     for a in range(d):
         for b in range(d):
-            prediction.nominal[a, b] = aids.figures[row, a * d + b]
+            prediction.nominal[a, b] = dynamics.aids.figures[row, a * d + b]
     return predict_reading(
-        Aid(code, aids.lever_arms[row], bias_at, scale_at), readings.value[k, :d], state, dynamics.covariance,
+        aid_of(dynamics, readings, k), readings.value[k, :d], state_of(dynamics.numbers), dynamics.covariance,
         prediction.innovation, prediction.cross, prediction.predicted,
     )  # fmt: skip
 

@@ -6,24 +6,102 @@ what is added to it, in metres for the position.
 
 from __future__ import annotations
 
+from math import atan2, cos, sin
+
 import numpy as np
 
+from simnav.compiled import kernel
+from simnav.kernel_types import IntegerVector, Matrix, Vector
 from simnav.types import Array, Measurement
 
-from .equations import equation_of
-from .points import PointModel
+from .filtering import Dynamics, ModelFunctions, Prediction, Readings
+from .points import PointModel, predict_through, propagate_through
+from .propagation import Samples
 from .ship import ShipModel
-from .ship_kernels import move_ships, read_ships
+from .ship_functions import predict as linearise
+from .ship_functions import propagate as propagate_linearised
+from .ship_functions import retract, ship_state
+from .ship_kernels import HEADING, move_ships, read_ships
 
 __all__ = ["ShipPoints"]
+
+
+@kernel
+def move_points(x: Vector, decay: Vector, turn_time: float, elapsed: float, errors: Matrix) -> None:
+    """Move points from their differences from a state to those from the state after a time, in place."""
+    k, n = errors.shape
+    states = np.empty((k + 1, n))
+    for i in range(n):
+        states[k, i] = x[i]
+        for j in range(k):
+            states[j, i] = x[i] + errors[j, i]
+    move_ships(states, decay, turn_time, elapsed)
+    for i in range(n):
+        for j in range(k):
+            errors[j, i] = states[j, i] - states[k, i]
+
+
+@kernel
+def observe_points(code: IntegerVector, aid: Vector, x: Vector, errors: Matrix, differences: Matrix) -> None:
+    """Fill in what an instrument should read at points, minus what it should read at the state."""
+    (k, n), d = errors.shape, differences.shape[1]
+    states, readings = np.empty((k + 1, n)), np.empty((k + 1, d))
+    for i in range(n):
+        states[k, i] = x[i]
+        for j in range(k):
+            states[j, i] = x[i] + errors[j, i]
+    read_ships(code, aid, states, readings)
+    for j in range(k):
+        for i in range(d):
+            difference = readings[j, i] - readings[k, i]
+            differences[j, i] = atan2(sin(difference), cos(difference)) if code[0] == HEADING else difference
+
+
+@kernel
+def move(dynamics: Dynamics, samples: Samples, until: float) -> None:
+    """Advance state and points; the covariance becomes that of the process noise."""
+    state = ship_state(dynamics.numbers)
+    move_points(state.x, dynamics.decay, dynamics.constants[0], until - state.clock[0], dynamics.points.errors)
+    dynamics.covariance[:] = 0.0
+    propagate_linearised(dynamics, samples, until)
+
+
+@kernel(passed=True)
+def propagate(dynamics: Dynamics, samples: Samples, until: float) -> None:
+    """Advance the state and its covariance to a time, through points."""
+    if until > ship_state(dynamics.numbers).clock[0]:
+        propagate_through(move, retract, dynamics, samples, until)
+
+
+@kernel
+def read(dynamics: Dynamics, readings: Readings, k: int, differences: Matrix) -> None:
+    """What an instrument should read at the points, minus what it should read at the state."""
+    row, aids = readings.instrument[k], dynamics.aids
+    x = ship_state(dynamics.numbers).x
+    observe_points(aids.codes[row], aids.figures[row], x, dynamics.points.errors, differences)
+
+
+@kernel(passed=True)
+def predict(dynamics: Dynamics, readings: Readings, k: int, prediction: Prediction) -> bool:
+    """Compute what a reading should be, and the covariance of that, from points."""
+    return predict_through(linearise, read, dynamics, readings, k, prediction)
+
+
+@kernel(passed=True)
+def predict_again(dynamics: Dynamics, readings: Readings, k: int, prediction: Prediction) -> None:
+    """There is no IMU: the process noise covers manoeuvres, and nothing is inflated."""
+    predict(dynamics, readings, k, prediction)
+
+
+POINT_FUNCTIONS = ModelFunctions(propagate, predict, retract, predict_again)
 
 
 class ShipPoints(ShipModel, PointModel):
     """`ShipModel` with points; the parameters are its own."""
 
-    def states(self, errors: Array) -> Array:
-        """(k, n) states of points: metres north and east of the model's own position, and its other states."""
-        return np.asarray(self.x + errors)
+    def point_functions(self) -> ModelFunctions | None:
+        """As `PointModel.point_functions`; None where `functions` is."""
+        return None if self.functions() is None else POINT_FUNCTIONS
 
     def move(self, states: Array, elapsed: float) -> None:
         """Advance (k, n) states by the model's motion, in place, in its own steps (`ShipModel`)."""
@@ -33,10 +111,7 @@ class ShipPoints(ShipModel, PointModel):
     def propagate_points(self, errors: Array, until: float) -> Array:
         """Advance the state and the points; return the process noise."""
         noise = np.zeros((self.size, self.size))
-        states = self.states(np.concatenate([np.zeros((1, self.size)), errors]))
-        elapsed = until - self.time
-        self.move(states, elapsed)
-        errors[:] = states[1:] - states[0]
+        move_points(self.x, self.decay, self.turn_time, until - self.time, errors)
         self.propagate(noise, until)
         return noise
 
@@ -52,8 +127,7 @@ class ShipPoints(ShipModel, PointModel):
         if measurement.instrument in self.own:
             own = self.own[measurement.instrument]
             return own.differences_at(measurement.time, self.position, self.x, errors, measurement.side)
-        reading = self.read(measurement, self.states(np.concatenate([np.zeros((1, self.size)), errors])))
-        difference = reading[1:] - reading[0]
-        if equation_of(self.instruments[measurement.instrument]).is_heading:
-            difference = np.arctan2(np.sin(difference), np.cos(difference))
-        return np.asarray(difference)
+        code, aid, m = self.aids[measurement.instrument]
+        differences = np.empty((len(errors), m))
+        observe_points(code, aid, self.x, errors, differences)
+        return differences
