@@ -10,7 +10,7 @@ from math import atan2, cos, sin
 
 import numpy as np
 
-from simnav.compiled import kernel
+from simnav.compiled import helper, kernel
 from simnav.kernel_types import IntegerVector, Matrix, Vector
 from simnav.types import Array, Measurement
 
@@ -26,34 +26,37 @@ from .ship_kernels import HEADING, move_ships, read_ships
 __all__ = ["ShipPoints"]
 
 
-@kernel
-def move_points(x: Vector, decay: Vector, turn_time: float, elapsed: float, errors: Matrix) -> None:
-    """Move points from their differences from a state to those from the state after a time, in place."""
+@helper
+def states_at(x: Array, errors: Array) -> Array:
+    """(k + 1, n) states: the one that k points differ from, and they."""
     k, n = errors.shape
     states = np.empty((k + 1, n))
     for i in range(n):
-        states[k, i] = x[i]
+        states[0, i] = x[i]
         for j in range(k):
-            states[j, i] = x[i] + errors[j, i]
+            states[j + 1, i] = x[i] + errors[j, i]
+    return states
+
+
+@kernel
+def move_points(x: Vector, decay: Vector, turn_time: float, elapsed: float, errors: Matrix) -> None:
+    """Move points from their differences from a state to those from the state after a time, in place."""
+    states = states_at(x, errors)
     move_ships(states, decay, turn_time, elapsed)
-    for i in range(n):
-        for j in range(k):
-            errors[j, i] = states[j, i] - states[k, i]
+    for j in range(errors.shape[0]):
+        for i in range(errors.shape[1]):
+            errors[j, i] = states[j + 1, i] - states[0, i]
 
 
 @kernel
 def observe_points(code: IntegerVector, aid: Vector, x: Vector, errors: Matrix, differences: Matrix) -> None:
     """Fill in what an instrument should read at points, minus what it should read at the state."""
-    (k, n), d = errors.shape, differences.shape[1]
-    states, readings = np.empty((k + 1, n)), np.empty((k + 1, d))
-    for i in range(n):
-        states[k, i] = x[i]
-        for j in range(k):
-            states[j, i] = x[i] + errors[j, i]
-    read_ships(code, aid, states, readings)
+    k, d = differences.shape
+    readings = np.empty((k + 1, d))
+    read_ships(code, aid, states_at(x, errors), readings)
     for j in range(k):
         for i in range(d):
-            difference = readings[j, i] - readings[k, i]
+            difference = readings[j + 1, i] - readings[0, i]
             differences[j, i] = atan2(sin(difference), cos(difference)) if code[0] == HEADING else difference
 
 

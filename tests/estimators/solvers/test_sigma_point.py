@@ -9,7 +9,9 @@ import pytest
 from scipy import stats
 
 from simnav.estimator import EstimatorError, make
+from simnav.estimators.adaptations.adkf import AdaptiveFactor
 from simnav.estimators.adaptations.base import Adaptation, Innovation
+from simnav.estimators.adaptations.sage_husa import SageHusa
 from simnav.estimators.models.base import Linearised
 from simnav.estimators.models.inertial import InertialModel
 from simnav.estimators.models.inertial_points import InertialPoints
@@ -32,6 +34,8 @@ DEG = np.pi / 180.0
 #: alpha, beta, kappa: unscented of three kinds, and cubature.
 SETS = {"default": (0.5, 2.0, 0.0), "narrow": (1e-2, 2.0, 0.0), "julier": (1.0, 0.0, 1.0), "cubature": (1.0, 0.0, 0.0)}
 START = InitialState(0.0, np.zeros(3), np.zeros(3), np.zeros(3), np.eye(9))
+GNSS = Datasheet("gnss", "gnss_position", 1.0, np.full(3, 1.0))
+COMPASS = Datasheet("compass", "magnetic_compass", 2.0, np.array([0.5 * DEG]), bias=np.array([0.5 * DEG]))
 METER = Datasheet("meter", "gnss_velocity", 1.0, np.full(3, 0.5))
 
 
@@ -332,6 +336,37 @@ def test_ship_points_move_and_read_as_the_model_does():
         position = earth.relative_position(point.position, center.position)[:2]
         np.testing.assert_allclose(e[:2], position, atol=2e-3)
         np.testing.assert_allclose(e[2:], (point.x - center.x)[2:], atol=1e-12)
+
+
+class ByMethods(SigmaPointEstimator):
+    """The filter whose functions are methods in Python."""
+
+    def _kernels(self):
+        return None
+
+
+@pytest.mark.parametrize("adaptation", [None, SageHusa, AdaptiveFactor])
+@pytest.mark.parametrize("model", [InertialPoints, ShipPoints])
+def test_kernels_and_methods_are_the_same_filter(recording_of, model, adaptation):
+    recording = recording_of(2, 40.0, aids=(GNSS, COMPASS))
+    filters = [kind(model(), adaptation and adaptation()) for kind in (SigmaPointEstimator, ByMethods)]
+    for estimator in filters:
+        estimator.reset(recording.start, recording.instruments)
+    assert [f._compiled for f in filters] == [True, False]
+    for k, packet in enumerate(recording.steps()):
+        if 20 <= k < 28:  # all at once: the motion is taken as wrong, and inflated
+            wrong = [m._replace(value=m.value + (1e-4 if m.kind == "gnss_position" else 0.2)) for m in packet.aids]
+            packet = replace(packet, aids=wrong)
+        a, b = (estimator.update(packet) for estimator in filters)
+        assert a.diagnostics == pytest.approx(b.diagnostics, rel=1e-5, abs=1e-6, nan_ok=True)
+        for state in filters[0].model.state:
+            np.testing.assert_allclose(*(getattr(f.model, state) for f in filters), rtol=1e-7, atol=1e-8)
+        np.testing.assert_allclose(a.covariance, b.covariance, rtol=1e-6, atol=1e-10)
+
+
+def test_points_of_another_kind_are_not_passed_over():
+    with pytest.raises(TypeError, match="observe_points of its own; it has to say: fused = False"):
+        type("Own", (InertialPoints,), {"observe_points": lambda self, measurement, errors: errors[:, :3]})
 
 
 @pytest.fixture(scope="module")
