@@ -278,7 +278,7 @@ def navigate(
             if i >= 0:
                 bias_at, scale_at = instruments.bias_at[b, i], instruments.scale_at[b, i]
                 aid = Aid(instruments.code[b, i], instruments.lever_arm[b, i], bias_at, scale_at)
-                rate = clock[b].view(CLOCK)[0].rate
+                rate = clock[b].view(CLOCK)[0].rate[:]
                 here = State(position[b], velocity[b], dcm[b], rate, bias[b], calibration[b, : n - 15])
                 noise = instruments.noise[b, i, : d * d].reshape((d, d))
                 use_reading(aid, value[b, j, :d], here, P, noise, correction)

@@ -17,8 +17,8 @@ from simnav.records import Record
 from simnav.types import Array, Measurement
 
 __all__ = [
-    "Aid", "AidTable", "Dynamics", "ModelFunctions", "Prediction", "Readings", "ReadingsOfSteps", "aid_of", "aid_table",
-    "room_for",
+    "Aid", "AidTable", "Dynamics", "ModelFunctions", "Prediction", "Readings", "ReadingsOfSteps", "SigmaPoints",
+    "aid_of", "aid_table", "room_for",
 ]  # fmt: skip
 
 
@@ -97,6 +97,27 @@ def aid_of(table: AidTable, row: int) -> Aid:
     return Aid(table.code[row], table.lever_arm[row], table.bias_at[row], table.scale_at[row])
 
 
+class SigmaPoints(NamedTuple):
+    """The points of a filter that takes its moments from them (`simnav.estimators.models.points`).
+
+    Attributes
+    ----------
+    spread : float
+        Distance of the points from the state, in columns of the square root of the covariance.
+    weight : float
+        Weight of each point.
+    excess : float
+        Weight of the squared mean in a covariance.
+    errors : (2 n, n) array
+        Differences of the points from the state.
+    """
+
+    spread: float
+    weight: float
+    excess: float
+    errors: Matrix
+
+
 class Dynamics(Record):
     """The state of a model with n error components, its covariance, and what its functions need to know.
 
@@ -118,6 +139,8 @@ class Dynamics(Record):
         Index of the first IMU sample of the step that is not completely used.
     aids : AidTable
         The instruments.
+    points : SigmaPoints
+        None of them where the filter linearises.
     """
 
     numbers: Vector
@@ -131,6 +154,7 @@ class Dynamics(Record):
     correction: Vector
     next_sample: IntegerVector
     aids: AidTable
+    points: SigmaPoints = SigmaPoints(0.0, 0.0, 0.0, np.empty((0, 0)))
 
 
 class Readings(Record):

@@ -137,12 +137,12 @@ class InertialModel(ErrorModel):
     attitude_at = 6
     moving = (slice(0, 6), slice(6, 9))
     #: True if the kernels of `simnav.estimators.models.inertial_functions` may replace `measure`, `correct` and
-    #: `loosen`. A model with another form of one of these methods sets it to False.
+    #: `loosen`. A model with another form of one of these methods, or of those of points, sets it to False.
     fused: ClassVar[bool] = True
 
     def __init_subclass__(cls) -> None:
         super().__init_subclass__()
-        own = {"measure", "correct", "loosen"} & vars(cls).keys()
+        own = {"measure", "correct", "loosen", "propagate_points", "observe_points"} & vars(cls).keys()
         if own and cls.fused and "fused" not in vars(cls):
             raise TypeError(f"{cls.__name__} has {', '.join(sorted(own))} of its own; it has to say: fused = False")
 

@@ -23,7 +23,7 @@ _MOVING = MotionStates(linear=0, linear_end=6, attitude=6, attitude_end=9)
 def state_of(numbers: Array) -> State:
     """The state at which a reading is predicted, as views of the flat one."""
     motion = motion_of(numbers)
-    rate = motion.clock.view(CLOCK)[0].rate
+    rate = motion.clock.view(CLOCK)[0].rate[:]  # an array like the others
     return State(motion.position, motion.velocity, motion.dcm, rate, motion.bias, numbers[MOTION_NUMBERS:])
 
 

@@ -16,9 +16,11 @@ from simnav.estimators.adaptations.sage_husa import SageHusa
 from simnav.estimators.algebra.joseph import project
 from simnav.estimators.models.channels import by_channel, instrument_of
 from simnav.estimators.models.inertial import InertialModel
+from simnav.estimators.models.inertial_points import InertialPoints
 from simnav.estimators.rows.kalman import Ekf
 from simnav.estimators.solvers.filter_step import filter_step
 from simnav.estimators.solvers.kalman import FilterFunctions, KalmanEstimator
+from simnav.estimators.solvers.sigma_point import SigmaPointEstimator
 from simnav.scenario import load
 from simnav.source import record
 from simnav.types import Measurement
@@ -104,10 +106,11 @@ def test_kernels_and_methods_are_the_same_filter(recording_of, adaptation):
         np.testing.assert_allclose(a.covariance, b.covariance, rtol=1e-8, atol=1e-14)
 
 
-def test_the_whole_step_runs_without_a_compiler(recording_of):
+@pytest.mark.parametrize(("solver", "model"), [(KalmanEstimator, InertialModel), (SigmaPointEstimator, InertialPoints)])
+def test_the_whole_step_runs_without_a_compiler(recording_of, solver, model):
     """The plain sources of the loop, the adaptation and the model: what a kernel is made of."""
     recording = recording_of(2, 3.0)
-    compiled, plain = (KalmanEstimator(InertialModel(), HuberWeights()) for _ in range(2))
+    compiled, plain = (solver(model(), HuberWeights()) for _ in range(2))
     for estimator in (compiled, plain):
         estimator.reset(recording.start, recording.instruments)
     made = plain._filter
