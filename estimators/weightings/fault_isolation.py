@@ -15,11 +15,13 @@ The assumption is that a log is not wrong for long while it is the last witness.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
 from simnav.compiled import kernel
-from simnav.estimators.algebra.chi_square import chi_square_limits
+from simnav.estimators.algebra.chi_square import chi_square_limits, normal_quantile
 from simnav.estimators.models.roles import fixes_and_logs
 from simnav.kernel_types import IntegerVector, Vector
 from simnav.types import Instruments
@@ -28,18 +30,44 @@ from .base import Factors
 
 __all__ = ["FaultIsolation"]
 
+#: Weight at which a measurement is rejected.
+REJECTED = 0.5
 #: Weight of the motion factors in the iteration that tests the measurements.
 LOOSE = 1e-6
 
 
+class _New(NamedTuple):
+    """The measurements since the last test.
+
+    Attributes
+    ----------
+    first : int
+        Index of the first of them.
+    failing : int
+        How many of them fail their tests.
+    rejected : int
+        How many of those before them, which were new at the last test, have hardly any weight.
+    """
+
+    first: int
+    failing: int
+    rejected: int
+
+
 @kernel
-def _failing(time: Vector, tested: float, norm: Vector, components: IntegerVector, limits: Vector) -> tuple[int, int]:
-    """Index of the first measurement after a time, and the number of failed tests from there on."""
-    first, failing = time.size, 0
+def _new(
+    time: Vector, tested: float, before: float, norm: Vector, weight: Vector, components: IntegerVector, limits: Vector
+) -> _New:
+    """Find the measurements after the time of the last test; ``before`` is the time of the test before it."""
+    first, failing, rejected = time.size, 0, 0
     while first > 0 and time[first - 1] > tested:
         first -= 1
         failing += norm[first] * norm[first] > limits[components[first]]
-    return first, failing
+    older = first
+    while older > 0 and time[older - 1] > before:
+        older -= 1
+        rejected += weight[older] <= REJECTED
+    return _New(first, failing, rejected)
 
 
 class FaultIsolation:
@@ -55,6 +83,8 @@ class FaultIsolation:
         Fault isolation: probability that a healthy measurement passes its test.
     """
 
+    DIRECTED = 0.9  # probability that failures by white noise are not found to have a common direction
+
     def __init__(self, together: int = 3, recent: float = 5.0, sound: float = 0.999):
         if together < 0:
             raise ValueError(f"together = {together}: it must be 0 or more")
@@ -63,17 +93,16 @@ class FaultIsolation:
         if not 0.5 < sound < 1.0:
             raise ValueError(f"sound = {sound:g}: it must lie between 0.5 and 1")
         self.together, self.recent, self.sound = together, recent, sound
-        self._limits = np.array(chi_square_limits(sound))
+        self._limits, self._quantile = np.array(chi_square_limits(sound)), normal_quantile(self.DIRECTED)
 
     def reset(self, instruments: Instruments) -> None:
         """Begin a run."""
-        self._is_fix = fixes_and_logs(instruments)
-        if False not in self._is_fix.values() or not self.together:
-            self._is_fix = {}  # the test needs a log
+        self._is_fix = fixes_and_logs(instruments) if self.together else {}
+        self._has_logs = False in self._is_fix.values()
         self._fixed = -np.inf  # the time of the latest fix
         self._failures: dict[str, tuple[int, float, float]] = {}  # running; the time of the first and of the latest
         self._blamed: list[tuple[float, float, NDArray[np.bool_]]] = []  # from, to, and which instruments agreed
-        self._tested = -np.inf
+        self._tested = self._before = -np.inf
         self._asking: tuple[float, float] | None = None
         self._weight = self._motion_weight = np.empty(0)
         self._fresh = True
@@ -123,19 +152,24 @@ class FaultIsolation:
 
     def _suspect(self, factors: Factors) -> tuple[float, float] | None:
         """Test the new measurements at full weight; return the interval of a suspect motion, or None."""
-        first, failing_now = _failing.unchecked(
-            factors.time, self._tested, factors.norm, factors.components, self._limits
+        found = _new.unchecked(
+            factors.time, self._tested, self._before, factors.norm, factors.weight, factors.components, self._limits
         )
-        new = slice(first, None)
+        first, new = found.first, slice(found.first, None)
         if first == len(factors.time):
             return None
-        self._tested = now = float(factors.time[-1])
+        older = slice(int(np.searchsorted(factors.time, self._before, side="right")), first)
+        self._before, self._tested = self._tested, float(factors.time[-1])
+        now = self._tested
         for i, time in zip(factors.instrument[new].tolist(), factors.time[new].tolist()):
             if self._is_fix.get(factors.names[i]):
                 self._fixed = time
-        if not (self._failures or self._blamed or failing_now):
+        if not (self._failures or self._blamed or found.failing or found.rejected):
             return None
+        # A new measurement has its full weight, so that an uncertain state may follow it; the weighting then decides.
+        rejected = set(factors.instrument[older][factors.weight[older] <= REJECTED].tolist())
         failed = factors.norm[new] ** 2 > self._limits[factors.components[new]]
+        failed |= np.isin(factors.instrument[new], list(rejected))
         for i, time, fails in zip(factors.instrument[new].tolist(), factors.time[new].tolist(), failed.tolist()):
             name = factors.names[i]
             if not fails:
@@ -148,10 +182,19 @@ class FaultIsolation:
         if self._blamed and now - self._blamed[-1][1] <= self.recent and failing:
             return self._blamed[-1][0], now
         failing = {n: f for n, f in failing.items() if f[0] >= self.together}
+        if not self._has_logs:
+            failing = {n: f for n, f in failing.items() if self._directed(factors, n, f[1])}
         kinds = {self._is_fix[name] for name in failing}
-        if len(kinds) < 2 and not (kinds == {False} and self._alone(now)):
+        if len(kinds) < 2 and not (failing and (self._alone(now) if False in kinds else not self._has_logs)):
             return None
         return min(since for _, since, _ in failing.values()), now
+
+    def _directed(self, factors: Factors, name: str, since: float) -> bool:
+        """Whether the residuals of an instrument have had a common direction since a time, as noise has not."""
+        its = (factors.instrument == factors.names.index(name)) & (factors.time >= since)
+        residual, norm, m = factors.whitened[its], factors.norm[its], float(factors.components[its].max())
+        cosine = np.einsum("ij,ij->i", residual[1:], residual[:-1]) / (norm[1:] * norm[:-1])
+        return len(cosine) > 0 and float(cosine.sum()) * (m / len(cosine)) ** 0.5 > self._quantile
 
     def _alone(self, now: float) -> bool:
         """Whether logs are the last witnesses: no fix was heard for a while."""
@@ -172,4 +215,5 @@ class FaultIsolation:
             if freedom and float(np.sum(factors.norm[its] ** 2)) <= chdtri(freedom, 1.0 - self.sound):
                 agreeing[i] = True
                 kinds.add(self._is_fix.get(name))
-        return agreeing if kinds >= ({False} if self._alone(end) else {True, False}) else None
+        needed = {True} if not self._has_logs else {False} if self._alone(end) else {True, False}
+        return agreeing if kinds >= needed else None
