@@ -185,6 +185,8 @@ class FaultIsolation:
         if not self._has_logs:
             failing = {n: f for n, f in failing.items() if self._directed(factors, n, f[1])}
         kinds = {self._is_fix[name] for name in failing}
+        if len(kinds) == 1 and self._has_logs:
+            kinds |= self._contradicting(factors, min(since for _, since, _ in failing.values()), kinds)
         if len(kinds) < 2 and not (failing and (self._alone(now) if False in kinds else not self._has_logs)):
             return None
         return min(since for _, since, _ in failing.values()), now
@@ -196,6 +198,24 @@ class FaultIsolation:
         cosine = np.einsum("ij,ij->i", residual[1:], residual[:-1]) / (norm[1:] * norm[:-1])
         return len(cosine) > 0 and float(cosine.sum()) * (m / len(cosine)) ** 0.5 > self._quantile
 
+    def _contradicting(self, factors: Factors, since: float, failing: set[bool]) -> set[bool]:
+        """The groups whose instruments do not agree with the motion since one of the other group has been failing."""
+        return {
+            is_fix
+            for name, is_fix in self._is_fix.items()
+            if is_fix not in failing and name in factors.names and self._agrees(factors, name, since) is False
+        }
+
+    def _agrees(self, factors: Factors, name: str, start: float, end: float = np.inf) -> bool | None:
+        """Whether the residuals of an instrument pass their chi-square test together; None if there are none."""
+        from scipy.special import chdtri
+
+        asked = (factors.time >= start) & (factors.time <= end) & (factors.instrument == factors.names.index(name))
+        freedom = int(factors.components[asked].sum())
+        if not freedom:
+            return None
+        return bool(np.sum(factors.norm[asked] ** 2) <= chdtri(freedom, 1.0 - self.sound))
+
     def _alone(self, now: float) -> bool:
         """Whether logs are the last witnesses: no fix was heard for a while."""
         return now - self._fixed > self.recent
@@ -205,15 +225,7 @@ class FaultIsolation:
 
         None unless a log is among them, and a fix as well where one was heard lately.
         """
-        from scipy.special import chdtri
-
-        asked = (factors.time >= start) & (factors.time <= end)
-        agreeing, kinds = np.zeros(len(factors.names), dtype=bool), set()
-        for i, name in enumerate(factors.names):
-            its = asked & (factors.instrument == i)
-            freedom = int(factors.components[its].sum())
-            if freedom and float(np.sum(factors.norm[its] ** 2)) <= chdtri(freedom, 1.0 - self.sound):
-                agreeing[i] = True
-                kinds.add(self._is_fix.get(name))
+        agrees = [self._agrees(factors, name, start, end) is True for name in factors.names]
+        kinds = {self._is_fix.get(name) for name, agreed in zip(factors.names, agrees, strict=True) if agreed}
         needed = {True} if not self._has_logs else {False} if self._alone(end) else {True, False}
-        return agreeing if kinds >= needed else None
+        return np.array(agrees, dtype=bool) if kinds >= needed else None
