@@ -15,8 +15,6 @@ The assumption is that a log is not wrong for long while it is the last witness.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -36,38 +34,14 @@ REJECTED = 0.5
 LOOSE = 1e-6
 
 
-class _New(NamedTuple):
-    """The measurements since the last test.
-
-    Attributes
-    ----------
-    first : int
-        Index of the first of them.
-    failing : int
-        How many of them fail their tests.
-    rejected : int
-        How many of those before them, which were new at the last test, have hardly any weight.
-    """
-
-    first: int
-    failing: int
-    rejected: int
-
-
 @kernel
-def _new(
-    time: Vector, tested: float, before: float, norm: Vector, weight: Vector, components: IntegerVector, limits: Vector
-) -> _New:
-    """Find the measurements after the time of the last test; ``before`` is the time of the test before it."""
-    first, failing, rejected = time.size, 0, 0
+def _failing(time: Vector, tested: float, norm: Vector, components: IntegerVector, limits: Vector) -> tuple[int, int]:
+    """Index of the first measurement after a time, and the number of failed tests from there on."""
+    first, failing = time.size, 0
     while first > 0 and time[first - 1] > tested:
         first -= 1
         failing += norm[first] * norm[first] > limits[components[first]]
-    older = first
-    while older > 0 and time[older - 1] > before:
-        older -= 1
-        rejected += weight[older] <= REJECTED
-    return _New(first, failing, rejected)
+    return first, failing
 
 
 class FaultIsolation:
@@ -102,7 +76,8 @@ class FaultIsolation:
         self._fixed = -np.inf  # the time of the latest fix
         self._failures: dict[str, tuple[int, float, float]] = {}  # running; the time of the first and of the latest
         self._blamed: list[tuple[float, float, NDArray[np.bool_]]] = []  # from, to, and which instruments agreed
-        self._tested = self._before = -np.inf
+        self._tested = -np.inf
+        self._rejected: set[int] = set()
         self._asking: tuple[float, float] | None = None
         self._weight = self._motion_weight = np.empty(0)
         self._fresh = True
@@ -119,6 +94,7 @@ class FaultIsolation:
             if self._asking is not None:  # the last epoch ended before the result of the test
                 factors.motion_weight[:] = 1.0
             self._fresh, self._asking = True, None
+            self._rejected = self._rejected_before(factors)
             return False
         if not self._is_fix:
             return True
@@ -150,26 +126,33 @@ class FaultIsolation:
         factors.motion_weight[first:][factors.motion_time[first:] <= end] = LOOSE
         return False
 
+    def _rejected_before(self, factors: Factors) -> set[int]:
+        """The instruments whose newest measurement of the last epoch ended with hardly any weight."""
+        if not (factors.weight <= REJECTED).any():
+            return set()
+        last = {}
+        for i, time, weight in zip(factors.instrument.tolist(), factors.time.tolist(), factors.weight.tolist()):
+            if time <= self._tested:
+                last[i] = weight
+        return {i for i, weight in last.items() if weight <= REJECTED}
+
     def _suspect(self, factors: Factors) -> tuple[float, float] | None:
         """Test the new measurements at full weight; return the interval of a suspect motion, or None."""
-        found = _new.unchecked(
-            factors.time, self._tested, self._before, factors.norm, factors.weight, factors.components, self._limits
+        first, failing_now = _failing.unchecked(
+            factors.time, self._tested, factors.norm, factors.components, self._limits
         )
-        first, new = found.first, slice(found.first, None)
+        new = slice(first, None)
         if first == len(factors.time):
             return None
-        older = slice(int(np.searchsorted(factors.time, self._before, side="right")), first)
-        self._before, self._tested = self._tested, float(factors.time[-1])
-        now = self._tested
+        self._tested = now = float(factors.time[-1])
         for i, time in zip(factors.instrument[new].tolist(), factors.time[new].tolist()):
             if self._is_fix.get(factors.names[i]):
                 self._fixed = time
-        if not (self._failures or self._blamed or found.failing or found.rejected):
+        if not (self._failures or self._blamed or failing_now or self._rejected):
             return None
-        # A new measurement has its full weight, so that an uncertain state may follow it; the weighting then decides.
-        rejected = set(factors.instrument[older][factors.weight[older] <= REJECTED].tolist())
+        # A new measurement has its full weight, so that an uncertain state may follow it; the weighting decides later.
         failed = factors.norm[new] ** 2 > self._limits[factors.components[new]]
-        failed |= np.isin(factors.instrument[new], list(rejected))
+        failed |= np.isin(factors.instrument[new], list(self._rejected))
         for i, time, fails in zip(factors.instrument[new].tolist(), factors.time[new].tolist(), failed.tolist()):
             name = factors.names[i]
             if not fails:
