@@ -15,7 +15,7 @@ from tests.audit.self_test import CAUSES, CLEAN, Ran
 def measured(**of_all: Any) -> dict[str, list[Ran]]:
     """Ten runs of each cause that are lost and say so, and ten clean ones."""
     lost = [Ran("ekf", seed, True, True)._replace(**of_all) for seed in range(10)]
-    return {cause: lost for cause in CAUSES} | {f: [Ran("ekf", s, False, False) for s in range(10)] for f in CLEAN}
+    return dict.fromkeys(CAUSES, lost) | {f: [Ran("ekf", s, False, False) for s in range(10)] for f in CLEAN}
 
 
 def verdicts(found: dict[str, list[Ran]]) -> list[bool]:
