@@ -19,7 +19,7 @@ from __future__ import annotations
 
 from math import sqrt
 
-__all__ = ["ConsistencyTest", "CostTest", "chi_square_deviate", "improbable_square"]
+__all__ = ["ConsistencyTest", "CostTest", "chi_square_deviate"]
 
 #: Standard normal deviate beyond which a cost is improbable (one in 30 000).
 IMPROBABLE = 4.0
@@ -45,18 +45,6 @@ def chi_square_deviate(value: float, freedom: float) -> float:
     spread = 2.0 / (9.0 * freedom)
     deviate: float = ((value / freedom) ** (1.0 / 3.0) - 1.0 + spread) / sqrt(spread)
     return deviate
-
-
-def improbable_square(freedom: float) -> float:
-    """The value of chi-square at the limit `IMPROBABLE`: the inverse of `chi_square_deviate`.
-
-    Examples
-    --------
-    >>> round(chi_square_deviate(improbable_square(3.0), 3.0), 6)
-    4.0
-    """
-    spread = 2.0 / (9.0 * freedom)
-    return freedom * (1.0 - spread + IMPROBABLE * sqrt(spread)) ** 3
 
 
 class ConsistencyTest:

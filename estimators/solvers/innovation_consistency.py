@@ -8,8 +8,9 @@ distinguish these. The filter reports that it is inconsistent, and continues; it
 
 A filter that follows wrong measurements bends its states until they agree. Then the last `EPOCHS` epochs are as they
 should be, while the estimate is lost. So there is a second sum, over the last `LONG` epochs. In it no epoch counts for
-more than the square at which it would be improbable by itself. So a single wrong measurement is not remembered, and a
-contradiction that lasted is. Such a sum is never larger than chi-square, so its limit is one of chi-square, too.
+more than `BOUND` times its degrees of freedom. So it is improbable only if about a third of the epochs contradict the
+filter: one that recovers soon is not reported for it afterwards. Such a sum is never larger than chi-square, so its
+limit is one of chi-square, too.
 
 The noise is the one in use, so an adapted noise explains a large innovation. Rejected measurements are not counted.
 
@@ -21,7 +22,7 @@ from __future__ import annotations
 
 from collections import deque
 
-from .cost_consistency import ConsistencyTest, improbable_square
+from .cost_consistency import ConsistencyTest
 
 __all__ = ["InnovationTest"]
 
@@ -29,6 +30,8 @@ __all__ = ["InnovationTest"]
 EPOCHS = 20
 #: Number of epochs of the second sum.
 LONG = 100
+#: What an epoch counts in it at most, in degrees of freedom.
+BOUND = 2.0
 
 
 class InnovationTest:
@@ -41,7 +44,6 @@ class InnovationTest:
         self._freedoms: deque[int] = deque(maxlen=EPOCHS)
         self._bounded: deque[tuple[float, int]] = deque([(0.0, 0)] * LONG)
         self._long_sum, self._long_freedom = 0.0, 0
-        self._largest: dict[int, float] = {}
 
     @property
     def variance_factor(self) -> float:
@@ -63,13 +65,10 @@ class InnovationTest:
         freedom = self._freedom
         if not freedom:
             return
-        largest = self._largest.get(freedom)
-        if largest is None:
-            largest = self._largest[freedom] = improbable_square(freedom)
         self._sums.append(self._sum)
         self._freedoms.append(freedom)
         self._latest.judge(sum(self._sums), sum(self._freedoms))
-        bounded = self._sum if self._sum < largest else largest
+        bounded = self._sum if self._sum < BOUND * freedom else BOUND * freedom
         oldest, its_freedom = self._bounded.popleft()
         self._bounded.append((bounded, freedom))
         self._long_sum += bounded - oldest

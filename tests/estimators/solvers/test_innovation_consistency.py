@@ -57,11 +57,11 @@ def after(square: float, epochs: int, seed: int = 0) -> list[bool]:
     return found[100:]
 
 
-def test_a_contradiction_that_lasted_is_remembered_and_a_single_wrong_measurement_is_not():
-    lasted, single = after(1000.0, 30), after(1000.0, 1)
-    assert all(lasted[5 : 30 + LONG - 10])
-    assert not any(lasted[30 + LONG :])
-    assert not any(single[EPOCHS:])
+def test_a_contradiction_that_lasted_is_remembered_and_a_short_one_is_not():
+    lasted, short = after(1000.0, 60), after(1000.0, 15)
+    assert all(lasted[5 : 60 + EPOCHS + 30])
+    assert not any(lasted[60 + LONG :])
+    assert not any(short[15 + EPOCHS :])
 
 
 @pytest.fixture(scope="module")
