@@ -7,10 +7,15 @@ row. A filter cannot distinguish this from two instruments that are wrong at onc
 the motion factors of that time get nearly no weight. Then correct measurements agree with each other, and wrong ones do
 not. Only those that agree get their full weight.
 
+A measurement counts as failed if its residual fails the test, or if the last one of its instrument has ended with
+hardly any weight: a new measurement has its full weight at first, and an uncertain state follows it. While a log is
+failing, fixes fail, too, if their residuals since then do not pass a chi-square test together.
+
 If no fix was heard for a while, a log is the last witness beside the motion. If it fails several times in a row, one of
 the two is wrong, and nothing in the measurements says which. Then the motion is suspected: a log that is rejected for
 good leaves a prediction without bound, and a log that is wrongly believed leaves an error that grows with its own.
-The assumption is that a log is not wrong for long while it is the last witness.
+The assumption is that a log is not wrong for long while it is the last witness. Where there is no log at all, the same
+holds of fixes whose residuals have a common direction; those of a larger noise have none.
 """
 
 from __future__ import annotations
@@ -32,6 +37,8 @@ __all__ = ["FaultIsolation"]
 REJECTED = 0.5
 #: Weight of the motion factors in the iteration that tests the measurements.
 LOOSE = 1e-6
+#: The same where there is no log: fixes alone do not hold velocity and attitude, which must not go too far.
+LOOSE_WITHOUT_LOG = 1e-3
 
 
 @kernel
@@ -123,7 +130,8 @@ class FaultIsolation:
         factors.weight[(factors.time >= start) & (factors.time <= end)] = 1.0
         # The first reading may belong to an older node, so the motion that leads there is loosened, too.
         first = max(int(np.searchsorted(factors.motion_time, start, side="right")) - 1, 0)
-        factors.motion_weight[first:][factors.motion_time[first:] <= end] = LOOSE
+        loose = LOOSE if self._has_logs else LOOSE_WITHOUT_LOG
+        factors.motion_weight[first:][factors.motion_time[first:] <= end] = loose
         return False
 
     def _rejected_before(self, factors: Factors) -> set[int]:
@@ -168,8 +176,8 @@ class FaultIsolation:
         if not self._has_logs:
             failing = {n: f for n, f in failing.items() if self._directed(factors, n, f[1])}
         kinds = {self._is_fix[name] for name in failing}
-        if len(kinds) == 1 and self._has_logs:
-            kinds |= self._contradicting(factors, min(since for _, since, _ in failing.values()), kinds)
+        if kinds == {False} and self._fixes_contradict(factors, min(since for _, since, _ in failing.values())):
+            kinds = {False, True}
         if len(kinds) < 2 and not (failing and (self._alone(now) if False in kinds else not self._has_logs)):
             return None
         return min(since for _, since, _ in failing.values()), now
@@ -181,13 +189,10 @@ class FaultIsolation:
         cosine = np.einsum("ij,ij->i", residual[1:], residual[:-1]) / (norm[1:] * norm[:-1])
         return len(cosine) > 0 and float(cosine.sum()) * (m / len(cosine)) ** 0.5 > self._quantile
 
-    def _contradicting(self, factors: Factors, since: float, failing: set[bool]) -> set[bool]:
-        """The groups whose instruments do not agree with the motion since one of the other group has been failing."""
-        return {
-            is_fix
-            for name, is_fix in self._is_fix.items()
-            if is_fix not in failing and name in factors.names and self._agrees(factors, name, since) is False
-        }
+    def _fixes_contradict(self, factors: Factors, since: float) -> bool:
+        """Whether the fixes of one instrument do not agree with the motion since a log has been failing."""
+        fixes = [name for name in factors.names if self._is_fix.get(name)]
+        return any(self._agrees(factors, name, since) is False for name in fixes)
 
     def _agrees(self, factors: Factors, name: str, start: float, end: float = np.inf) -> bool | None:
         """Whether the residuals of an instrument pass their chi-square test together; None if there are none."""
