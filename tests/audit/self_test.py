@@ -4,8 +4,8 @@ A run is *lost* if an error is beyond 100 times its stated sigma for more than a
 (`simnav.scoring.ending`), whatever the row says. It is *found* if the diagnostic ``inconsistent`` alone makes the run
 an inconsistent one. A false alarm is a voyage of a clean family on which this is so, and which is not lost.
 
-Each cause is set so large that rows are lost by it. The seeds begin at `FIRST`. One of them (frozen GNSS, seed 9001) led
-to the long sum of `simnav.estimators.solvers.innovation_consistency`, so give other seeds where that sum is judged.
+Each cause is set so large that rows are lost by it. The seeds begin at `FIRST`. One of them (frozen GNSS, seed 9001)
+led to the long sum of `simnav.estimators.solvers.innovation_consistency`, so give other seeds where that sum is judged.
 """
 
 from __future__ import annotations
