@@ -73,5 +73,6 @@ class InnovationTest:
         self._bounded.append((bounded, freedom))
         self._long_sum += bounded - oldest
         self._long_freedom += freedom - its_freedom
-        self._lasting.judge(self._long_sum, self._long_freedom)
+        if its_freedom:  # from then on there are so many epochs
+            self._lasting.judge(self._long_sum, self._long_freedom)
         self._sum, self._freedom = 0.0, 0

@@ -4,7 +4,8 @@ A run is *lost* if an error is beyond 100 times its stated sigma for more than a
 (`simnav.scoring.ending`), whatever the row says. It is *found* if the diagnostic ``inconsistent`` alone makes the run
 an inconsistent one. A false alarm is a voyage of a clean family on which this is so, and which is not lost.
 
-Each cause is set so large that rows are lost by it. The seeds begin at `FIRST`, and no threshold was chosen on them.
+Each cause is set so large that rows are lost by it. The seeds begin at `FIRST`. One of them (frozen GNSS, seed 9001)
+led to the long sum of `simnav.estimators.solvers.innovation_consistency`, so give other seeds where that sum is judged.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ from simnav.sensors.faults import FalseZero, Frozen
 __all__ = ["CAUSES", "CLEAN", "FIRST", "ROWS", "Ran", "found", "parts", "ran", "rows", "voyage"]
 
 #: Seed of the first run of a cause; the others count up.
-FIRST = 9000
+FIRST = int(os.environ.get("SIMNAV_AUDIT_SELF_TEST_FIRST", "9000"))
 RUNS = int(os.environ.get("SIMNAV_AUDIT_SELF_TEST_RUNS", "6"))
 CLEAN_RUNS = int(os.environ.get("SIMNAV_AUDIT_SELF_TEST_CLEAN_RUNS", "40"))
 ROWS = tuple(os.environ.get("SIMNAV_AUDIT_SELF_TEST_ROWS", "ekf,ukf,inekf,iae-fgo,huber-fgo,gnc-fgo").split(","))
