@@ -35,8 +35,6 @@ class EstimatorEntry:
     ----------
     label, page : str
         Label of the estimator, and file of its page.
-    data, runs : str
-        Names of the files of its errors and of the scores of its runs (``data/NAME.js``).
     reference : bool
         Whether it is a reference, which is not ranked.
     facts : EstimatorFacts
@@ -45,10 +43,13 @@ class EstimatorEntry:
 
     label: str
     page: str
-    data: str
-    runs: str
     reference: bool
     facts: EstimatorFacts
+
+    @property
+    def data(self) -> str:
+        """Name of the file of its data (``data/NAME.js``)."""
+        return Path(self.page).stem
 
 
 @dataclass(frozen=True)
@@ -89,7 +90,7 @@ class ScenarioEntry:
 
     @property
     def data(self) -> str:
-        """Beginning of the names of its files of data."""
+        """Name of the file of its data."""
         return Path(self.page).stem
 
 

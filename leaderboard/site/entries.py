@@ -40,7 +40,7 @@ def entries(
     for label in dict.fromkeys([*ranked, *sorted({label for by in runs.values() for label in by})]):
         stem = _slug(label, taken)
         estimators[label] = EstimatorEntry(
-            label, f"estimator-{stem}.html", f"row-{stem}", f"runs-{stem}", label in references, estimator_facts(label)
+            label, f"estimator-{stem}.html", label in references, estimator_facts(label)
         )
     return estimators, {s: _scenario(s, by, f"{_slug(s, taken)}.html") for s, by in runs.items()}
 

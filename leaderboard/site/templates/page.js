@@ -1,7 +1,7 @@
 // What each kind of page does with its data.
 "use strict";
-{
-  const { make, page, state, write } = simnav;
+(async () => {
+  const { make, state, write } = simnav, page = (simnav.page = await simnav.read(document.body.dataset.page));
   const at = (name, within = document) => within.querySelector(`[data-${name}]`);
   const say = (host, text) => host.replaceChildren(make("p", { class: "note" }, text));
 
@@ -9,10 +9,10 @@
 
   const drawn = new Set();
 
-  const drawTrack = async ({ key, file, ...rest }) => {
-    if (drawn.has(key)) return;
-    drawn.add(key);
-    const panel = document.getElementById(`track-${key}`), track = file ? await simnav.read(file) : { key, ...rest };
+  const drawTrack = (track) => {
+    if (drawn.has(track.key)) return;
+    drawn.add(track.key);
+    const panel = document.getElementById(`track-${track.key}`);
     simnav.table(at("table", panel), track.table);
     if (track.map) simnav.chart(at("map", panel), track.map);
     const charts = at("charts", panel);
@@ -133,7 +133,7 @@
   };
 
   const oneRun = (host) => {
-    const { data, argument } = page.scenario, rows = Object.keys(page.rows);
+    const { argument } = page.scenario, rows = Object.keys(page.rows);
     if (!rows.length) return say(host, "No estimator ran here.");
     let row = state.get("row"), seed = Number(state.get("seed") ?? page.runs.seeds[0]);
     if (!rows.includes(row)) row = page.first[0];
@@ -144,9 +144,9 @@
     const inside = make("details", { class: "inside" }, make("summary", {}, "Innovations, residuals and weights of this run"), inner);
     host.append(make("div", { class: "tools" }, make("label", {}, "Estimator ", choice), make("label", {}, "Run ", runs)), facts, make("pre", { tabindex: "0" }, command), drawn, charts, inside, make("details", {}, make("summary", {}, "All runs of this estimator"), list));
     let made = null, within = null;
-    const showInside = async () => {
+    const showInside = () => {
       if (!inside.open || !page.runs.seeds.includes(seed)) return;
-      const read = await simnav.read(`${data}-run-${seed}-inside`);
+      const read = page.runs.data[seed].inside;
       if (!within) within = page.runs.inside.map((chart) => simnav.chart(inner, { ...chart, data: read[chart.name] ?? {} }));
       else for (const chart of within) chart.show({ data: read[chart.given.name] ?? {} });
     };
@@ -156,14 +156,14 @@
       state.set("seed", String(seed));
       runs.value = String(seed);
       command.textContent = `simnav run ${argument} --seed ${seed} -e ${row} --plot run.svg`;
-      const all = (await simnav.read(page.rows[row].data)).scenarios[page.scenario.id];
+      const all = (await simnav.read(page.rows[row].data)).runs.scenarios[page.scenario.id];
       drawRuns(list, all);
       const k = all.seed.indexOf(seed);
       facts.textContent = k < 0 ? `${row} did not run with seed ${seed}.` : `${row}, seed ${seed}${all.note?.[k] ? `, ${all.note[k]}` : ""}: ${all.status?.[k] ?? "ok"}${all.reason?.[k] ? ` (${all.reason[k]})` : ""}, horizontal RMSE ${write.number(all.scores.horizontal_rmse?.[k])} m, ${write.duration(all.seconds[k])}.`;
       charts.hidden = drawn.hidden = !page.runs.seeds.includes(seed);
       inside.hidden = charts.hidden || !page.runs.inside.length;
       if (charts.hidden) return;
-      const name = `${data}-run-${seed}`, read = await simnav.read(name);
+      const read = page.runs.data[seed];
       drawn.hidden = !read.draws.length;
       const values = read.draws.map(([key, value]) => make("tr", {}, make("th", { scope: "row" }, key), make("td", { class: "wrap" }, value)));
       drawn.replaceChildren(make("summary", {}, `Drawn for this run: ${read.draws.length} values`), make("div", { class: "scroll", tabindex: "0", role: "region", "aria-label": "Drawn for this run" }, make("table", {}, make("tbody", {}, values))));
@@ -173,7 +173,7 @@
       };
       if (!made) made = page.runs.charts.map((chart) => simnav.chart(charts, { ...chart, data: shown(chart.name) }));
       else for (const chart of made) chart.show({ data: shown(chart.given.name) });
-      await showInside();
+      showInside();
     };
     const drawRuns = (target, all) => {
       const columns = page.table.columns.filter((c) => all.scores[c.key]).map((c) => ({ ...c, hidden: false }));
@@ -219,7 +219,7 @@
   });
 
   const compared = async (a, b) => {
-    const [mine, other] = await Promise.all([simnav.read(a), simnav.read(b)]);
+    const [mine, other] = (await Promise.all([simnav.read(a), simnav.read(b)])).map((row) => row.errors);
     const found = simnav.comparison(mine, other);
     for (const row of found.rows) row.entry = mine.scenarios[row.scenario];
     return found;
@@ -326,8 +326,9 @@
     const keys = page.wins.map((t) => t.key);
     let key = keys.includes(state.get("track")) ? state.get("track") : keys[0], chart = null;
     const select = make("select", { "aria-label": "Track" }, page.wins.map((t) => make("option", { value: t.key, selected: t.key === key }, t.title)));
-    const draw = async () => {
-      const given = await simnav.read(page.wins.find((t) => t.key === key).file);
+    const draw = () => {
+      const given = page.wins.find((t) => t.key === key).chart, { row, other } = given.data.cells;
+      given.data.cells.page = row.map((a, k) => `compare.html#${new URLSearchParams({ track: key, a, b: other[k] })}`);
       if (chart) chart.show(given);
       else chart = simnav.chart(place, { ...given });
     };
@@ -342,5 +343,6 @@
 
   const kinds = { index, scenario, estimator, compare, about: () => {} };
   at("print")?.addEventListener("click", () => simnav.print());
-  Promise.resolve(kinds[page.kind]?.()).then(() => { document.body.dataset.ready = "true"; });
-}
+  await kinds[page.kind]?.();
+  document.body.dataset.ready = "true";
+})();
