@@ -1,8 +1,8 @@
 """The first view of a board: what a reader has to know of it, in one picture, one sentence and four rows to take.
 
-All of it is of one track: the first that has a plain row and kinds of trouble. **Rows worth knowing**: the four that are
-advised, then the rows that are told from the plain row and better in a kind of trouble, the best of each kind first,
-then those with the smallest score.
+All of it is of one track: the first that has a plain row and kinds of trouble. **Rows worth knowing**: those that are
+advised, then those that are told from the plain row and better in a kind of trouble, the best of each kind first, then
+those with the smallest score.
 
 =============  =========================================================================================================
 plain          The row that all others are compared with.
@@ -18,6 +18,9 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from simnav.leaderboard.figures.ratio_map import written_map
 
 from . import tables
 from .board import Ranking, TrackRanking, TrackRow
@@ -26,7 +29,10 @@ from .summary import best_rows, less
 from .trouble_profile import GroupRow, TrackProfile, TroubleGroup
 from .troubles import within
 
-__all__ = ["KNOWN", "Advice", "FirstView", "KnownRow", "first_view", "main_profile"]
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["KNOWN", "Advice", "FirstView", "KnownRow", "first_view", "view_figure"]
 
 #: Rows of the picture.
 KNOWN = 8
@@ -109,7 +115,19 @@ class FirstView:
     silence: str
 
 
-def main_profile(profiles: Sequence[TrackProfile], ranking: Ranking) -> tuple[TrackProfile, TrackRanking] | None:
+def view_figure(view: FirstView) -> Figure:
+    """The picture: rows worth knowing across, kinds of trouble and all of them together down."""
+    cells = {(g.title, r.estimator): r.groups[k].to_plain for k, g in enumerate(view.groups) for r in view.rows}
+    cells |= {("All kinds alike", r.estimator): r.to_plain for r in view.rows}
+    told = {(g.title, r.estimator) for k, g in enumerate(view.groups) for r in view.rows
+            if view.plain in (*r.groups[k].better_than, *r.groups[k].worse_than)}  # fmt: skip
+    return written_map(
+        cells, told, f"Error beside that of {view.plain} on the same runs",
+        "Blue: less; orange: more. Bold: a test tells the two apart.",
+    )  # fmt: skip
+
+
+def _main(profiles: Sequence[TrackProfile], ranking: Ranking) -> tuple[TrackProfile, TrackRanking] | None:
     """The track of the first view: the first whose rows are ranked beside one plain row; None without one."""
     for profile in profiles:
         track = ranking.track(profile.track)
@@ -128,7 +146,7 @@ def first_view(ranking: Ranking, profiles: Sequence[TrackProfile]) -> FirstView 
     profiles : sequence of TrackProfile
         Its tracks by kind of trouble.
     """
-    found = main_profile(profiles, ranking)
+    found = _main(profiles, ranking)
     if found is None:
         return None
     profile, track = found
@@ -174,31 +192,35 @@ def _advice(track: TrackRanking, profile: TrackProfile, rows: dict[str, KnownRow
         costs = [(rows[n].cost, n) for n in told if n in may_be_best and math.isfinite(rows[n].cost)]
         if costs:
             cost, cheap = min(costs)
-            yield Advice("cheapest", cheap, f"of the rows that may be the best; {tables.number(cost, 2)} times the "
+            yield Advice("cheapest", cheap, f"of the filters that may be the best: {tables.number(cost, 2)} times the "
                          f"processor time of `{plain}`")  # fmt: skip
     honest = [r for r in rows.values() if r.to_plain <= 1.0 and math.isfinite(r.coverage)]
     if honest:
         best = min(honest, key=lambda r: abs(r.coverage - _STATED))
         beside = rows[plain].coverage
-        other = f"; with `{plain}` {tables.percent(beside)}" if best.estimator != plain and beside > 0.0 else ""
-        yield Advice("most honest", best.estimator, f"its 95 % region holds the truth {tables.percent(best.coverage)}"
+        other = f"; with `{plain}` {_percent(beside)}" if best.estimator != plain and beside > 0.0 else ""
+        yield Advice("most honest", best.estimator, f"its 95 % region holds the truth {_percent(best.coverage)}"
                      f" of the time{other}")  # fmt: skip
+
+
+def _percent(share: float) -> str:
+    return f"{100.0 * share:.0f} %"
 
 
 def _why_plain(profile: TrackProfile, plain: str) -> str:
     calm = [g for g in profile.groups if not any(plain in r.better_than for r in g.ranked)]
     if len(calm) == len(profile.groups):
-        return "no row is shown to be better in any kind of trouble"
+        return "in no kind of trouble a filter is shown to be better"
     if any(g.trouble == "nothing" for g in calm):
-        return "nothing is wrong: no row is shown to be better"
-    return f"no row is shown to be better with: {', '.join(within(g.title) for g in calm)}" if calm else "all know it"
+        return "where nothing is wrong, no filter is shown to be better"
+    return "what all others are compared with"
 
 
 def _why_robust(row: KnownRow, plain: str) -> str:
     bad = sum(g.bad * g.runs for g in row.groups)
     runs = sum(g.runs for g in row.groups)
-    lost = "no run is lost" if not bad else f"{tables.percent(bad / runs)} of the runs are bad"
-    return f"{less(row.to_plain):.0f} % less error than `{plain}` over all kinds of trouble; {lost}"
+    lost = "no run is far worse" if not bad else f"{tables.percent(bad / runs)} of the runs are far worse"
+    return f"{less(row.to_plain):.0f} % less error than `{plain}` over all kinds of trouble, and {lost}"
 
 
 def _sentence(profile: TrackProfile, rows: dict[str, KnownRow], advice: Sequence[Advice]) -> str:
@@ -206,14 +228,14 @@ def _sentence(profile: TrackProfile, rows: dict[str, KnownRow], advice: Sequence
     plain = f"the plain filter `{advice[0].estimator}`"
     robust = next((rows[a.estimator] for a in advice if a.what == "robust"), None)
     if robust is None:
-        return f"No row is shown to be better than {plain} over all kinds of trouble: take that one."
+        return f"No filter is shown to be better than {plain} over all kinds of trouble: take that one."
     told = [(g.to_plain, group) for g, group in zip(robust.groups, profile.groups, strict=True)
             if advice[0].estimator in g.better_than]  # fmt: skip
     nothing = next((g for g in profile.groups if g.trouble == "nothing"), None)
     calm = nothing is not None and not any(advice[0].estimator in r.better_than for r in nothing.ranked)
-    first = f"With nothing wrong, no row is shown to be better than {plain}; over all kinds of trouble" if calm else (
-        f"Compared with {plain}, over all kinds of trouble")  # fmt: skip
-    said = f"{first} `{robust.estimator}` has {less(robust.to_plain):.0f} % less error"
+    first = f"Where nothing is wrong, no filter is shown to be better than {plain}" if calm else f"Beside {plain}"
+    said = f"{first}{'; ' if calm else ', '}over all kinds of trouble `{robust.estimator}` has "
+    said += f"{less(robust.to_plain):.0f} % less error"
     if told and less(min(told, key=lambda t: t[0])[0]) > less(robust.to_plain) + _CLEARLY:
         gain, group = min(told, key=lambda t: t[0])
         said += f", and {less(gain):.0f} % less with {within(group.title)}"

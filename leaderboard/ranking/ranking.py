@@ -333,7 +333,9 @@ def _rows(
         every = np.concatenate([c.capped for c in mine])
         lost = share(failed, runs)
         units = _count(tables, cells[n])
-        over = scenario_interval(f.logs, f.scenarios, f.strata) if standing[n][0] != "incomplete" else Interval(math.nan)
+        over = (
+            scenario_interval(f.logs, f.scenarios, f.strata) if standing[n][0] != "incomplete" else Interval(math.nan)
+        )
         rows.append({
             "estimator": n,
             "standing": standing[n][0],

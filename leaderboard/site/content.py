@@ -12,6 +12,7 @@ from simnav.leaderboard.results.provenance import Provenance
 from simnav.leaderboard.results.web_addresses import NOWHERE, Home
 
 from .facts import EstimatorFacts
+from .headings import Heading
 
 __all__ = ["PLAIN", "EstimatorEntry", "ExtraPage", "Fact", "ScenarioEntry", "SiteFacts"]
 
@@ -127,6 +128,8 @@ class SiteFacts:
         Version of simnav that wrote the site; date and time.
     total, runs : int
         Results, also of estimators that a scenario does not suit; 0 for a page that stands alone. Runs among them.
+    headings : sequence of Heading
+        Pages of the tracks.
     scenarios, estimators : sequence
         What has a page of its own, in the order of the menus.
     papers : sequence of ExtraPage
@@ -149,6 +152,7 @@ class SiteFacts:
     generated: str
     total: int = 0
     runs: int = 0
+    headings: Sequence[Heading] = ()
     scenarios: Sequence[ScenarioEntry] = ()
     estimators: Sequence[EstimatorEntry] = ()
     papers: Sequence[ExtraPage] = ()

@@ -24,13 +24,13 @@
 
   const drawWeights = (host, track) => {
     const kept = (state.get(`${track.key}.weights`) ?? "").split(",");
-    const weights = Object.fromEntries(track.scenarios.map((s, i) => [s.id, kept[i] === undefined || kept[i] === "" ? 1 : Math.max(0, Number(kept[i]) || 0)]));
-    const even = Object.fromEntries(track.scenarios.map((s) => [s.id, 1]));
+    const weights = Object.fromEntries(track.kinds.map((s, i) => [s.id, kept[i] === undefined || kept[i] === "" ? 1 : Math.max(0, Number(kept[i]) || 0)]));
+    const even = Object.fromEntries(track.kinds.map((s) => [s.id, 1]));
     const before = simnav.places(simnav.weighted(track.ratios, even));
     const fields = make("div", { class: "weights" }), table = make("div");
     const draw = () => {
       const scores = simnav.weighted(track.ratios, weights), places = simnav.places(scores);
-      const without = track.scenarios.map((s) => simnav.places(simnav.weighted(track.ratios, { ...even, [s.id]: 0 })));
+      const without = track.kinds.map((s) => simnav.places(simnav.weighted(track.ratios, { ...even, [s.id]: 0 })));
       const rows = Object.keys(track.ratios).map((row) => {
         const range = without.map((w) => w[row]).filter((x) => x !== null), moved = before[row] - places[row];
         return {
@@ -43,19 +43,19 @@
         name: `${track.key}.weighted`, title: `${track.title}: places with these weights`, sort: "place", rows,
         columns: [
           { key: "place", title: "Place", help: "With these weights.", kind: "integer" },
-          { key: "name", title: "Estimator", help: "Only estimators with a result on every scenario that counts have a place.", kind: "name", fixed: true },
-          { key: "score", title: "Score", help: "Weighted geometric mean of the scores by scenario.", kind: "ratio" },
+          { key: "name", title: "Estimator", help: "Only estimators with a result in every kind that counts have a place.", kind: "name", fixed: true },
+          { key: "score", title: "Score", help: "Weighted geometric mean of the scores by kind of trouble.", kind: "ratio" },
           { key: "moved", title: "Moved", help: "Places gained or lost against equal weights.", kind: "text" },
-          { key: "without", title: "Without one scenario", help: "Places when any one scenario is left out, all others counting the same.", kind: "text" },
+          { key: "without", title: "Without one kind", help: "Places when any one kind of trouble is left out, all others counting the same.", kind: "text" },
         ],
       });
     };
-    for (const s of track.scenarios) {
-      const field = make("input", { type: "number", min: "0", max: "10", step: "0.5", value: weights[s.id], "data-scenario": s.id });
+    for (const s of track.kinds) {
+      const field = make("input", { type: "number", min: "0", max: "10", step: "0.5", value: weights[s.id], "data-kind": s.id });
       field.addEventListener("input", () => {
         weights[s.id] = Math.max(0, Number(field.value) || 0);
-        const changed = track.scenarios.some((t) => weights[t.id] !== 1);
-        state.set(`${track.key}.weights`, changed ? track.scenarios.map((t) => weights[t.id]).join(",") : "");
+        const changed = track.kinds.some((t) => weights[t.id] !== 1);
+        state.set(`${track.key}.weights`, changed ? track.kinds.map((t) => weights[t.id]).join(",") : "");
         draw();
       });
       fields.append(make("label", { "data-help": s.title }, field, ` ${s.name}`));
@@ -64,8 +64,10 @@
     draw();
   };
 
-  const index = () => {
+  const tracks = () => {
+    simnav.shown.rows = [];
     const tabs = [...document.querySelectorAll("[role=tab]")], select = at("tracks"); // the second on a phone
+    if (!tabs.length) return page.tracks.forEach(drawTrack);
     const show = (tab, focus) => {
       select.value = tab.dataset.track;
       for (const other of tabs) {
@@ -75,7 +77,7 @@
         document.getElementById(other.getAttribute("aria-controls")).hidden = !chosen;
       }
       if (focus) tab.focus();
-      return drawTrack(page.tracks.find((t) => t.key === tab.dataset.track));
+      drawTrack(page.tracks.find((t) => t.key === tab.dataset.track));
     };
     tabs.forEach((tab, k) => {
       tab.addEventListener("click", () => { state.set("track", tab.dataset.track); show(tab); });
@@ -91,8 +93,32 @@
       state.set("track", select.value);
       show(tabs.find((t) => t.dataset.track === select.value));
     });
-    simnav.shown.rows = [];
-    return tabs.length ? show(tabs.find((t) => t.dataset.track === state.get("track")) ?? tabs[0]) : null;
+    show(tabs.find((t) => t.dataset.track === state.get("track")) ?? tabs[0]);
+  };
+
+  // -- the first page --------------------------------------------------------------------------------
+
+  /** Three boxes, and what the stored results say for them. */
+  const index = () => {
+    const host = at("advisor");
+    if (!host) return;
+    const { answers, troubles, limits, milliseconds, commands } = page.advisor;
+    const box = (key, label, options) => {
+      const kept = state.get(key), select = make("select", {}, options.map(([value, text]) => make("option", { value, selected: value === kept }, text)));
+      select.addEventListener("change", () => { state.set(key, select.value); show(); });
+      host.append(make("label", {}, `${label} `, select));
+      return select;
+    };
+    const kit = box("instruments", "Instruments", Object.keys(answers).map((title) => [title, title]));
+    const trouble = box("trouble", "What may go wrong", Object.entries(troubles));
+    const limit = box("time", "Time of an epoch", limits.map((text, k) => [String(k), text]));
+    const show = () => {
+      const [first, ...rest] = answers[kit.value][trouble.value][Number(limit.value)], time = milliseconds[Number(limit.value)];
+      const code = (text) => text.split("`").map((part, k) => (k % 2 ? make("code", {}, part) : part));
+      const command = `simnav recommend ${commands[kit.value].replaceAll(",", " ")}${trouble.value ? ` --trouble ${trouble.value}` : ""}${time === null ? "" : ` --milliseconds ${time}`}`;
+      at("answer").replaceChildren(make("p", { class: "verdict" }, code(first)), make("ul", { class: "plain" }, rest.map((text) => make("li", {}, code(text)))), make("pre", { tabindex: "0" }, make("code", {}, command)));
+    };
+    show();
   };
 
   // -- a scenario -------------------------------------------------------------------------------------
@@ -341,7 +367,7 @@
     draw();
   };
 
-  const kinds = { index, scenario, estimator, compare, about: () => {} };
+  const kinds = { index, tracks, scenario, estimator, compare, about: () => {} };
   at("print")?.addEventListener("click", () => simnav.print());
   await kinds[page.kind]?.();
   document.body.dataset.ready = "true";
