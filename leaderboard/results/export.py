@@ -39,7 +39,7 @@ SCHEMA_VERSION = 2
 MOST_IN_JSON = 20_000
 
 _CHUNK = 8192  # runs that are converted at a time
-_DIGITS = 5  # of figures of the ranking
+_DIGITS = 4  # of figures of the ranking
 _FACTS = ("scenario", "seed", "draws", "estimator", "parameters", "learned", "reference", "status", "reason", "note")
 _COSTS = ("seconds", "peak_memory")
 #: Column -> attribute: how a run ended as tables count it, and why.
@@ -123,11 +123,15 @@ def _run(result: Result) -> dict[str, Any]:
 def write_json(document: Document, path: Path) -> list[Path]:
     """Write ``results.json``: a line a run. NaN is not JSON and has become null.
 
-    Of more than `MOST_IN_JSON` runs the list of the runs stays empty: they are in the Parquet file. Figures of the
-    ranking have `_DIGITS` digits.
+    Of more than `MOST_IN_JSON` runs it has neither the list of the runs nor the ratios of each: they are in the Parquet
+    file. Figures of the ranking have `_DIGITS` digits.
     """
-    head = json.dumps(_short(document._head()), allow_nan=False, ensure_ascii=False, separators=(",", ":"))
-    results = document.results if len(document.results) <= MOST_IN_JSON else ()
+    found, many = _short(document._head()), len(document.results) > MOST_IN_JSON
+    for scenario in found["ranking"].get("scenarios", ()) if many else ():
+        for row in scenario["rows"]:
+            row["ratios"] = {}
+    head = json.dumps(found, allow_nan=False, ensure_ascii=False, separators=(",", ":"))
+    results = () if many else document.results
     lines = (json.dumps(_run(r), allow_nan=False, ensure_ascii=False, separators=(",", ":")) for r in results)
     with complete_file(path) as part, open(part, "w", encoding="utf-8") as file:
         file.write(head[:-1] + ',\n "results": [')

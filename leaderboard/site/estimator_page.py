@@ -117,7 +117,7 @@ def _scores(results: Sequence[Result]) -> dict[str, list[float | None]]:
     """Columns of the scores that any of the runs has."""
     matrix = score_matrix([r.scores for r in results], [c.key for c in SCORES_SHOWN])
     found = {c.key: c.factor * matrix[:, k] for k, c in enumerate(SCORES_SHOWN)}
-    return {key: shorts(values) for key, values in found.items() if np.isfinite(values).any()}
+    return {key: shorts(values, 3) for key, values in found.items() if np.isfinite(values).any()}
 
 
 def estimator_data(

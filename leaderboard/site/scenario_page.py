@@ -35,11 +35,11 @@ if TYPE_CHECKING:
 __all__ = ["RUNS_SHOWN", "ScenarioData", "inside_chart", "scenario_data", "seeds_to_show", "shown_first", "track_from"]
 
 #: Runs of a scenario of which track and errors are kept, by default.
-RUNS_SHOWN = 2
+RUNS_SHOWN = 1
 
 _FIRST = 6  # rows that a chart shows at first
 _BAND = 5  # runs from which on a band is drawn
-_TICKS = 40  # runs of a row that a chart marks
+_TICKS = 20  # runs of a row that a chart marks
 
 
 @dataclass(frozen=True)
@@ -302,7 +302,7 @@ def _over_all_runs(
     if cdf:
         counted = _counted([len(c) for c in by.values() if c], len(entry.seeds))
         caption = f"Over all epochs of {counted}."
-        made.append(charts.distribution("cdf", "Horizontal error", "m", {"curves": {"rows": cdf}}, caption))
+        made.append(charts.distribution("cdf", "Horizontal error", "m", {"curves": curves.over_shares(cdf)}, caption))
     limit = ALERT_LIMITS[0]
     cells = {n: q for n, c in by.items() if (q := curves.integrity(c, limit)) is not None}
     if cells:
@@ -383,7 +383,7 @@ def _spread(
             continue
         values = zip(cell.scores(score).tolist(), cell.good, strict=True)
         marked = _marked([(v, r) for v, r in values if v > 0.0])
-        ticks += [(row.estimator, short(value), _run_name(result)) for value, result in marked]
+        ticks += [(row.estimator, short(value, 3), _run_name(result)) for value, result in marked]
         low, high = (found.low, found.high) if math.isfinite(found.low) else (found.value, found.value)
         middles.append((row.estimator, short(found.value), short(max(low, 1e-9)), short(high)))
     if not middles:

@@ -55,6 +55,7 @@ from .facts import catalogued, name_of
 from .first_page import picture
 from .headings import headings
 from .library import bundle
+from .light_pictures import in_few_colours
 from .overview import BOARD_COLUMNS, track_data
 from .pages import STATIC, TEMPLATES, environment
 from .print_figures import filled, write_figure
@@ -348,11 +349,17 @@ class _Site:
         self._page("about.html", "about.html", {"kind": "about"}, glossary=glossary(BOARD_COLUMNS))
         for extra in (*self.facts.papers, *self.facts.editions):
             extra.install(self.folder, self.facts)
+        for path in (self.folder / "figures").glob("paper-*/*.png"):
+            in_few_colours(path)
         for name in _STATIC:
             shutil.copyfile(TEMPLATES / name, self.folder / name)
-        charts = (TEMPLATES / "charts.js").read_text(encoding="utf-8")
-        charts = charts.replace("$APPEARANCE", json.dumps(appearance.for_browser()))
-        (self.folder / "charts.js").write_text(charts, encoding="utf-8")
+        menus = {
+            "scenarios": [(s.name, s.page) for s in self.facts.scenarios],
+            "estimators": sorted((e.label, e.page) for e in self.facts.estimators),
+        }
+        for name, key, value in (("charts.js", "$APPEARANCE", appearance.for_browser()), ("menu.js", "$MENUS", menus)):
+            text = (TEMPLATES / name).read_text(encoding="utf-8").replace(key, json.dumps(value))
+            (self.folder / name).write_text(text, encoding="utf-8")
         (self.folder / "vega.js").write_text(bundle(), encoding="utf-8")
 
     def _wins(self) -> list[dict[str, Any]]:

@@ -27,6 +27,8 @@ pytestmark = pytest.mark.skipif(
 
 FLAGS = ["--no-sandbox", "--disable-gpu", "--disable-background-networking"]
 SCREEN, PHONE = 1400, 390
+#: What a chart draws of its data.
+MARKS = ", ".join(f"g.mark-{kind} path[d]:not([d=''])" for kind in ("symbol", "line", "rect", "area", "arc"))
 
 
 @pytest.fixture(scope="module")
@@ -102,6 +104,7 @@ def test_every_kind_of_page_fits_and_draws_all_charts(browser, folder, catalogue
             box = drawn.bounding_box()
             assert box["width"] <= width
             assert box["height"] > 40
+            assert drawn.query_selector(MARKS), f"{name}: {place.get_attribute('id')} is empty"
         text = page.evaluate("getComputedStyle(document.body).color")
         assert (sum(map(int, text[4:-1].split(","))) > 384) == (scheme == "dark")
     visit.close()
@@ -112,15 +115,34 @@ def test_the_overview_opens_quickly_without_the_chart_library(browser, folder):
     visit = Visit(browser, folder, PHONE)
     visit.context.route("**/vega.js", lambda route: route.abort())
     page = visit.open("index.html")
-    assert len(visit.names()) > 2
+    assert page.locator(".picture tbody tr").count() == 4  # one kind of trouble, all, time, honesty
+    assert page.locator(".headings a").count() == 1
     loaded = page.evaluate("performance.getEntriesByType('navigation')[0].domContentLoadedEventEnd")
     assert loaded < 1000.0 * 3  # a second on an idle machine; tests share theirs
+    page = visit.open(BOARD)
+    assert len(visit.names()) > 2
     assert not page.is_visible("[role=tablist]")  # tracks are chosen in a list
-    page.select_option("select[data-tracks]", "other")
-    page.wait_for_selector("#track-other tbody tr")
-    assert "track=other" in page.url
-    assert page.is_hidden(".track:not(#track-other)")
+    page.select_option("select[data-tracks]", "fjords")
+    page.wait_for_selector("#track-fjords tbody tr")
+    assert "track=fjords" in page.url
+    assert page.is_hidden(".track:not(#track-fjords)")
     visit.context.close()
+
+
+def test_three_boxes_choose_a_row_and_say_where_there_is_no_evidence(visit):
+    page = visit.open("index.html")
+    boxes = page.locator("[data-advisor] select")
+    assert boxes.count() == 3
+    assert "take `" not in page.inner_text("[data-answer]")
+    assert "With fixes noisy or jumping, take " in page.inner_text("[data-answer]")
+    boxes.nth(1).select_option("imu")
+    assert page.inner_text("[data-answer] .verdict").startswith("No evidence: ")
+    boxes.nth(1).select_option("noisy-fixes")
+    boxes.nth(2).select_option("4")
+    assert page.inner_text("[data-answer] pre").endswith("--trouble noisy-fixes --milliseconds 0.1")
+    address = page.url.partition("#")[2]
+    page = visit.open(f"index.html#{address}")
+    assert page.input_value("[data-advisor] select >> nth=1") == "noisy-fixes"
 
 
 def test_runs_that_are_lost_against_the_plain_ekf_are_listed_and_lead_to_the_run(visit, hostile):
@@ -162,7 +184,7 @@ def test_tables_sort_filter_and_search_and_the_address_keeps_it(visit, hostile):
 
 
 def test_tabs_are_chosen_by_keyboard_and_link(visit):
-    page = visit.open("index.html")
+    page = visit.open(BOARD)
     tabs = page.get_by_role("tab")
     first = tabs.nth(0)
     first.focus()
@@ -170,7 +192,7 @@ def test_tabs_are_chosen_by_keyboard_and_link(visit):
     assert tabs.nth(1).get_attribute("aria-selected") == "true"
     assert page.evaluate("document.activeElement.getAttribute('role')") == "tab"
     assert page.locator(".track:not([hidden])").count() == 1
-    assert "track=other" in page.url
+    assert "track=fjords" in page.url
 
 
 def test_headings_and_charts_explain_themselves_on_hover(visit, catalogued):
