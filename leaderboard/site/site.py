@@ -65,7 +65,6 @@ from .win_matrix import win_matrix
 
 if TYPE_CHECKING:
     from simnav.leaderboard.ranking.board import Ranking
-    from simnav.leaderboard.ranking.first_view import FirstView
     from simnav.leaderboard.ranking.trouble_profile import TrackProfile
     from simnav.leaderboard.results.result import Result
 
@@ -145,7 +144,7 @@ def build(
         catalogued.cache_clear()
         report = progress or (lambda *_, **__: None)
         site = _Site(results, ranking, draft, command or reproduce(results), report, workers, papers, editions, home,
-                     first_view(ranking, profiles))  # fmt: skip
+                     profiles)  # fmt: skip
         site.write(runs_shown, figures, sweeps, seeds or {})
     return output / "index.html"
 
@@ -268,10 +267,12 @@ class _Site:
         papers: Sequence[ExtraPage],
         editions: Sequence[ExtraPage],
         home: Home,
-        view: FirstView | None,
+        profiles: Sequence[TrackProfile],
     ):
         self.results = sorted(results, key=lambda r: (r.scenario, r.estimator, r.seed))
-        self.ranking, self.folder, self.progress, self.workers, self.view = ranking, folder, progress, workers, view
+        self.ranking, self.folder, self.progress, self.workers = ranking, folder, progress, workers
+        self.view = first_view(ranking, profiles)
+        self.silence = {p.track: p.silence for p in profiles}
         self.runs = group(self.results)
         self.pages = environment()
         self.estimators, self.scenarios = entries(self.runs, ranking)
@@ -340,7 +341,10 @@ class _Site:
                    view=None if self.view is None else picture(self.view, self.estimators))  # fmt: skip
         voyages = side_by_side(self.ranking)
         for heading in self.facts.headings:
-            shown_tracks = [track_data(t, self.estimators, self.scenarios, self.runs) for t in heading.tracks]
+            shown_tracks = [
+                track_data(t, self.estimators, self.scenarios, self.runs) | {"silence": self.silence.get(t.track, "")}
+                for t in heading.tracks
+            ]
             own = {t.track for t in heading.tracks}
             self._page("tracks.html", heading.page, {"kind": "tracks", "tracks": shown_tracks}, heading=heading,
                        tracks=shown_tracks, voyages=[v for v in voyages if v.recorded in own], loss=LOSS)  # fmt: skip

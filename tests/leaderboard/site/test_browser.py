@@ -82,9 +82,10 @@ def chart(page: Any, name: str) -> Any:
     return page.wait_for_selector(f"#chart-{name} .vega[data-drawn] svg")
 
 
+BOARD = "board-other-scenarios.html"
 PAGES = (
     "index.html",
-    "board-other-scenarios.html",
+    BOARD,
     "{scenario}.html",
     "made-up-two-v3.html",
     "estimator-sw-fgo.html",
@@ -158,7 +159,7 @@ def test_runs_that_are_lost_against_the_plain_ekf_are_listed_and_lead_to_the_run
 
 
 def test_tables_sort_filter_and_search_and_the_address_keeps_it(visit, hostile):
-    page = visit.open("board-other-scenarios.html#track=other")
+    page = visit.open(f"{BOARD}#track=other")
     assert visit.names() == ["sw-fgo", "ekf", hostile, "inertial", "oracle"]
     page.click(".track:not([hidden]) [data-table] th[data-key=cost] button")
     assert visit.names()[-1] == hostile  # its cost was not measured
@@ -173,7 +174,7 @@ def test_tables_sort_filter_and_search_and_the_address_keeps_it(visit, hostile):
     panel.get_by_label("Worst run").check()
     address = page.url.partition("#")[2]
     assert {"track=other", "other.sort=-cost", "other.family=Factor+graph"} <= set(address.split("&"))
-    page = visit.open(f"board-other-scenarios.html#{address}")
+    page = visit.open(f"{BOARD}#{address}")
     assert visit.names() == ["sw-fgo"]
     assert page.query_selector("#track-other th[data-key=worst]") is not None
     page.locator("#track-other [data-table] select").select_option("")
@@ -196,7 +197,7 @@ def test_tabs_are_chosen_by_keyboard_and_link(visit):
 
 
 def test_headings_and_charts_explain_themselves_on_hover(visit, catalogued):
-    page = visit.open("board-other-scenarios.html#track=other")
+    page = visit.open(f"{BOARD}#track=other")
     page.hover("#track-other [data-table] th[data-key=ranks] button")
     assert "cannot be told apart" in page.inner_text("#tip")
     page.mouse.move(0, 0)
@@ -333,7 +334,7 @@ def test_p_values_in_the_browser_are_those_of_the_board(visit):
 
 
 def test_weights_of_scenarios_move_the_places(visit):
-    page = visit.open("board-other-scenarios.html#track=other")
+    page = visit.open(f"{BOARD}#track=other")
     table = "#track-other [data-weights]"
     page.locator(f"{table} input[type=number]").nth(0).scroll_into_view_if_needed()
     scores = page.evaluate("simnav.page.tracks.find((t) => t.key === 'other').ratios")
@@ -344,7 +345,7 @@ def test_weights_of_scenarios_move_the_places(visit):
 
 
 def test_every_table_is_written_as_csv_and_latex(visit, hostile):
-    page = visit.open("board-other-scenarios.html#track=other")
+    page = visit.open(f"{BOARD}#track=other")
     panel = page.locator("#track-other [data-table]")
     with page.expect_download() as waiting:
         panel.get_by_role("button", name="CSV").click()
@@ -363,7 +364,7 @@ def test_every_table_is_written_as_csv_and_latex(visit, hostile):
 
 def test_header_and_names_stay_in_view_on_a_phone(browser, folder):
     visit = Visit(browser, folder, PHONE)
-    page = visit.open("board-other-scenarios.html#track=other")
+    page = visit.open(f"{BOARD}#track=other")
     scroll = page.locator("#track-other [data-table] .scroll")
     scroll.evaluate("s => { s.scrollLeft = 300; }")
     page.locator("#track-other [data-table] tbody th").first.scroll_into_view_if_needed()
@@ -378,7 +379,7 @@ def test_header_and_names_stay_in_view_on_a_phone(browser, folder):
 
 
 def test_links_lead_somewhere(visit):
-    page = visit.open("board-other-scenarios.html#track=other")
+    page = visit.open(f"{BOARD}#track=other")
     page.locator("#track-other [data-table]").get_by_role("link", name="sw-fgo").click()
     page.wait_for_selector("body[data-ready]")
     assert page.inner_text("h1") == "sw-fgo"
