@@ -28,7 +28,7 @@ pytestmark = pytest.mark.skipif(
 FLAGS = ["--no-sandbox", "--disable-gpu", "--disable-background-networking"]
 SCREEN, PHONE = 1400, 390
 #: What a chart draws of its data.
-MARKS = ", ".join(f"g.mark-{kind} path[d]:not([d=''])" for kind in ("symbol", "line", "rect", "area", "arc"))
+MARKS = ", ".join(f"g.mark-{kind}.role-mark path[d]:not([d=''])" for kind in ("symbol", "line", "rect", "area", "arc"))
 
 
 @pytest.fixture(scope="module")
