@@ -89,7 +89,7 @@ def written_map(
                 ax.text(j + 0.5, top + 0.5, f"{values[k, j]:.2f}", ha="center", va="center", weight=weight)
         ax.set_xticks(np.arange(len(columns)) + 0.5, columns)
         ax.set_yticks([top + 0.5 for top in tops], rows)
-        ax.get_yticklabels()[-1].set_weight("bold")
+        ax.get_yticklabels()[-1].set_fontweight("bold")
         ax.invert_yaxis()
         ax.tick_params(top=True, labeltop=True, bottom=False, labelbottom=False, length=0)
         ax.grid(visible=False)
