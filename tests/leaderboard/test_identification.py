@@ -21,6 +21,7 @@ from simnav.recording import Recording
 from simnav.scenario import Scenario, load
 from simnav.scenario.reading import parse
 from simnav.source import record
+from simnav.spec import SpecError
 from simnav.trial import run_trial
 
 TOLD = """
@@ -222,5 +223,5 @@ def test_a_twin_follows_the_track_with_the_errors_that_were_found(
 def test_a_twin_needs_a_track(found: Identification, told: Scenario, recording: Recording) -> None:
     data = recording.data
     lost = replace(data.truth, position=np.full_like(data.truth.position, np.nan))
-    with pytest.raises(simnav.SpecError, match="1 poses; a track needs 8 or more"):
+    with pytest.raises(SpecError, match="1 poses; a track needs 8 or more"):
         twin_of(told, replace(recording, data=replace(data, truth=lost)), found)
