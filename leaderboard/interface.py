@@ -20,7 +20,7 @@ from .claiming import claim
 from .costing import bench, costs
 from .datasets import dataset, read_voyages, voyages
 from .inspection import allan, bound, cite, merge, rank, realism, reproduce, rescore, seal, verify
-from .logs import align, export, identify, inspect_log, recordings, score_files, tune_noise
+from .logs import align, export, identify, inspect_log, recordings, score_files, tune_noise, twin
 from .recommending import recommend
 from .requests import ScenarioLike, Scenarios
 from .running import campaign, check, evaluate, make, record, robustness, run, sweep, tune
@@ -65,6 +65,7 @@ __all__ = [
     "sweep",
     "tune",
     "tune_noise",
+    "twin",
     "verify",
     "voyages",
 ]

@@ -13,7 +13,7 @@ from .requests import ScenarioLike, Scenarios
 
 __all__ = [
     "AlignRequest", "ExportRequest", "IdentifyRequest", "InspectRequest", "RecordingsRequest", "ScoreRequest",
-    "TuneNoiseRequest",
+    "TuneNoiseRequest", "TwinRequest",
 ]  # fmt: skip
 
 _SCENARIO = "Name, versioned id, or path of a TOML file."
@@ -119,4 +119,26 @@ class InspectRequest:
     _: KW_ONLY
     output: PathLike | None = option(
         "--output", "-o", default=None, help="Write a scenario to begin with to this TOML file."
+    )
+
+
+@request
+class TwinRequest:
+    """Write a scenario of simulated voyages with the track of a log and the errors that were found in it."""
+
+    scenario: ScenarioLike = option(help=_SCENARIO, more=_SCENARIO_MORE, argument=True, metavar="SCENARIO")
+    _: KW_ONLY
+    seed: int = option(default=0, help="Number of the recording; of a simulated scenario the seed.", least=0)
+    until: float | None = option(
+        "--until",
+        default=None,
+        cli=float | None,
+        metavar="SECONDS",
+        help="Identify the errors up to here. Default: 1200 s.",
+    )
+    output: PathLike | None = option(
+        "--output",
+        "-o",
+        default=None,
+        help="Write the scenario to this TOML file, and its track to a .csv beside it. Default: NAME-twin.toml.",
     )

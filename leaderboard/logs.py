@@ -19,6 +19,7 @@ from .log_requests import (
     RecordingsRequest,
     ScoreRequest,
     TuneNoiseRequest,
+    TwinRequest,
 )
 
 if TYPE_CHECKING:
@@ -28,10 +29,11 @@ if TYPE_CHECKING:
     from simnav.scenario import Scenario
 
     from .identification.report import Identification
+    from .identification.twin import Twin
     from .recordings import PublicRecordings
     from .single_run import ScoreReport
 
-__all__ = ["align", "export", "identify", "inspect_log", "recordings", "score_files", "tune_noise"]
+__all__ = ["align", "export", "identify", "inspect_log", "recordings", "score_files", "tune_noise", "twin"]
 
 
 @call(ScoreRequest)
@@ -243,11 +245,46 @@ def identify(request: IdentifyRequest) -> Identification:
     from .identification.report import identify
 
     scenario, seed = scenario_of(request.scenario), whole_number("seed", request.seed, 0)
-    until = None if request.until is None else finite_number("until", request.until)
-    if until is not None and until <= 0.0:
-        raise RequestError(f"until = {until:g}: it should be a time of the log above 0 s")
+    until = _until(request.until)
     with mistakes(ValueError, OSError):
         return identify(scenario.drawn(seed), record(scenario, seed), until)
+
+
+@call(TwinRequest)
+def twin(request: TwinRequest) -> Twin:
+    """Write a scenario of simulated voyages with the track of a log and the errors that were found in it.
+
+    Returns
+    -------
+    simnav.leaderboard.identification.twin.Twin
+        The scenario, its track, and which instruments have errors that were fitted to a reference.
+
+    Raises
+    ------
+    RequestError
+        If the log cannot be used, or the output is no TOML file.
+    """
+    from simnav.source import record
+
+    from .identification.report import identify
+    from .identification.twin import twin_of
+
+    scenario, seed = scenario_of(request.scenario), whole_number("seed", request.seed, 0)
+    until = _until(request.until)
+    target = absolute(request.output or f"{scenario.name}-twin.toml")
+    if target.suffix != ".toml":
+        raise RequestError(f"output = {request.output}: the file should end in .toml")
+    with mistakes(ValueError, OSError):
+        drawn = scenario.drawn(seed)
+        recording = record(drawn.model_copy(update={"faults": ()}), seed)
+        return twin_of(drawn, recording, identify(drawn, recording, until)).save(target)
+
+
+def _until(given: float | None) -> float | None:
+    until = None if given is None else finite_number("until", given)
+    if until is not None and until <= 0.0:
+        raise RequestError(f"until = {until:g}: it should be a time of the log above 0 s")
+    return until
 
 
 def _recorded(given: str | Path | Scenario) -> Scenario:

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
         seal,
         verify,
     )
-    from simnav.leaderboard.logs import align, export, identify, inspect_log, recordings, score_files, tune_noise
+    from simnav.leaderboard.logs import align, export, identify, inspect_log, recordings, score_files, tune_noise, twin
     from simnav.leaderboard.publishing import (
         audit_standard,
         check_standard,
@@ -147,6 +147,7 @@ __all__ = [
     "sweep",
     "tune",
     "tune_noise",
+    "twin",
     "verify",
     "verify_bundle",
     "voyages",
@@ -196,7 +197,16 @@ _HOMES = {
         "seal",
         "verify",
     ),
-    "leaderboard.logs": ("align", "export", "identify", "inspect_log", "recordings", "score_files", "tune_noise"),
+    "leaderboard.logs": (
+        "align",
+        "export",
+        "identify",
+        "inspect_log",
+        "recordings",
+        "score_files",
+        "tune_noise",
+        "twin",
+    ),
     "leaderboard.recommending": ("recommend",),
     "leaderboard.results.errors": ("RequestError",),
     "leaderboard.running": ("campaign", "check", "evaluate", "make", "record", "robustness", "run", "sweep", "tune"),

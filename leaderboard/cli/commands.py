@@ -20,6 +20,7 @@ from simnav.leaderboard.log_requests import (
     RecordingsRequest,
     ScoreRequest,
     TuneNoiseRequest,
+    TwinRequest,
 )
 from simnav.leaderboard.publishing_requests import (
     AuditRequest,
@@ -372,6 +373,7 @@ GROUPS: Mapping[str, tuple[str, Mapping[str, tuple[type[Any], str]]]] = {
             "align": (AlignCommand, "align"),
             "tune-noise": (TuneNoiseRequest, "tune_noise"),
             "identify": (IdentifyCommand, "identify"),
+            "twin": (TwinRequest, "twin"),
             "allan": (AllanCommand, "allan"),
             "realism": (RealismCommand, "realism"),
             "recordings": (RecordingsRequest, "recordings"),

@@ -4,6 +4,7 @@
 - `innovations`: the innovations of the plain filter for an assumption
 - `scoring`: the maximum of their likelihood
 - `choices`, `search`: what is fitted, and in which order
+- `prediction`: positions after a minute without fixes, and the errors that are enlarged for them
 - `estimates`, `remarks`: the figures for the scenario file, and what the log does not tell
 - `report`: all of it
 """

@@ -26,8 +26,9 @@ _DELAY_STEP, _LEAST_STEP = 0.05, 0.005
 #: The smallest size to begin with [SI units]: of readings, of gyroscopes and of accelerometers.
 _LEAST = 1e-4
 _LEAST_OF: dict[str, tuple[float, float]] = {"gyroscope": (1e-6, 1e-7), "accelerometer": (1e-5, 1e-5)}
-#: Sigmas of constant errors in the fit, at least: bias by unit, scale [-], mounting [rad].
-_BIAS = {"m_s": 0.05, "deg": radians(2.0)}
+#: Sigmas of constant errors in the fit, at least: bias by unit, of a DVL [m/s], scale [-], mounting [rad]. With a wide
+#: one the bias of a DVL takes over the slow error of the fixes.
+_BIAS, _DVL_BIAS = {"m_s": 0.05, "deg": radians(2.0)}, 0.02
 _SCALE, _MOUNTING = 0.03, radians(3.0)
 #: Turn-on biases of an IMU in the fit are so many times those of the datasheet, and at least so large [SI units].
 _TIMES, _TURN_ON = 5.0, {"gyroscope": radians(0.1) / 3600.0, "accelerometer": 2e-4}
@@ -65,7 +66,7 @@ def with_wide_states(scenario: Scenario, assumed: Assumption) -> Assumption:
         spec, changes = scenario.aids[name], dict[str, object]()
         unit = KINDS[sheet.kind].components[0].error_unit
         if _has(spec, "bias") and unit in _BIAS and sheet.equation != "velocity":
-            changes["bias"] = np.maximum(sheet.bias, _BIAS[unit])
+            changes["bias"] = np.maximum(sheet.bias, _DVL_BIAS if sheet.equation == BODY_VELOCITY else _BIAS[unit])
         if _has(spec, "scale") and sheet.equation in (BODY_VELOCITY, WATER_SPEED):
             changes["scale"] = max(sheet.scale, _SCALE)
         if _has(spec, "misalignment"):
@@ -161,7 +162,8 @@ def places(scenario: Scenario, assumed: Assumption) -> list[Parameter]:
             for k, axis in enumerate(("forward", "starboard", "down")):
                 first = float(sheet.lever_arm[k])
                 found.append(Parameter(name, "lever_arm", (k,), first, _ARM, size=False, part=axis))
-        if sheet.equation and sheet.equation != WATER_SPEED:
+        # Without an IMU the fixes are the clock: only the other instruments can be late by it.
+        if sheet.equation and sheet.equation != WATER_SPEED and (imu is not None or sheet.role != "fix"):
             found.append(Parameter(name, "delay", (), 0.0, _DELAY, size=False, step=step))
     return found
 

@@ -1,13 +1,15 @@
 """The estimates of a fit in the units of a scenario file, and the figures of datasheets that follow from them.
 
-A size that the log tells takes the place of the datasheet's. A constant error x with the standard deviation s is a
-state of the row, whose sigma in the datasheet becomes sqrt(x^2 + s^2) where that is more. A lever arm or a delay that
-differs from the datasheet by three standard deviations or more is corrected.
+A size that the log tells takes the place of the datasheet's, as the root of its mean square over what the log allows:
+the few swings of a slow error in a log tell its size badly, and the middle would be too small on average. A constant
+error x with the standard deviation s is a state of the row, whose sigma in the datasheet becomes sqrt(x^2 + s^2) where
+that is more, also where the log does not tell it and the datasheet knows none. A lever arm or a delay that differs from
+the datasheet by three standard deviations or more is corrected.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,12 +17,12 @@ import numpy as np
 
 from simnav.scenario import Scenario
 from simnav.spec import UNITS, Spec, unit_of
-from simnav.types import Array
+from simnav.types import Array, Instruments
 
 from .assumption import HEADING, Parameter
 from .search import Fitted
 
-__all__ = ["AXES", "Estimated", "estimates", "replaced"]
+__all__ = ["AXES", "CONSTANTS", "PLACES", "Estimated", "enlarged", "estimates", "replaced", "without"]
 
 #: Half a 95 % interval, in standard deviations.
 _HALF = 1.96
@@ -193,6 +195,11 @@ class _Table:
             whole[k if len(whole) > 1 else 0] = _rounded(v / unit)
         table[key] = whole
 
+    def has(self, instrument: str, figure: str) -> bool:
+        """Whether a figure is replaced."""
+        path, _, key, _ = _place(self.scenario, instrument, figure)
+        return key in self.found.get(path, {})
+
     def finished(self) -> dict[str, dict[str, Any]]:
         """The tables; a vector of one number is a number."""
         return {
@@ -220,17 +227,41 @@ def replaced(scenario: Scenario, fitted: Fitted) -> dict[str, dict[str, Any]]:
             if s < _TOLD_PART * p.spread and _corrects(fitted, p, value - _stated(scenario, p), s):
                 table.put(p.instrument, p.figure, {p.components[0]: value})
         elif s < _TOLD_SIZE or p.instrument in changed or _outside(scenario, p, x, s):
-            used = value if s < _TOLD_SIZE else p.value(x + s)  # not too small where the log allows more
+            used = p.value(x + min(s * s, s))  # the mean square of a log-normal size; see the module
             table.put(p.instrument, p.figure, dict.fromkeys(p.components, used) if p.components else used)
     for name, sheet in sheets.items():
         aid = scenario.aids.get(name)
-        if aid is not None and sheet.bias_instability.any() and np.any(aid.figure("bias")):
-            table.put(name, "bias", dict.fromkeys(range(len(sheet.bias)), 0.0))
+        if aid is not None and sheet.bias_instability.any():
+            if np.any(aid.figure("bias")):
+                table.put(name, "bias", dict.fromkeys(range(len(sheet.bias)), 0.0))
+            if table.has(name, "bias_instability") and not table.has(name, "correlation_time"):  # which is not told
+                table.put(name, "correlation_time", sheet.correlation_time)
     for name in _TRIADS:
         if sheets.imu is not None and any(p.instrument == name and p.figure == "bias_instability" for p, _, _ in found):
             table.put(name, "correlation_time", getattr(sheets.imu, name).correlation_time)
     for c in _constants(fitted):
         _put_constant(scenario, table, c)
+    return table.finished()
+
+
+#: Beginnings of keys: where an instrument is and how late it is, and its constant errors.
+PLACES, CONSTANTS = ("lever_arm_m", "offset_s"), ("bias_m", "bias_deg", "scale_", "misalignment_")
+
+
+def without(changes: Mapping[str, Mapping[str, Any]], keys: tuple[str, ...]) -> dict[str, dict[str, Any]]:
+    """The figures of `replaced` but for the keys with some beginnings."""
+    kept = {path: {k: v for k, v in figures.items() if not k.startswith(keys)} for path, figures in changes.items()}
+    return {path: figures for path, figures in kept.items() if figures}
+
+
+def enlarged(scenario: Scenario, instruments: Instruments, names: Iterable[str]) -> dict[str, dict[str, Any]]:
+    """The in-run biases of some instruments and triads in other datasheets, as of `replaced`."""
+    table = _Table(scenario)
+    for name in names:
+        sheet = getattr(instruments.imu, name) if name in _TRIADS else instruments[name]
+        size = sheet.bias_instability
+        table.put(name, "bias_instability", size if name in _TRIADS else dict(enumerate(size.tolist())))
+        table.put(name, "correlation_time", sheet.correlation_time)
     return table.finished()
 
 
@@ -251,11 +282,11 @@ def _outside(scenario: Scenario, p: Parameter, x: float, s: float) -> bool:
 
 
 def _put_constant(scenario: Scenario, table: _Table, c: _Constant) -> None:
-    """The sigma of a constant error, of the components that the log tells: one small value makes no sigma smaller."""
+    """The sigma of a constant error: a small value makes no sigma smaller; what is not told stays, but for a 0."""
     _, spec, _, _ = _place(scenario, c.instrument, c.figure)
     stated = np.array([_now(spec, c.figure, (k,)) for k in range(len(c.value))])
     size = np.hypot(c.value, c.sigma)
-    told = c.sigma < _TOLD_PART * c.prior
+    told = (c.sigma < _TOLD_PART * c.prior) | (stated == 0.0)
     if c.instrument in _TRIADS and told.any():
         size = np.full(len(size), np.sqrt(np.mean(size[told] ** 2)))
     larger = told & (size > stated)

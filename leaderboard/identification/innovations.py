@@ -100,15 +100,15 @@ class StateValues:
 
 def run_filter(
     start: InitialState, instruments: Instruments, steps: list[Measurements]
-) -> tuple[InnovationKeeper, Estimate]:
+) -> tuple[InnovationKeeper, list[Estimate]]:
     """Run the plain filter (of the inertial model, without an IMU of the ship model) to the end.
 
     Returns
     -------
     solver : InnovationKeeper
         After the last step.
-    estimate : Estimate
-        The last.
+    estimates : list of Estimate
+        One for each step.
 
     Raises
     ------
@@ -122,8 +122,7 @@ def run_filter(
     except UnsuitableScenario as error:
         raise LogError(f"the error model cannot be identified: {error}") from None
     with np.errstate(all="ignore"):
-        *_, estimate = map(solver.update, steps)
-    return solver, estimate
+        return solver, [solver.update(step) for step in steps]
 
 
 class Likelihood:
@@ -135,18 +134,21 @@ class Likelihood:
         The recording.
     until : float
         Readings after this time are not used [s].
+    times : (k,) array, optional
+        Ascending times of estimates [s]. Default: a few.
     """
 
-    def __init__(self, recording: Recording, until: float = inf):
+    def __init__(self, recording: Recording, until: float = inf, times: Array | None = None):
         data = recording.data
         streams = {n: replace(s.as_delivered(), arrival=np.empty(0)) for n, s in data.aids.items()}
         self._recording = replace(recording, data=replace(data, aids=streams))
-        self._until, self.start = until, recording.start
+        self._until, self.start, self._times = until, recording.start, times
         self._known: dict[tuple[tuple[str, float], ...], list[Measurements]] = {(): self._cut(self._recording)}
 
     def _cut(self, recording: Recording) -> list[Measurements]:
         data, last = recording.data, min(self._until, recording.data.end)
-        return list(packets(data, np.append(np.arange(data.start + _STEP, last, _STEP), last)))
+        times = np.arange(data.start + _STEP, last, _STEP) if self._times is None else self._times
+        return list(packets(data, np.append(times[times < last], last)))
 
     def _delayed(self, delays: Mapping[str, float]) -> list[Measurements]:
         """The steps with stamps put back; those of the last few sets of delays are kept."""
@@ -163,8 +165,8 @@ class Likelihood:
         aids = {n: s.rows(s.time > data.start) for n, s in aids.items()}
         return self._cut(replace(self._recording, data=replace(data, aids=aids)))
 
-    def run(self, assumed: Assumption, heading: bool = True) -> tuple[InnovationKeeper, Estimate]:
-        """The filter and its last estimate; ``heading``: with the assumed heading at the start, and hardly a sigma."""
+    def run(self, assumed: Assumption, heading: bool = True) -> tuple[InnovationKeeper, list[Estimate]]:
+        """The filter and its estimates; ``heading``: with the assumed heading at the start, and hardly a sigma."""
         start = self.start
         if heading:
             attitude, covariance = start.attitude.copy(), start.covariance.copy()
@@ -184,9 +186,13 @@ class Likelihood:
             name: Stream(*(np.array(part) for part in zip(*rows, strict=True))) for name, rows in kept.items()
         }  # fmt: skip
 
+    def estimates(self, assumed: Assumption) -> list[tuple[float, Estimate]]:
+        """Times [s] and estimates; the heading at the start is that of the log."""
+        return [(e.time, e) for e in self.run(assumed, heading=False)[1]]
+
     def states(self, assumed: Assumption) -> StateValues:
         """The constant errors at the end of the run; their covariance is that under the assumption."""
-        solver, estimate = self.run(assumed)
+        solver, (*_, estimate) = self.run(assumed)
         blocks = solver.model.blocks  # type: ignore[attr-defined]  # both models of `Suitable` have them
         values = {n: v for n, (v, _) in (estimate.states or {}).items()}
         rows, place = list[int](), dict[str, slice]()

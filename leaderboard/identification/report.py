@@ -18,11 +18,12 @@ from simnav.scenario import Scenario
 from simnav.scenario.writing import toml_text
 
 from .assumption import Assumption
-from .estimates import Estimated, estimates, replaced
+from .estimates import CONSTANTS, PLACES, Estimated, enlarged, estimates, replaced, without
 from .innovations import Innovations, Likelihood, neighbours
+from .prediction import AWAY, Judged, Predictions, widened
 from .remarks import remarks
 from .scoring import log_likelihood
-from .search import search
+from .search import Fitted, search
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -32,6 +33,8 @@ __all__ = ["Identification", "identify"]
 
 #: Fewer readings of all instruments together say nothing. A longer log is used up to this time [s].
 _LEAST, _LONGEST = 60, 1200.0
+#: Figures are left out where predictions are more likely without them, by so much in the logarithm.
+_BETTER = 2.0
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -165,14 +168,66 @@ def identify(scenario: Scenario, recording: Recording, until: float | None = Non
         )
     fitted = search(scenario, likelihood, given)
     found, changes = estimates(scenario, fitted), replaced(scenario, fitted)
-    table = _with(scenario.to_toml(), changes, scenario)
-    to_use = Scenario.from_toml(table, source=f"the identified {scenario.id}")
-    shift = {n: d for n, d in fitted.maximum.assumed.delays.items() if f"log.instruments.{n}" in changes}
-    after = likelihood.innovations(Assumption(to_use.instruments_sheet(), shift), heading=False)
+    used = _used(scenario, Predictions(recording, seconds, scenario.log is not None), fitted, changes)
+    changes, to_use, given = used.changes, _to_use(scenario, used.changes), used.given
+    after = likelihood.innovations(given, heading=False)
     said = remarks(scenario, fitted, found)
+    if used.left_out:
+        said.append(
+            f"{used.left_out}: left out, because without them positions after {AWAY:g} s without fixes are nearer"
+        )
+    said += [
+        f"{name}: its in-run bias is larger than the innovations say, because the position after {AWAY:g} s without "
+        "fixes is further off than predicted"
+        for name in used.wider
+    ]
     if seconds < recording.duration and until is None:
         said.append(f"of {recording.duration:g} s the first {seconds:g} s were used; --until takes another length")
-    return Identification(scenario.id, seconds, found, said, before, after, changes, table)
+    return Identification(scenario.id, seconds, found, said, before, after, changes, to_use.to_toml())
+
+
+@dataclass(frozen=True, eq=False)
+class _Used:
+    """What is used of a fit: the figures, what was left out and enlarged, and what a filter then assumes."""
+
+    changes: dict[str, dict[str, Any]]
+    left_out: str
+    wider: list[str]
+    given: Assumption
+    judged: Judged
+
+
+def _used(scenario: Scenario, predictions: Predictions, fitted: Fitted, changes: dict[str, dict[str, Any]]) -> _Used:
+    """The figures with which positions after a time without fixes are the most likely: all, or without some of them."""
+    tries = []
+    for left_out, some in (
+        ("", changes),
+        ("lever arms and delays", without(changes, PLACES)),
+        ("constant errors", without(changes, CONSTANTS)),
+        ("all figures", {}),
+    ):
+        if tries and some == changes:
+            continue
+        given = _assumed(scenario, some, fitted)
+        wider = widened(_to_use(scenario, some), predictions, given)
+        names, last = [name for name, _ in wider], wider[-1][1] if wider else given
+        found = {path: dict(figures) for path, figures in some.items()}
+        for path, figures in enlarged(scenario, last.instruments, names).items():
+            found.setdefault(path, {}).update(figures)
+        tries.append(_Used(found, left_out, names, last, predictions.judged(last)))
+    best = max(tries, key=lambda t: t.judged.log_likelihood)
+    return best if best.judged.log_likelihood > tries[0].judged.log_likelihood + _BETTER else tries[0]
+
+
+def _assumed(scenario: Scenario, changes: Mapping[str, Mapping[str, Any]], fitted: Fitted) -> Assumption:
+    """What a filter assumes with some changes."""
+    delays = fitted.maximum.assumed.delays
+    late = {n: d for n, d in delays.items() if "offset_s" in changes.get(f"log.instruments.{n}", {})}
+    return Assumption(_to_use(scenario, changes).instruments_sheet(), late)
+
+
+def _to_use(scenario: Scenario, changes: Mapping[str, Mapping[str, Any]]) -> Scenario:
+    return Scenario.from_toml(_with(scenario.to_toml(), changes, scenario), source=f"the identified {scenario.id}")
 
 
 def _with(table: dict[str, Any], changes: Mapping[str, Mapping[str, Any]], scenario: Scenario) -> dict[str, Any]:

@@ -9,7 +9,7 @@ clearly smaller. A shape is compared as it looks after the mean of a recording o
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import pi, sqrt
 from typing import Any
 
@@ -24,14 +24,14 @@ from simnav.types import Array
 from .errors import ErrorSeries
 from .features import on_grid
 
-__all__ = ["Fit", "autocovariance", "fitted"]
+__all__ = ["Fit", "autocovariance", "fitted", "fitted_apart"]
 
 #: Largest lag that is fitted [s], and largest number of coloured processes.
 _LONGEST, _MOST = 120.0, 3
 #: A further process makes the residual smaller by at least this part of the variance squared.
 _GAIN = 0.004
 #: Correlation times [s]; periods [s] and damping ratios of second-order processes.
-_TIMES = (0.5, 0.8, 1.2, 2.0, 3.0, 5.0, 8.0, 12.0, 20.0, 30.0, 50.0, 80.0, 120.0, 200.0, 300.0)
+_TIMES = (0.5, 0.8, 1.2, 2.0, 3.0, 5.0, 8.0, 12.0, 20.0, 30.0, 50.0, 80.0, 120.0, 200.0, 300.0, 600.0, 1800.0)
 _PERIODS = (2.2, 2.6, 3.2, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 12.0, 15.0, 20.0, 30.0)
 _DAMPINGS = (0.06, 0.12, 0.25, 0.5)
 #: Above this many degrees of freedom white noise is normal.
@@ -46,8 +46,8 @@ class Fit:
     ----------
     white : (d,) array
         Standard deviation of the white noise, SI units.
-    freedom : float
-        Degrees of freedom of Student's t for the white noise; infinite for normal noise.
+    freedom : (d,) array
+        Degrees of freedom of Student's t for the white noise of each component; infinite for normal noise.
     bias : (d,) array
         Root mean square over the recordings of the mean error.
     shapes : list of dict
@@ -57,7 +57,7 @@ class Fit:
     """
 
     white: Array
-    freedom: float
+    freedom: Array
     bias: Array
     shapes: list[dict[str, Any]]
     sigma: Array
@@ -72,12 +72,13 @@ class Fit:
             return numbers[0] if component == 1 else f"[{', '.join(numbers)}]"
 
         heavy = self.freedom < _NORMAL
-        lines = [f"[instruments.{name}]", f"sigma_{unit} = {written(0.0 * self.white if heavy else self.white)}"]
+        lines = [f"[instruments.{name}]", f"sigma_{unit} = {written(np.where(heavy, 0.0, self.white))}"]
         lines.append(f"bias_{unit} = {written(self.bias)}")
-        if heavy:
+        for k in np.flatnonzero(heavy & (self.white > 0.0)).tolist():
             lines += [
-                "", f"[[instruments.{name}.error]]", 'kind = "heavy_tailed"', f"sigma_{unit} = {written(self.white)}",
-                f"degrees_of_freedom = {self.freedom:.3g}",
+                "", f"[[instruments.{name}.error]]", 'kind = "heavy_tailed"',
+                f"sigma_{unit} = {written(np.where(np.arange(component) == k, self.white, 0.0))}",
+                f"degrees_of_freedom = {self.freedom[k]:.3g}",
             ]  # fmt: skip
         for shape, sigma in zip(self.shapes, self.sigma, strict=True):
             lines += [
@@ -170,7 +171,21 @@ def fitted(series: Sequence[ErrorSeries]) -> Fit:
     )
 
 
-def _freedom(series: Sequence[ErrorSeries], shares: Array) -> float:
+def fitted_apart(series: Sequence[ErrorSeries]) -> Fit:
+    """Fit the processes to the errors of several runs, with shapes of its own for each component."""
+    d = series[0].error.shape[1]
+    fits = [fitted([replace(s, error=s.error[:, k : k + 1]) for s in series]) for k in range(d)]
+    sigma = [np.eye(d)[k] * size for k, fit in enumerate(fits) for size in fit.sigma]
+    return Fit(
+        np.concatenate([f.white for f in fits]),
+        np.concatenate([f.freedom for f in fits]),
+        np.concatenate([f.bias for f in fits]),
+        [shape for f in fits for shape in f.shapes],
+        np.array(sigma).reshape(-1, d),
+    )
+
+
+def _freedom(series: Sequence[ErrorSeries], shares: Array) -> Array:
     """Degrees of freedom of the white part, from the tails of the readings less the mean of their neighbours."""
     parts = []
     for one in series:
@@ -178,9 +193,9 @@ def _freedom(series: Sequence[ErrorSeries], shares: Array) -> float:
         whole = there[:-2] & there[1:-1] & there[2:]
         rough = (x[1:-1] - 0.5 * (x[:-2] + x[2:]))[whole]
         parts.append(rough / (np.median(np.abs(rough), axis=0) + 1e-300))
-    rough = np.concatenate(parts)
-    rough = rough[:, shares[0] > 0.02]
-    if not rough.size:
-        return float("inf")
-    freedom = float(student.fit(rough.ravel()[:20000], floc=0.0)[0])
-    return max(freedom, 2.2) if freedom < _NORMAL else float("inf")
+    found = np.full(shares.shape[1], np.inf)
+    for k, rough in enumerate(np.concatenate(parts).T):
+        if rough.size and shares[0, k] > 0.02:
+            freedom = float(student.fit(rough[:20000], floc=0.0)[0])
+            found[k] = max(freedom, 2.2) if freedom < _NORMAL else np.inf
+    return found

@@ -156,6 +156,7 @@ ELSEWHERE |= {
     "log align",
     "log tune-noise",
     "log identify",
+    "log twin",
     "log recordings",
     "export",
     "score",
