@@ -55,7 +55,7 @@ class ClaimRequest:
     runs: int = option("--runs", "-n", default=6, help="Seeds of the search, for each value.", least=1)
     judged: int = option(
         default=12, help="First number of seeds of the judgement.", least=1,
-        more="They are doubled while it is undecided, seven times at most; the interval allows for that.",
+        more="They are doubled while it is undecided, four times at most; the interval allows for that.",
     )  # fmt: skip
     judged_from: int = option(default=10000, help="First seed of the judgement.", least=0)
     output: PathLike | None = option(

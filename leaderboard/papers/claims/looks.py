@@ -24,7 +24,7 @@ from simnav.leaderboard.ranking.statistics import Interval
 __all__ = ["DOUBLINGS", "LEVEL", "UNLUCKY", "deciding_interval", "looks"]
 
 #: How often the runs of an undecided judgement are doubled at most.
-DOUBLINGS = 7
+DOUBLINGS = 4
 #: Probability that a judgement of one setting is wrong, over all of its looks.
 LEVEL = 0.05
 #: How far off one more run may be, as a multiple of the farthest run.
@@ -35,7 +35,7 @@ def looks(first: int) -> tuple[int, ...]:
     """The numbers of runs at which a judgement is looked at.
 
     >>> looks(12)
-    (12, 24, 48, 96, 192, 384, 768, 1536)
+    (12, 24, 48, 96, 192)
     """
     return tuple(first * 2**k for k in range(DOUBLINGS + 1))
 
@@ -59,7 +59,7 @@ def deciding_interval(ratios: Sequence[float], first: int, level: float = LEVEL)
 
     Examples
     --------
-    Each look spends an eighth of the level, so the interval is wider than one of 95 %, from 0.698 to 0.715.
+    Each look spends a fifth of the level, so the interval is wider than one of 95 %, from 0.698 to 0.715.
 
     >>> found = deciding_interval([0.7, 0.72, 0.71, 0.69, 0.7, 0.71, 0.7, 0.72], 4)
     >>> round(found.low, 3), round(found.high, 3)

@@ -36,7 +36,7 @@ __all__ = ["JUDGED_FROM", "SEARCHED_FROM", "TRIES", "search"]
 #: 5000 were looked at while claims and dials of the papers were chosen, so nothing is judged on them.
 SEARCHED_FROM, JUDGED_FROM = 1000, 10000
 #: Values of a dial that are judged at most, one after the other, and the distance of their seeds.
-TRIES, APART = 3, 2000
+TRIES, APART = 3, 1000
 
 
 def search(

@@ -214,8 +214,8 @@ def test_a_look_that_was_not_planned_decides_nothing(tmp_path):
     assert deciding_interval(ratios[:12], 12).high < 0.6
     assert math.isnan(deciding_interval(ratios, 12).high)
     base = compared(lambda: load("ship-turn"), "ship-fgo", "ship-ekf", "horizontal_rmse")
-    with pytest.raises(simnav.RequestError, match=r"judged = 20: it is doubled up to 2560 seeds.* at most 15"):
-        searching.search(Claim("c", "", "", 0.1, base, ()), (), tmp_path, runs=3, judged=20)
+    with pytest.raises(simnav.RequestError, match=r"judged = 70: it is doubled up to 1120 seeds.* at most 62"):
+        searching.search(Claim("c", "", "", 0.1, base, ()), (), tmp_path, runs=3, judged=70)
 
 
 def test_a_look_allows_for_the_others_and_for_a_run_that_is_worse_than_all():
