@@ -235,6 +235,8 @@ def _beside_plain(name: str, every: Iterable[ScenarioRuns]) -> list[_Beside]:
         plain = {r.seed: t.log(t.plain, r.seed) for r in t.cells[t.plain].runs.tried}
         mine = t.cells[name]
         for run, log, capped in zip(mine.runs.tried, mine.logs.tolist(), mine.capped.tolist(), strict=True):
+            if run.seed not in plain:
+                continue
             bad = run.outcome != "ok" or math.isinf(log) or log - plain[run.seed] > math.log(BAD)
             found.append(_Beside(t.name, capped - plain[run.seed], bad))
     return found
