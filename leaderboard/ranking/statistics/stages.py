@@ -45,7 +45,7 @@ STAGES = (Stage(30, 0.02), Stage(100, 0.015), Stage(300, 0.015))
 #: Seeds that all rows have.
 FIRST = STAGES[0].seeds
 #: Scores whose ratio to the first is within this of 1 are not worth more seeds.
-ALIKE = 0.05
+ALIKE = 0.01
 
 
 @dataclass(frozen=True, eq=False)
