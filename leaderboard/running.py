@@ -231,8 +231,8 @@ def _further(
     request: CampaignRequest, asked: Sequence[Sequence[EstimatorRequest]], folder: Path, seal: Seal, end: float | None
 ) -> list[Summary]:
     """More seeds for the rows that may be the best, in the parts of a profile that ask for them."""
-    from simnav.leaderboard.campaign.further import run_further
     from simnav.leaderboard.campaign.oracles import beside_oracles
+    from simnav.leaderboard.ranking.further import run_further
 
     from .profiles import read_profile
 

@@ -13,10 +13,10 @@ from simnav.estimator import find
 from simnav.leaderboard.arguments import scenarios_of
 from simnav.leaderboard.calls import finite_number
 from simnav.leaderboard.campaign.campaign import Progress, Summary, combined, require_known, run_campaign
-from simnav.leaderboard.campaign.further import run_further
 from simnav.leaderboard.campaign.request import EstimatorRequest, comes_with_simnav, requests
 from simnav.leaderboard.profiles import Profile
 from simnav.leaderboard.ranking.board import Ranking
+from simnav.leaderboard.ranking.further import run_further
 from simnav.leaderboard.ranking.next_runs import next_runs
 from simnav.leaderboard.ranking.ranking import rank
 from simnav.leaderboard.results import requested, store

@@ -6,11 +6,11 @@ import time
 from collections.abc import Callable, Collection, Sequence
 from pathlib import Path
 
-from simnav.leaderboard.ranking.next_runs import next_runs
+from simnav.leaderboard.campaign.campaign import Summary
 from simnav.leaderboard.results import store
 from simnav.scenario import Scenario
 
-from .campaign import Summary
+from .next_runs import next_runs
 
 __all__ = ["run_further"]
 
