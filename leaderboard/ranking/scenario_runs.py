@@ -197,7 +197,7 @@ class ScenarioRuns:
         mine = {r.seed for r in runs.tried}
         parts = [self.order[: stage.seeds] for stage in STAGES] if self.staged else []
         whole = [part for part in parts if all(seed in mine and seed in self.divisor for seed in part)]
-        return set(max(whole, key=len, default=[]))
+        return {seed for part in whole for seed in part}
 
     def in_stratum(self, name: str) -> ScenarioRuns:
         """The same runs as a part of a stratum."""
