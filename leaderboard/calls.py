@@ -10,7 +10,7 @@ import inspect
 import math
 import operator
 import textwrap
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import MISSING, Field, dataclass, field, fields
 from fractions import Fraction
 from functools import cache, wraps
@@ -29,6 +29,7 @@ __all__ = [
     "option_of",
     "options_of",
     "request",
+    "require_unused",
     "whole_number",
 ]
 
@@ -99,6 +100,29 @@ def option_of(declared: Field[Any]) -> Option:
     found = declared.metadata["option"]
     assert isinstance(found, Option)
     return found
+
+
+def require_unused(request: Any, names: Sequence[str], why: str) -> None:
+    """Refuse options that were given and cannot act.
+
+    Parameters
+    ----------
+    request : object
+        The request.
+    names : sequence of str
+        Options that cannot act; one that has its default was not given.
+    why : str
+        Why they cannot, and what would be right.
+
+    Raises
+    ------
+    RequestError
+        One sentence that names the options.
+    """
+    defaults = {f.name: f.default for f in fields(request)}
+    given = [name for name in names if getattr(request, name) != defaults[name]]
+    if given:
+        raise RequestError(f"{', '.join(map(repr, given))} cannot act here: {why}")
 
 
 @cache  # many requests share options

@@ -53,7 +53,10 @@ class ClaimRequest:
     gain: float | None = option(default=None, help="For a claim of your own: by how many percent it is better.")
     score: str = option(default="horizontal_rmse", help="For a claim of your own: a score that is better when lower.")
     runs: int = option("--runs", "-n", default=6, help="Seeds of the search, for each value.", least=1)
-    judged: int = option(default=12, help="Seeds of the judgement.", least=1)
+    judged: int = option(
+        default=12, help="First number of seeds of the judgement.", least=1,
+        more="They are doubled while it is undecided, four times at most; the interval allows for that.",
+    )  # fmt: skip
     judged_from: int = option(default=10000, help="First seed of the judgement.", least=0)
     output: PathLike | None = option(
         "--output", "-o", default=None, help="Folder of the results. Default: results/claims.",

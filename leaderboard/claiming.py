@@ -13,7 +13,7 @@ from simnav.scoring import SCORES
 from simnav.scoring.lagged import seconds_of
 
 from .arguments import absolute, scenario_of
-from .calls import call, whole_number
+from .calls import call, require_unused, whole_number
 from .claim_requests import ClaimRequest
 
 if TYPE_CHECKING:
@@ -54,13 +54,21 @@ def claim(request: ClaimRequest) -> Answer:
         raise RequestError(f"{request.claim} is a paper's claim; 'than', 'scenario' and 'gain' are for one of your own")
     if not known and mine == (None, None, None):
         claim_of(request.claim)  # says what there is
+    if known:
+        require_unused(request, ["score"], f"the claim {request.claim} has a score of its own")
     if known and not request.holds_if:
+        require_unused(
+            request, ["runs", "judged", "judged_from", "output", "workers"],
+            f"the stored answer to {request.claim} is shown, and nothing is run; add --holds-if all",
+        )  # fmt: skip
         with mistakes(ValueError):
             answer = stored.read(request.claim)
         if answer is None:
             raise RequestError(f"there is no stored answer to {request.claim}; run it with --holds-if all")
         return answer
     chosen = claim_of(request.claim) if known else _own(request)
+    if not request.holds_if:
+        require_unused(request, ["runs"], "a claim without a condition is judged as it stands, without a search")
     return search(
         chosen, _dials(chosen, request.holds_if), absolute(request.output or Path("results") / "claims"),
         runs=whole_number("runs", request.runs, 1), judged=whole_number("judged", request.judged, 1),

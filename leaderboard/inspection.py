@@ -16,7 +16,7 @@ from simnav.leaderboard.results.errors import RequestError, StoreError, mistakes
 from simnav.leaderboard.results.scratch import scratch
 
 from .arguments import absolute, results_of, scenario_of, scenarios_of
-from .calls import call, finite_number, whole_number
+from .calls import call, finite_number, require_unused, whole_number
 from .error_requests import AllanRequest, RealismRequest
 from .requests import (
     BoundRequest,
@@ -269,7 +269,7 @@ def reproduce(request: ReproduceRequest) -> Reproduction:
     """
     from simnav.leaderboard.papers.reproduction import reproduce
 
-    from .papers import reading, sequential
+    from .papers import PAPERS, key_of, reading, sequential
     from .papers import stored as shipped
 
     if request.holds_if and (request.methods or request.until_decided or request.stored):
@@ -279,6 +279,10 @@ def reproduce(request: ReproduceRequest) -> Reproduction:
         raise RequestError("stored results have a fixed number of runs: 'runs' and 'until_decided' do not go with them")
     if request.until_decided and request.runs is not None:
         raise RequestError("'until_decided' chooses the number of runs itself: give 'limit' in place of 'runs'")
+    if not request.until_decided:
+        require_unused(request, ["limit", "minutes"], "they belong to 'until_decided'")
+    if request.stored:
+        require_unused(request, ["workers"], "stored results are shown, and nothing is run")
     with mistakes(ValueError):
         chosen = reading.paper_of(str(request.paper))
         if request.methods:
@@ -294,13 +298,19 @@ def reproduce(request: ReproduceRequest) -> Reproduction:
 
         count = 6 if request.runs is None else whole_number("runs", request.runs, 1)
         with mistakes(ValueError, StoreError):
-            stored = shipped.shipped_reproduction(chosen)
+            claims = claims_of(str(request.paper))
+            if not claims:
+                raise RequestError(f"{request.paper} has no claim: a table [[claim]] declares one")
+            if key_of(str(request.paper)) in PAPERS:
+                tables = shipped.shipped_reproduction(chosen)
+            else:  # nothing of it comes with simnav
+                tables = reproduce(chosen, chosen.runs, folder, workers=workers, progress=request.progress)
             answers = [
                 search(claim, claim.dials, folder.with_name("claims"), runs=count, judged=2 * count, workers=workers,
                        progress=request.progress)
-                for claim in claims_of(chosen.key)
+                for claim in claims
             ]  # fmt: skip
-        return replace(stored, answers=answers)
+        return replace(tables, answers=answers)
     with mistakes(StoreError):
         if request.until_decided:
             return sequential.decide(

@@ -510,7 +510,8 @@ class ReproduceRequest:
         default=False,
         help="Search for the conditions under which the paper's claims hold.",
         more="All choices that the paper does not print are varied (see `simnav paper claim`), on --runs seeds (6) of "
-        "the search; judged on twice as many or more. The tables are those that come with simnav.",
+        "the search; judged on twice as many or more. The tables are those that come with simnav; those of a paper "
+        "of your own are run first.",
     )
     limit: int = option(default=200, help="With --until-decided: largest number of runs of a scenario.", least=1)
     minutes: float | None = option(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import os
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -36,6 +36,7 @@ from .requests import (
 if TYPE_CHECKING:
     from simnav.estimator import Estimator
     from simnav.leaderboard.campaign.campaign import Summary
+    from simnav.leaderboard.campaign.seal import Seal
     from simnav.leaderboard.ranking.reports import CampaignReport, EvaluationReport
     from simnav.leaderboard.sweep.datasheets import Robustness
     from simnav.leaderboard.sweep.report import Sweep
@@ -214,9 +215,48 @@ def campaign(request: CampaignRequest) -> CampaignReport:
             summaries.append(_run(request, some, beside, seeds, folder, seal=seal, minutes=left))
         if request.external is not None:
             add_external(folder, absolute(request.external), chosen, seeds, seal)
+    if (
+        request.profile is not None
+        and request.runs is None
+        and request.shard == (1, 1)
+        and not any(s.left for s in summaries)
+    ):
+        summaries += _further(request, asked, folder, seal, end)
     results = results_of(folder)
     ranking = rank(results, tracks=tracks, requested=requested.read(folder))
     return CampaignReport(results, ranking, combined(summaries))
+
+
+def _further(
+    request: CampaignRequest, asked: Sequence[Sequence[EstimatorRequest]], folder: Path, seal: Seal, end: float | None
+) -> list[Summary]:
+    """More seeds for the rows that may be the best, in the parts of a profile that ask for them."""
+    from simnav.leaderboard.campaign.oracles import beside_oracles
+    from simnav.leaderboard.ranking.further import run_further
+
+    from .profiles import read_profile
+
+    found: list[Summary] = []
+    assert request.profile is not None
+    for part, mine in zip(read_profile(request.profile).parts, asked, strict=True):
+        if not part.more:
+            continue
+        chosen = scenarios_of(part.scenarios if request.scenarios is None else request.scenarios, optional=True)
+        beside = [e for _, some in beside_oracles(chosen, mine) for e in some] if request.oracle else mine
+        rows = {e.label: e for e in beside}
+
+        def further(
+            scenario: Scenario,
+            names: Collection[str],
+            runs: int,
+            minutes: float | None,
+            rows: Mapping[str, EstimatorRequest] = rows,
+        ) -> Summary:
+            return _run(request, [scenario], [rows[name] for name in names], seeds_of(request.seed, runs), folder,
+                        seal=seal, minutes=minutes, force=(), later=True)  # fmt: skip
+
+        found += run_further(folder, chosen, rows, further, end)
+    return found
 
 
 def _parts(request: CampaignRequest) -> list[tuple[Scenarios, Estimators, int]]:

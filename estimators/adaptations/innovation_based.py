@@ -268,6 +268,9 @@ class InnovationBased(EstimatedNoise):
     significance : float
         Probability that the test rejects the datasheet of a healthy instrument, for one component on one side, in
         (0, 1]; 1: the estimate is always used, as printed.
+    always : bool
+        True: every innovation counts, as printed: also one of a prediction that is less certain than the measurement
+        (`EstimatedNoise`), and one of a wrong prediction (`PredictionTest`).
     """
 
     rule = innovation_noise
@@ -287,8 +290,11 @@ class InnovationBased(EstimatedNoise):
         highest: float = 30.0,
         full: bool = False,
         scope: Scope = "all",
+        always: bool = False,
     ):
         super().__init__(lowest, highest, full, scope)
+        if always:
+            self.together, self.estimates = 0, False
         if source not in ("innovation", "residual"):
             raise ValueError(f"source = {source!r}: it must be 'innovation' or 'residual'")
         if not 1 <= shortest <= longest:

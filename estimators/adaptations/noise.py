@@ -86,7 +86,7 @@ class NoiseAdaptation(Adaptation):
     #: What the number that the rule returns is reported as.
     reported: ClassVar[str] = ""
     #: Whether the rule estimates the noise, so that the last one stands while a prediction is poor.
-    estimates: ClassVar[bool] = False
+    estimates: bool = False
 
     def __init_subclass__(cls) -> None:
         super().__init_subclass__()

@@ -20,9 +20,18 @@ from simnav.estimators.solvers.imm import ImmEstimator
 from simnav.estimators.solvers.iterated import poor_heading
 from simnav.estimators.solvers.kalman import KalmanEstimator
 
-__all__ = ["Adkf", "Adkf23", "AdkfPaper", "FadingEkf", "GatedEkf", "HuberKf", "Iae", "IaeFixed", "Igg3", "Imm", "Mckf"]
-__all__ += ["Rae", "SageHusaKf", "SageHusaPaper", "VbAkf"]
+__all__ = ["Adkf", "Adkf23", "AdkfPaper", "FadingEkf", "GatedEkf", "HuberKf", "Iae", "IaeFixed", "IaePaper", "Igg3"]
+__all__ += ["Imm", "Mckf", "Rae", "SageHusaKf", "SageHusaPaper", "VbAkf"]
 
+#: Eqs. 16-20 of Mao, Wang and Fu (2025) without additions. The bounds are ours, because eq. 17 is often not positive.
+INNOVATIONS_AS_PRINTED = piece(
+    InnovationBased,
+    defaults={
+        "newest": True, "significance": 1.0, "lowest": 0.1, "highest": 100.0, "full": True, "scope": "fixes",
+        "always": True,
+    },
+    source="innovation",
+)  # fmt: skip
 #: `innovations` was the window of these rows, as a filter has no other.
 _FORMERLY = {"window": "innovations"}
 
@@ -120,6 +129,19 @@ class Iae(_Adaptive, adaptation=piece(InnovationBased, source="innovation")):
     """
 
     version = 4
+
+
+@register("iae-paper")
+class IaePaper(_Adaptive, adaptation=INNOVATIONS_AS_PRINTED):
+    """Innovation-based adaptive estimation of the noise of fixes with the equations as their paper prints them.
+
+    The newest covariance of the prediction is subtracted from all innovations, and the estimate is always used. The
+    full matrix has eigenvalues between 0.01 and 10 000 times the variances of the datasheet, because the printed
+    estimate is often not positive definite.
+
+    Source: G. Mao, K. Wang, T. Fu, *Robust GNSS/INS integrated navigation algorithm based on adaptive factor graph
+    optimization*, 2025, eqs. 16-20.
+    """
 
 
 @register("iae-fixed")

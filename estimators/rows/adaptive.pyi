@@ -17,8 +17,21 @@ from simnav.estimators.solvers.imm import ImmEstimator
 from simnav.estimators.solvers.iterated import poor_heading
 from simnav.estimators.solvers.kalman import KalmanEstimator
 
-__all__ = ["Adkf", "Adkf23", "AdkfPaper", "FadingEkf", "GatedEkf", "HuberKf", "Iae", "IaeFixed", "Igg3", "Imm", "Mckf"]
-__all__ += ["Rae", "SageHusaKf", "SageHusaPaper", "VbAkf"]
+__all__ = ["Adkf", "Adkf23", "AdkfPaper", "FadingEkf", "GatedEkf", "HuberKf", "Iae", "IaeFixed", "IaePaper", "Igg3"]
+__all__ += ["Imm", "Mckf", "Rae", "SageHusaKf", "SageHusaPaper", "VbAkf"]
+INNOVATIONS_AS_PRINTED = piece(
+    InnovationBased,
+    defaults={
+        "newest": True,
+        "significance": 1.0,
+        "lowest": 0.1,
+        "highest": 100.0,
+        "full": True,
+        "scope": "fixes",
+        "always": True,
+    },
+    source="innovation",
+)
 _FORMERLY = {"window": "innovations"}
 
 class _Adaptive(Row, solver=KalmanEstimator, model=Suitable, iteration=poor_heading):
@@ -77,6 +90,27 @@ class Iae(_Adaptive, adaptation=piece(InnovationBased, source="innovation")):
         highest: float = 30.0,
         full: bool = False,
         scope: typing.Literal["fixes", "all"] = "all",
+        always: bool = False,
+        iterate_above_deg: float | None = None,
+    ) -> None: ...
+
+@register("iae-paper")
+class IaePaper(_Adaptive, adaptation=INNOVATIONS_AS_PRINTED):
+    def __init__(
+        self,
+        *,
+        shortest: int = 10,
+        longest: int = 20,
+        low: float = 2.0,
+        high: float = 5.0,
+        forgetting: float = 0.9,
+        newest: bool = True,
+        significance: float = 1.0,
+        lowest: float = 0.1,
+        highest: float = 100.0,
+        full: bool = True,
+        scope: typing.Literal["fixes", "all"] = "fixes",
+        always: bool = True,
         iterate_above_deg: float | None = None,
     ) -> None: ...
 

@@ -10,7 +10,10 @@ from simnav.estimators.models.suitable import Suitable
 from simnav.estimators.solvers.full_graph import FullGraph
 from simnav.estimators.solvers.window import WindowEstimator
 
-__all__ = ["FgoFull", "FgoUnsimplified", "IaeFgo", "IaeFgoFixed", "ShipFgo", "ShipFgoFull", "SwFgo", "SwFgoPaper"]
+from .adaptive import INNOVATIONS_AS_PRINTED
+
+__all__ = ["FgoFull", "FgoUnsimplified", "IaeFgo", "IaeFgoFixed", "IaeFgoPaper", "ShipFgo", "ShipFgoFull", "SwFgo"]
+__all__ += ["SwFgoPaper"]
 
 _WINDOW = piece(WindowEstimator, every_sample=False)
 
@@ -76,6 +79,15 @@ class IaeFgo(Row, solver=_WINDOW, model=Suitable, adaptation=piece(InnovationBas
     """
 
     version = 4
+
+
+@register("iae-fgo-paper")
+class IaeFgoPaper(Row, solver=_WINDOW, model=Suitable, adaptation=INNOVATIONS_AS_PRINTED):
+    """The sliding window with innovation-based estimation of the noise of fixes as its paper prints it (``iae-paper``).
+
+    Source: G. Mao, K. Wang, T. Fu, *Robust GNSS/INS integrated navigation algorithm based on adaptive factor graph
+    optimization*, 2025, eqs. 16-20.
+    """
 
 
 @register("iae-fgo-fixed")

@@ -11,7 +11,10 @@ from simnav.estimators.models.suitable import Suitable
 from simnav.estimators.solvers.full_graph import FullGraph
 from simnav.estimators.solvers.window import WindowEstimator
 
-__all__ = ["FgoFull", "FgoUnsimplified", "IaeFgo", "IaeFgoFixed", "ShipFgo", "ShipFgoFull", "SwFgo", "SwFgoPaper"]
+from .adaptive import INNOVATIONS_AS_PRINTED
+
+__all__ = ["FgoFull", "FgoUnsimplified", "IaeFgo", "IaeFgoFixed", "IaeFgoPaper", "ShipFgo", "ShipFgoFull", "SwFgo"]
+__all__ += ["SwFgoPaper"]
 _WINDOW = piece(WindowEstimator, every_sample=False)
 
 @register("sw-fgo", aliases=("fgo", "fgo-simplified"))
@@ -69,6 +72,30 @@ class IaeFgo(Row, solver=_WINDOW, model=Suitable, adaptation=piece(InnovationBas
         highest: float = 30.0,
         full: bool = False,
         scope: typing.Literal["fixes", "all"] = "all",
+        always: bool = False,
+        window: int | None = 20,
+        tolerance: float = 0.001,
+        iterations: int = 10,
+        spacing: float = 0.5,
+    ) -> None: ...
+
+@register("iae-fgo-paper")
+class IaeFgoPaper(Row, solver=_WINDOW, model=Suitable, adaptation=INNOVATIONS_AS_PRINTED):
+    def __init__(
+        self,
+        *,
+        shortest: int = 10,
+        longest: int = 20,
+        low: float = 2.0,
+        high: float = 5.0,
+        forgetting: float = 0.9,
+        newest: bool = True,
+        significance: float = 1.0,
+        lowest: float = 0.1,
+        highest: float = 100.0,
+        full: bool = True,
+        scope: typing.Literal["fixes", "all"] = "fixes",
+        always: bool = True,
         window: int | None = 20,
         tolerance: float = 0.001,
         iterations: int = 10,

@@ -171,6 +171,11 @@ class Campaign(CampaignOptions):
         "comes with simnav is; of other estimators a digest of their own files counts, too. False: by digests of the "
         "code, and by the libraries and the processor that computed them.",
     )
+    later: bool = option(
+        default=False,
+        help="True: a later stage of a plan (`simnav.leaderboard.ranking.statistics.stages`), whose seeds were not "
+        "asked for by somebody who looked at results.",
+    )
     progress: Callable[[Progress], None] | None = option(default=None, help="Called with a `Progress` now and then.")
 
     def __post_init__(self) -> None:
@@ -255,7 +260,8 @@ def run_campaign(asked: Campaign) -> Summary:
         _compile(asked.report)
     entrants = _entrants(asked, confinement, path)
     keyed = _keyed(asked, entrants, path)
-    requested.add(path, (s.id for s in asked.scenarios), len(asked.numbers))
+    if not asked.later:
+        requested.add(path, (s.id for s in asked.scenarios), len(asked.numbers))
     scenario_files.add(path, asked.scenarios)
     plan, again = _planned(asked, path, entrants, keyed)
     total, skipped = plan.total, len(plan.there)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import fields, replace
 
+from simnav.leaderboard.calls import require_unused
 from simnav.leaderboard.claiming import claim
 from simnav.leaderboard.figures.style import save_as
 from simnav.leaderboard.papers import ALIASES, PAPERS, key_of
@@ -24,6 +25,8 @@ def show(out: Output, request: ClaimCommand) -> None:
     """Find out under which conditions a claim holds, or list the claims of the papers."""
     require_figure("--plot", request.plot)
     if not request.claim or request.claim in (*PAPERS, *ALIASES):
+        names = [f.name for f in fields(request) if f.name != "claim"]
+        require_unused(request, names, "the claims are listed; name one, such as mao-road-east")
         _list(out, key_of(request.claim) if request.claim else "")
         return
     with out.progress("starting") as bar:

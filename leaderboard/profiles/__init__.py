@@ -26,6 +26,7 @@ from pathlib import Path
 from typing import Any
 
 from simnav.estimator import describe, names
+from simnav.leaderboard.ranking.statistics import FIRST
 from simnav.leaderboard.results.errors import MOST_RUNS, RequestError
 from simnav.scenario.catalogue import headers
 from simnav.spec import closest
@@ -40,6 +41,7 @@ KEYS: Mapping[str, str] = {
     "tracks": "names of tracks, which stand for their scenarios",
     "estimators": "names of estimators, or the name of a group; default: all that are not slow",
     "runs": "required: seeds of each scenario, from 0 on",
+    "more": "true: rows that may be the best of a kind of trouble or of the track have more seeds; `runs` is then 30",
     "shortest_s": "with `tracks`: only scenarios that take longer than this",
     "longest_s": "with `tracks`: only scenarios that take no longer than this",
 }
@@ -55,11 +57,14 @@ class Part:
         Names.
     runs : int
         Seeds a scenario.
+    more : bool
+        Whether rows that may be the best have more seeds (`simnav.leaderboard.ranking.next_runs`).
     """
 
     scenarios: tuple[str, ...]
     estimators: tuple[str, ...]
     runs: int
+    more: bool = False
 
 
 @dataclass(frozen=True)
@@ -129,6 +134,9 @@ def _part(where: str, table: dict[str, Any], groups: dict[str, list[str]]) -> Pa
     runs = table.get("runs")
     if not isinstance(runs, int) or isinstance(runs, bool) or not 1 <= runs <= MOST_RUNS:
         raise RequestError(f"{where}: runs = {runs!r:.40} should be a number of seeds, from 1 to {MOST_RUNS}")
+    more = table.get("more", False)
+    if not isinstance(more, bool) or (more and runs != FIRST):
+        raise RequestError(f"{where}: more = {more!r:.40} should be true or false, and true only with runs = {FIRST}")
     if ("scenarios" in table) == ("tracks" in table):
         raise RequestError(f"{where}: it should name scenarios or tracks")
     if "scenarios" in table:
@@ -143,7 +151,7 @@ def _part(where: str, table: dict[str, Any], groups: dict[str, list[str]]) -> Pa
             raise RequestError(f"{where}: there is no group {asked!r} of estimators{closest(asked, list(groups))}")
         table = table | {"estimators": groups[asked]}
     everyone = tuple(n for n in names() if not describe(n).slow)
-    return Part(scenarios, _texts(where, table, "estimators") if "estimators" in table else everyone, runs)
+    return Part(scenarios, _texts(where, table, "estimators") if "estimators" in table else everyone, runs, more)
 
 
 def _seconds(where: str, table: dict[str, Any], key: str, default: float) -> float:

@@ -18,6 +18,9 @@ few are listed apart (`simnav.leaderboard.ranking.variants`).
 counts the same, whatever its scenario, and seeds over one recording are averaged. Where the rows of a track cannot be
 ordered, none has a rank, and the board says why.
 
+**More seeds where they decide.** In a track in which a row has more than 30 seeds, the rows are looked at in stages
+(`simnav.leaderboard.ranking.statistics.stages`). The score of a row is over all seeds up to the last stage that it has.
+
 **Gain.** Each row is compared with the plain row on the same runs (`simnav.leaderboard.ranking.plain_row`).
 
 **Plausible.** A row whose errors are below the oracle's by more than chance is not ranked.
@@ -27,7 +30,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import compress
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -65,6 +69,7 @@ from .remarks import (
 from .runs import Runs
 from .scenario_runs import Cell, ScenarioRuns
 from .statistics import (
+    FIRST,
     Gain,
     Interval,
     Separation,
@@ -72,6 +77,7 @@ from .statistics import (
     scenario_interval,
     score,
     separate,
+    separate_in_stages,
     share,
     unlucky_excess,
     unorderable,
@@ -83,7 +89,7 @@ from .track_runs import TrackRuns, runs_of_tracks
 if TYPE_CHECKING:
     from simnav.leaderboard.results.result import Result
 
-__all__ = ["FAR", "PROVISIONAL", "RANKED_SCORES", "rank", "rank_track", "require_lower", "require_score"]
+__all__ = ["FAR", "PROVISIONAL", "RANKED_SCORES", "rank", "rank_track", "require_lower", "require_score", "undecided"]
 
 Array = NDArray[np.float64]
 
@@ -309,6 +315,25 @@ def _figures(tables: Sequence[ScenarioRuns], cells: Mapping[str, Cell]) -> _Figu
     return _Figures(scenarios, strata, clusters, np.concatenate(logs), np.array(failed, dtype=bool))
 
 
+def undecided(runs: TrackRuns) -> tuple[list[str], int]:
+    """The rows that may still be the best, and how many seeds they should have next; none where no more are to be run.
+
+    Parameters
+    ----------
+    runs : TrackRuns
+        Runs on scenarios that are looked at in stages.
+    """
+    ranked = rank_track(runs).rows
+    names = [r.estimator for r in ranked if r.ranked and r.may_be_best]
+    if len(names) < 2 or not all(t.staged for t in runs.tables):
+        return [], 0
+    figures = {r.estimator: _figures(runs.tables, {t.name: t.cells[r.estimator] for t in runs.tables})
+               for r in ranked if r.ranked}  # fmt: skip
+    board = _board(figures, staged=True)
+    wanted = separate_in_stages(board.values, board.strata, board.clusters).wanted
+    return (names, wanted) if wanted else ([], 0)
+
+
 def _rows(
     tables: Sequence[ScenarioRuns],
     cells: Mapping[str, Mapping[str, Cell]],
@@ -316,8 +341,8 @@ def _rows(
 ) -> tuple[list[dict[str, Any]], Separation | None, str]:
     """The fields that all rows have, in the order of a table; which are told apart; why they cannot be ordered."""
     figures = {n: _figures(tables, c) for n, c in cells.items()}
-    board = _board({n: f for n, f in figures.items() if standing[n][0] == "ranked"})
-    excess = _excess(board)
+    board = _board({n: f for n, f in figures.items() if standing[n][0] == "ranked"}, all(t.staged for t in tables))
+    excess = _excess(board.first)
     usual = float(np.median(list(excess.values()))) if excess else 0.0  # of a row that is not ranked
     scores = {n: score(f.logs, f.strata, f.clusters, f.failed, excess.get(n, usual)) for n, f in figures.items()}
     ranked = sorted(board.names, key=lambda n: (scores[n].value, n))
@@ -374,6 +399,8 @@ def _gain(name: str, tables: Sequence[ScenarioRuns], cells: Mapping[str, Cell], 
     for t in tables:
         plain = dict(zip(*_by_seed(t.cells[t.plain]), strict=True))
         for seed, log in zip(*_by_seed(cells[t.name]), strict=True):
+            if seed not in plain:
+                continue
             mine.append(log)
             theirs.append(plain[seed])
             names.append(t.name)
@@ -394,15 +421,32 @@ class _Board:
     values: Array
     strata: list[str]
     clusters: list[Any]
+    staged: bool
+
+    @property
+    def first(self) -> _Board:
+        """The runs of the first stage, which all rows have."""
+        if not self.staged:
+            return self
+        known = set(sorted(set(self.clusters))[:FIRST])
+        inside = [c in known for c in self.clusters]
+        strata, clusters = (list(compress(part, inside)) for part in (self.strata, self.clusters))
+        return replace(self, values=self.values[inside], strata=strata, clusters=clusters)
+
+    def separated(self) -> Separation:
+        """Which rows are told apart, at all stages together."""
+        if self.staged:
+            return separate_in_stages(self.values, self.strata, self.clusters).separation
+        return separate(self.values, self.strata, self.clusters)
 
 
-def _board(figures: Mapping[str, _Figures]) -> _Board:
+def _board(figures: Mapping[str, _Figures], staged: bool) -> _Board:
     keys = sorted({k for f in figures.values() for k in f.keys}, key=repr)
     index = {k: i for i, k in enumerate(keys)}
     values = np.full((len(keys), len(figures)), np.nan)
     for j, f in enumerate(figures.values()):
         values[[index[k] for k in f.keys], j] = f.logs
-    return _Board(list(figures), values, [k[0] for k in keys], [k[1] for k in keys])
+    return _Board(list(figures), values, [k[0] for k in keys], [k[1] for k in keys], staged)
 
 
 def _excess(board: _Board) -> dict[str, float]:
@@ -419,9 +463,9 @@ def _places(ranked: Sequence[str], board: _Board) -> tuple[Separation | None, di
     """
     if not ranked:
         return None, {}, ""
-    values = board.values[:, [board.names.index(n) for n in ranked]]
-    found = separate(values, board.strata, board.clusters)
-    why = unorderable(values, board.strata, board.clusters)
+    board = replace(board, names=list(ranked), values=board.values[:, [board.names.index(n) for n in ranked]])
+    found, first = board.separated(), board.first
+    why = unorderable(first.values, first.strata, first.clusters)
     places: dict[str, dict[str, Any]] = {}
     for j, n in enumerate(ranked):
         places[n] = {

@@ -28,7 +28,7 @@ from .plain_row import plain_row
 from .plausibility import beats, below_floor, too_good
 from .reference import ORACLES, PLAIN, reference_of
 from .runs import Runs
-from .statistics import FAILURE
+from .statistics import FAILURE, FIRST, STAGES
 from .tracks import RECORDED, SMOOTHED, Track
 
 __all__ = ["CAP", "Cell", "ScenarioRuns"]
@@ -104,6 +104,9 @@ class ScenarioRuns:
         Whether the scenario is of recorded voyages, as the catalogue says; None for one that is not in it.
     apart : container of str
         Rows that have no say in which seeds count.
+    staged : bool
+        Whether rows may have more seeds than others (`simnav.leaderboard.ranking.statistics.stages`). The seeds that
+        count for all are then at most the first 30, and a row with all seeds of a later stage has these.
 
     Attributes
     ----------
@@ -118,11 +121,19 @@ class ScenarioRuns:
     plain : str
         The plain row; empty where none has all seeds.
     seeds : list of int
-        Seeds that count.
+        Seeds that count for all rows.
+    order : list of int
+        These, and in a staged scenario those after them, of which a row may have the first ones.
     """
 
     def __init__(
-        self, name: str, by: Mapping[str, Runs], track: Track, recorded: bool | None = None, apart: Container[str] = ()
+        self,
+        name: str,
+        by: Mapping[str, Runs],
+        track: Track,
+        recorded: bool | None = None,
+        apart: Container[str] = (),
+        staged: bool = False,
     ):
         self.name, self.stratum, self.track = name, name, track
         self.unsuitable = {n: why for n in sorted(by) if (why := by[n].unsuitable())}
@@ -132,7 +143,11 @@ class ScenarioRuns:
         self.notes = notes_by_seed([r for runs in entries.values() for r in runs.tried])
         voters = [r for n, r in entries.items() if not r.reference and n not in apart]
         voters = voters or [r for r in entries.values() if not r.reference] or list(entries.values())
+        self.staged = staged
         self.seeds = common_seeds([{r.seed for r in runs.tried} for runs in voters])
+        self.order = sorted({r.seed for runs in voters for r in runs.tried}) if staged else self.seeds
+        if staged:
+            self.seeds = self.seeds[:FIRST]
         self.errors = {n: self._errors(r) for n, r in entries.items()}
         self.recorded = track.name == RECORDED or (self._said_to_be_recorded() if recorded is None else recorded)
         self._smoothed = {n: _column(by[n], SMOOTHED) for n in SMOOTHERS if n in by}
@@ -162,19 +177,27 @@ class ScenarioRuns:
         if self.recorded:
             name = plain_row(self.track.score, {n for n in self.errors if self._is_complete(n)})
         if not name or not self._is_complete(name):
-            return dict.fromkeys(self.seeds, self._stored.value), self._stored
-        mine = {seed: self.errors[name][seed] for seed in self.seeds}
-        logs = np.log(list(mine.values()))
+            return dict.fromkeys(self.order, self._stored.value), self._stored
+        mine = {s: e for s in self.order if 0.0 < (e := self.errors[name].get(s, math.inf)) < math.inf}
+        logs = np.log([mine[seed] for seed in self.seeds])
         spread = float(logs.std(ddof=1)) if len(logs) > 1 else math.nan
         return mine, Reference(math.exp(float(logs.mean())), name, len(logs), spread, paired=True)
 
     def _cell(self, runs: Runs) -> Cell:
         counts = set(self.seeds)
-        there = [r for r in runs.tried if r.seed in counts]
+        used = counts | self._further(runs)
+        there = [r for r in runs.tried if r.seed in used]
         logs = [self.log(runs.estimator, r.seed) for r in there]
         same = len(there) == len(runs.results)
         counted = runs if same else Runs(there) if there else runs
         return Cell(counted, len(counts), [self.unit(r.seed) for r in there], np.array(logs, dtype=np.float64))
+
+    def _further(self, runs: Runs) -> set[int]:
+        """The seeds that count for a row beyond those of all: up to the last stage that it has whole."""
+        mine = {r.seed for r in runs.tried}
+        parts = [self.order[: stage.seeds] for stage in STAGES] if self.staged else []
+        whole = [part for part in parts if all(seed in mine and seed in self.divisor for seed in part)]
+        return {seed for part in whole for seed in part}
 
     def in_stratum(self, name: str) -> ScenarioRuns:
         """The same runs as a part of a stratum."""

@@ -14,7 +14,8 @@ from simnav.leaderboard.campaign.request import comes_with_simnav
 
 from .runs import Runs, group
 from .scenario_runs import ScenarioRuns
-from .tracks import Track, catalogued, tracks_of
+from .statistics import FIRST
+from .tracks import RECORDED, Track, catalogued, tracks_of
 from .troubles import trouble_of
 from .variants import families, surplus
 
@@ -59,6 +60,7 @@ def runs_of_tracks(
     results: Iterable[Result],
     score: str | None = None,
     tracks: Mapping[str, str] | None = None,
+    staged: bool = False,
 ) -> Iterator[TrackRuns]:
     """The runs of each track, in the order in which tracks are shown; tracks without a run are left out.
 
@@ -66,6 +68,9 @@ def runs_of_tracks(
     ----------
     results, score, tracks
         As for `simnav.leaderboard.ranking.ranking.rank`.
+    staged : bool
+        True: simulated scenarios are looked at in stages (`simnav.leaderboard.ranking.statistics.stages`). Otherwise
+        those of a track are as soon as one of its rows has more seeds than the first stage.
 
     Raises
     ------
@@ -78,10 +83,17 @@ def runs_of_tracks(
     for track in tracks_of(runs, known, score):
         apart = surplus(_families(track, runs))
         recorded = {s: headers[s].recorded for s in track.scenarios if s in headers}
-        every = (ScenarioRuns(s, runs[s], track, recorded.get(s), apart) for s in track.scenarios)
+        simulated = track.name != RECORDED and not any(recorded.values())
+        looks = simulated and (staged or any(_most(runs[s]) > FIRST for s in track.scenarios))
+        every = (ScenarioRuns(s, runs[s], track, recorded.get(s), apart, looks) for s in track.scenarios)
         tables = [t for t in every if t.cells]
         if tables:
             yield TrackRuns(track, tables, apart)
+
+
+def _most(by: Mapping[str, Runs]) -> int:
+    """The largest number of seeds of a row that is no reference."""
+    return max((len(runs.tried) for runs in by.values() if not runs.reference), default=0)
 
 
 def _families(track: Track, runs: Mapping[str, Mapping[str, Runs]]) -> list[list[str]]:

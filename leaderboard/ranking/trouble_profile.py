@@ -223,7 +223,8 @@ def _bad(name: str, every: Iterable[ScenarioRuns]) -> list[bool]:
         plain = {r.seed: t.log(t.plain, r.seed) for r in t.cells[t.plain].runs.tried}
         mine = t.cells[name]
         for run, log in zip(mine.runs.tried, mine.logs.tolist(), strict=True):
-            found.append(run.outcome != "ok" or math.isinf(log) or log - plain[run.seed] > math.log(BAD))
+            if run.seed in plain:
+                found.append(run.outcome != "ok" or math.isinf(log) or log - plain[run.seed] > math.log(BAD))
     return found
 
 

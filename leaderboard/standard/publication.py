@@ -13,10 +13,12 @@ from simnav.estimator import find
 from simnav.leaderboard.arguments import scenarios_of
 from simnav.leaderboard.calls import finite_number
 from simnav.leaderboard.campaign.campaign import Progress, Summary, combined, require_known, run_campaign
-from simnav.leaderboard.campaign.request import comes_with_simnav, requests
+from simnav.leaderboard.campaign.request import EstimatorRequest, comes_with_simnav, requests
 from simnav.leaderboard.profiles import Profile
 from simnav.leaderboard.ranking.board import Ranking
 from simnav.leaderboard.ranking.first_view import first_view
+from simnav.leaderboard.ranking.further import run_further
+from simnav.leaderboard.ranking.next_runs import next_runs
 from simnav.leaderboard.ranking.ranking import rank
 from simnav.leaderboard.ranking.trouble_profile import profiles
 from simnav.leaderboard.results import requested, store
@@ -26,7 +28,7 @@ from simnav.leaderboard.results.packing import shortened, write_packed
 from simnav.leaderboard.results.provenance import BENCHMARK
 from simnav.leaderboard.results.result import SINCE_VERSIONS, Result
 from simnav.leaderboard.results.versions import declared, is_declared
-from simnav.scenario import load
+from simnav.scenario import Scenario, load
 
 from . import shipped
 from .history import append
@@ -135,13 +137,30 @@ def run(
              for part in profile.parts]  # fmt: skip
     require_known(force, [everyone for _, everyone, _ in parts])
     end = None if minutes is None else time.monotonic() + 60.0 * finite_number("minutes", minutes)
-    return combined([
+    found = [
         run_campaign(
             chosen, everyone, range(runs), working, workers=workers, progress=progress, force=force, shard=shard,
             minutes=None if end is None else max(0.0, (end - time.monotonic()) / 60.0), by_version=True,
         )
         for chosen, everyone, runs in parts
-    ])  # fmt: skip
+    ]  # fmt: skip
+    if shard == (1, 1) and not any(s.left for s in found):  # a shard does not know which rows may be the best
+        for part, (chosen, everyone, _) in zip(profile.parts, parts, strict=True):
+            rows = {e.label: e for e in everyone}
+
+            def further(
+                scenario: Scenario,
+                names: Collection[str],
+                runs: int,
+                minutes: float | None,
+                rows: Mapping[str, EstimatorRequest] = rows,
+            ) -> Summary:
+                return run_campaign([scenario], [rows[name] for name in names], range(runs), working, workers=workers,
+                                    minutes=minutes, progress=progress, by_version=True, later=True)  # fmt: skip
+
+            if part.more:
+                found += run_further(working, chosen, rows, further, end)
+    return combined(found)
 
 
 def missing(profile: Profile, results: Sequence[Result]) -> dict[str, int]:
@@ -162,6 +181,23 @@ def missing(profile: Profile, results: Sequence[Result]) -> dict[str, int]:
                 lacking = sum((scenario.id, label, seed) not in there for seed in range(part.runs))
                 if lacking:
                     found[f"{label} on {scenario.id}"] = max(lacking, found.get(f"{label} on {scenario.id}", 0))
+    return found or _missing_later(profile, results, there)
+
+
+def _missing_later(
+    profile: Profile, results: Sequence[Result], there: Collection[tuple[str, str, int]]
+) -> dict[str, int]:
+    """As `missing`, of the later stages, where all runs of the first one are there."""
+    found: dict[str, int] = {}
+    for part in profile.parts:
+        if not part.more:
+            continue
+        chosen, labels = {load(name).id for name in part.scenarios}, set(part.estimators)
+        for each in next_runs(r for r in results if r.scenario in chosen and r.estimator in labels):
+            for label in each.estimators:
+                found[f"{label} on {each.scenario}"] = sum(
+                    (each.scenario, label, seed) not in there for seed in range(each.seeds)
+                )
     return found
 
 

@@ -12,7 +12,7 @@ from simnav.leaderboard.results.frame import frame
 from simnav.leaderboard.results.shown import Shown
 
 from .gain_figure import gain_figure
-from .points import DialAnswer, Point, Standing, gain_text
+from .points import DialAnswer, Judgement, Point, Standing, gain_text
 
 __all__ = ["Answer"]
 
@@ -27,7 +27,7 @@ class Answer(Shown):
         As of `simnav.leaderboard.papers.claims.claim.Claim`.
     scenario, row, than, score, than_score : str
         Of the comparison with our settings: id of the scenario, labels of the estimators, measures.
-    ours : Point
+    ours : Judgement
         The gain with our settings, on the seeds of the judgement.
     dials : list of DialAnswer
         What was found along each dial.
@@ -43,7 +43,7 @@ class Answer(Shown):
     than: str
     score: str
     than_score: str
-    ours: Point
+    ours: Judgement
     dials: list[DialAnswer]
 
     @property
@@ -115,11 +115,11 @@ class Answer(Shown):
             )},
             "verdict": self.verdict,
             "words": self.sentence_of_verdict,
-            "ours": _point_dict(self.ours, self.limit),
+            "ours": _judgement_dict(self.ours, self.limit),
             "dials": [
                 {"name": d.name, "title": d.title, "unit": d.unit, "ours": d.ours, "why": d.why,
                  "points": [_point_dict(p, self.limit) for p in d.points],
-                 "judged": [_point_dict(p, self.limit) for p in d.tried]}
+                 "judged": [_judgement_dict(p, self.limit) for p in d.tried]}
                 for d in self.dials
             ],
         }  # fmt: skip
@@ -130,10 +130,10 @@ class Answer(Shown):
         names = ("claim", "paper", "sentence", "gain", "derived", "scenario", "row", "than", "score", "than_score")
         dials = [
             DialAnswer(d["name"], d["title"], d["unit"], d["ours"], d["why"], [_point(p) for p in d["points"]],
-                       [_point(p) for p in d["judged"]])
+                       [_judgement(p) for p in d["judged"]])
             for d in found["dials"]
         ]  # fmt: skip
-        return cls(**{name: found[name] for name in names}, ours=_point(found["ours"]), dials=dials)
+        return cls(**{name: found[name] for name in names}, ours=_judgement(found["ours"]), dials=dials)
 
     def to_frame(self) -> Any:
         """One line for each value of each dial; see `simnav.leaderboard.results.frame.frame`."""
@@ -158,6 +158,17 @@ def _point_dict(point: Point, limit: float) -> dict[str, Any]:
         "standing": point.standing(limit), "seeds": list(point.seeds),
         "ratios": [float(f"{r:.6g}") for r in point.ratios], "failed": point.failed,
     }  # fmt: skip
+
+
+def _judgement_dict(judged: Judgement, limit: float) -> dict[str, Any]:
+    return {**_point_dict(judged, limit), "first": judged.first, "level": judged.level}
+
+
+def _judgement(found: dict[str, Any]) -> Judgement:
+    point = _point(found)
+    return Judgement(
+        point.value, point.seeds, point.ratios, point.failed, int(found["first"]), float(found["level"])
+    )  # fmt: skip
 
 
 def _point(found: dict[str, Any]) -> Point:

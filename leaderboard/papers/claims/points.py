@@ -10,8 +10,9 @@ from simnav.leaderboard.papers.comparison import FEWEST, as_gain
 from simnav.leaderboard.ranking.statistics import Interval, mean_ratio
 
 from .claim import Choice
+from .looks import LEVEL, deciding_interval
 
-__all__ = ["DialAnswer", "Point", "Standing", "gain_text"]
+__all__ = ["DialAnswer", "Judgement", "Point", "Standing", "gain_text"]
 
 #: Of a claim at one setting.
 Standing = Literal["holds", "does not hold", "undecided"]
@@ -59,6 +60,27 @@ class Point:
 
 
 @dataclass(frozen=True)
+class Judgement(Point):
+    """A comparison that decides: its interval allows for all looks that were planned.
+
+    Attributes
+    ----------
+    first : int
+        Number of runs of the first look (`simnav.leaderboard.papers.claims.looks.looks`).
+    level : float
+        Probability that it is wrong, over all looks.
+    """
+
+    first: int = 12
+    level: float = LEVEL
+
+    @property
+    def ratio(self) -> Interval:
+        """Geometric mean of the ratios with the interval that decides at this number of runs."""
+        return deciding_interval(self.ratios, self.first, self.level)
+
+
+@dataclass(frozen=True)
 class DialAnswer:
     """What was found along one dial.
 
@@ -68,7 +90,7 @@ class DialAnswer:
         As of `simnav.leaderboard.papers.claims.claim.Dial`.
     points : list of Point
         The gain at each value, on the seeds of the search.
-    tried : list of Point
+    tried : list of Judgement
         The gain at the values that were judged, in turn, each on seeds of its own; the last one counts.
     """
 
@@ -78,10 +100,10 @@ class DialAnswer:
     ours: Choice | None
     why: str
     points: list[Point]
-    tried: list[Point]
+    tried: list[Judgement]
 
     @property
-    def judged(self) -> Point | None:
+    def judged(self) -> Judgement | None:
         """The value that was judged last; None if there was none to be judged."""
         return self.tried[-1] if self.tried else None
 

@@ -21,7 +21,8 @@ from simnav.leaderboard.results.store import load
 from .answer import Answer
 from .claim import Choice, Claim, Dial, Setting
 from .dials import lags_given
-from .points import DialAnswer, Point
+from .looks import LEVEL, looks
+from .points import DialAnswer, Judgement, Point
 
 if TYPE_CHECKING:
     from simnav.leaderboard.campaign.campaign import Progress
@@ -29,15 +30,13 @@ if TYPE_CHECKING:
     from simnav.leaderboard.results.result import Result
     from simnav.scenario import Scenario
 
-__all__ = ["JUDGED_FROM", "MOST", "SEARCHED_FROM", "search"]
+__all__ = ["JUDGED_FROM", "SEARCHED_FROM", "TRIES", "search"]
 
 #: Seeds of the search and of the judgement begin here. The papers' tables are of seeds from 0 on. Seeds from 2000 to
 #: 5000 were looked at while claims and dials of the papers were chosen, so nothing is judged on them.
 SEARCHED_FROM, JUDGED_FROM = 1000, 10000
 #: Values of a dial that are judged at most, one after the other, and the distance of their seeds.
 TRIES, APART = 3, 1000
-#: Where a judgement is undecided the number of its seeds is doubled, up to so many times the first number.
-MOST = 4
 
 
 def search(
@@ -58,8 +57,9 @@ def search(
     to ours at which the claim holds in the search with its whole interval; if there is none, the nearest one at which
     the mean gain reaches the claim; and if there is none, that with the largest gain. If the claim does not hold there,
     the next value away from ours that reached it in the search is judged, on seeds that nothing was judged on before.
-    A judgement that is undecided gets twice as many seeds, as long as no condition was found. It is then looked at
-    several times, so it is wrong somewhat more often than the 5 % of a single look.
+    A judgement that is undecided gets twice as many seeds, up to the last of `simnav.leaderboard.papers.claims.looks`.
+    Our settings are judged wrongly in at most 5 %, and so is each dial: its 5 % are divided among the values that may
+    be judged.
 
     Parameters
     ----------
@@ -89,6 +89,11 @@ def search(
             f"judged_from = {judged_from}: the seeds of the search are from {SEARCHED_FROM} to "
             f"{SEARCHED_FROM + runs - 1}, and the judgement needs later ones"
         )
+    if looks(judged)[-1] > APART:
+        raise RequestError(
+            f"judged = {judged}: it is doubled up to {looks(judged)[-1]} seeds, and the next value is judged on seeds "
+            f"{APART} later; at most {APART // looks(1)[-1]} are possible"
+        )
     base = claim.base()
     # One list, so that one run of an estimator gives all of its lags.
     asked = [(dial, value) for dial in dials for value in dial.values]
@@ -105,23 +110,24 @@ def search(
         results = run(settings.values(), range(SEARCHED_FROM, SEARCHED_FROM + count), what="search")
         points = {key: _point(key[1], setting, results) for key, setting in settings.items()}
 
-    def judge(value: Choice, setting: Setting, first: int, most: int) -> Point:
-        """The gain at a value on seeds from the first on, with more seeds while it is undecided."""
-        count = judged
-        while True:
-            point = _point(value, setting, run([setting], range(first, first + count), what="judgement"))
-            if point.standing(claim.limit) != "undecided" or 2 * count > most:
-                return point
-            count *= 2
+    def judge(value: Choice, setting: Setting, begin: int, level: float, counts: Sequence[int]) -> Judgement:
+        """The gain at a value on seeds from one on, with more seeds while it is undecided."""
+        for count in counts:
+            point = _point(value, setting, run([setting], range(begin, begin + count), what="judgement"))
+            found = Judgement(value, point.seeds, point.ratios, point.failed, judged, level)
+            if found.standing(claim.limit) != "undecided":
+                break
+        return found
 
-    ours = judge("", base, judged_from, MOST * judged)
+    planned = looks(judged)
+    ours = judge("", base, judged_from, LEVEL, planned)
     known_to_hold = ours.standing(claim.limit) == "holds"
     answers = []
     for dial in dials:
-        tried: list[Point] = []
+        tried: list[Judgement] = []
         for k, value in enumerate(_to_be_judged(claim, dial, points)):
-            most = judged if known_to_hold else MOST * judged
-            tried.append(judge(value, settings[dial.name, value], judged_from + APART * k, most))
+            counts = planned[:1] if known_to_hold else planned
+            tried.append(judge(value, settings[dial.name, value], judged_from + APART * k, LEVEL / TRIES, counts))
             if known_to_hold or tried[-1].standing(claim.limit) == "holds":
                 break
         answers.append(

@@ -37,7 +37,7 @@ def claim_sheets(answers: Sequence[Answer]) -> list[Sheet]:
     """Two tables: the claims with their conditions, and the gain at each value; none without answers."""
     if not answers:
         return []
-    head = [("claim", False), ("as printed", True), ("with our settings [95 %]", True), ("verdict", False),
+    head = [("claim", False), ("as printed", True), ("with our settings [deciding interval]", True), ("verdict", False),
             ("condition", False)]  # fmt: skip
     rows = []
     for a in answers:
@@ -48,8 +48,9 @@ def claim_sheets(answers: Sequence[Answer]) -> list[Sheet]:
                      _VERDICTS[a.verdict][2])
         )  # fmt: skip
     notes = [
-        "A claim holds if the whole 95 % interval of our gain is at least as large as the printed one, within the "
-        "tolerance of all gains (the logarithm of the ratio divided by 1.5). One choice is varied at a time.",
+        "A claim holds if the whole interval of our gain is at least as large as the printed one, within the tolerance "
+        "of all gains (the logarithm of the ratio divided by 1.5). The interval allows for all looks, so it "
+        "is wider than one of 95 %. One choice is varied at a time.",
         "A condition was found on seeds of a search, and its gain is of other seeds. It is sufficient, and does not "
         "say what the authors did.",
     ]

@@ -19,7 +19,7 @@ __all__ = ["FOLDER", "answers_of", "computed_on", "read", "save"]
 
 #: Where the files are.
 FOLDER = Path(__file__).with_name("results")
-_FORMAT = 2
+_FORMAT = 3
 
 
 def save(answer: Answer, folder: Path = FOLDER) -> Path:

@@ -7,6 +7,7 @@ Intervals are of 95 % and come as `Interval`. ``docs/statistics.md`` has what wa
 - `pairs`: two rows on the same runs, `compare`.
 - `separation`: all rows of a board at once, `separate`: which can be told apart, rank intervals, and the set of rows
   that may be the best.
+- `stages`: the same in up to three looks, with more seeds for the rows that may be the best, `separate_in_stages`.
 - `gains`: a row beside the plain row, `gain`, with intervals over seeds and over scenarios.
 - `reliability`: whether the rows can be ordered at all, `unorderable`.
 """
@@ -27,15 +28,20 @@ from .intervals import (
 from .pairs import Comparison, compare
 from .reliability import reliability, unorderable
 from .separation import Separation, separate, smallest_p_value, unlucky_excess
+from .stages import FIRST, STAGES, Stage, Staged, separate_in_stages
 
 __all__ = [
     "FAILURE",
     "FEWEST",
     "FEWEST_SEEDS",
+    "FIRST",
+    "STAGES",
     "Comparison",
     "Gain",
     "Interval",
     "Separation",
+    "Stage",
+    "Staged",
     "compare",
     "gain",
     "mean",
@@ -45,6 +51,7 @@ __all__ = [
     "scenario_interval",
     "score",
     "separate",
+    "separate_in_stages",
     "share",
     "smallest_p_value",
     "unlucky_excess",

@@ -106,6 +106,7 @@ def separate(
     values: ArrayLike,
     strata: Sequence[Hashable] | None = None,
     clusters: Sequence[Hashable] | None = None,
+    level: float = ALPHA,
 ) -> Separation:
     """Test all pairs of rows at once.
 
@@ -118,6 +119,8 @@ def separate(
         The scenario of each run; each counts the same. Default: all are of one.
     clusters : sequence of u, optional
         The independent unit that each run belongs to: its seed or recording. Default: each run is one.
+    level : float
+        Probability that any two equal rows are separated, and that the best row is not in the set that may be best.
 
     Returns
     -------
@@ -137,15 +140,15 @@ def separate(
     count = int(cluster.max()) + 1 if u else 0
     first, second = np.triu_indices(n, 1)
     if count < FEWEST or not len(first):
-        return _conclude(np.ones((n, n)), np.zeros((n, n)), np.ones(n, dtype=bool), count)
+        return _conclude(np.ones((n, n)), np.zeros((n, n)), np.ones(n, dtype=bool), count, level)
     observed, drawn = _statistics(x, stratum, cluster, count, first, second)
 
     p = np.ones((n, n))
     p[first, second] = p[second, first] = _step_down(observed, drawn)
     sign = np.zeros((n, n))
     sign[first, second], sign[second, first] = np.sign(observed), -np.sign(observed)
-    best = _confidence_set(n, observed, drawn, first, second)
-    return _conclude(np.maximum(p, smallest_p_value(count)), sign, best, count)
+    best = _confidence_set(n, observed, drawn, first, second, level)
+    return _conclude(np.maximum(p, smallest_p_value(count)), sign, best, count, level)
 
 
 @lru_cache(maxsize=8)
@@ -315,6 +318,7 @@ def _confidence_set(
     drawn: NDArray[np.float32],
     first: NDArray[np.int64],
     second: NDArray[np.int64],
+    level: float,
 ) -> NDArray[np.bool_]:
     """Which rows may be the best: the worst of the most different pair goes while the rest are not equally good."""
     gone: list[int] = []  # in which order they would go, if all did
@@ -338,13 +342,13 @@ def _confidence_set(
             p[step] = _reached(most, steps[step])
     inside[:] = True
     for row, value in zip(gone, p, strict=True):
-        if value > ALPHA:
+        if value > level:
             break
         inside[row] = False
     return inside
 
 
-def _conclude(p: Array, sign: Array, best: NDArray[np.bool_], clusters: int) -> Separation:
-    better = (p <= ALPHA) & (sign < 0.0)  # lower is better
+def _conclude(p: Array, sign: Array, best: NDArray[np.bool_], clusters: int, level: float) -> Separation:
+    better = (p <= level) & (sign < 0.0)  # lower is better
     n = len(p)
     return Separation(p, better, 1 + better.sum(axis=0), n - better.sum(axis=1), best, clusters)

@@ -13,16 +13,18 @@ from typer.testing import CliRunner
 import simnav
 from simnav.leaderboard.claim_requests import ClaimRequest
 from simnav.leaderboard.cli import app
-from simnav.leaderboard.papers import PAPERS
+from simnav.leaderboard.papers import FOLDER, PAPERS, reading, reproduction
 from simnav.leaderboard.papers.claims import search as searching
 from simnav.leaderboard.papers.claims import stored
 from simnav.leaderboard.papers.claims.answer import Answer
 from simnav.leaderboard.papers.claims.claim import Claim, compared
 from simnav.leaderboard.papers.claims.declared import claim_of, claims
 from simnav.leaderboard.papers.claims.dials import choice_dial, lag_dial, lags_given, parameter_dial, scenario_dial
-from simnav.leaderboard.papers.claims.points import DialAnswer, Point
+from simnav.leaderboard.papers.claims.looks import LEVEL, deciding_interval, looks
+from simnav.leaderboard.papers.claims.points import DialAnswer, Judgement, Point
 from simnav.leaderboard.papers.claims.section import claim_count, claim_figures, claim_sheets
 from simnav.leaderboard.papers.measures import measure
+from simnav.leaderboard.papers.reproduction import Reproduction
 from simnav.leaderboard.results.result import Result
 from simnav.scenario import load
 
@@ -30,15 +32,23 @@ RUNNER = CliRunner()
 HALF = [math.exp(e) for e in (-0.02, -0.01, 0.0, 0.01, 0.02)]  # scatter of five seeds
 
 
+MINE = {"claim": "ship-fgo", "than": "ship-ekf", "gain": 9.0, "scenario": "ship-turn"}
+
+
 def point(value, ratio: float, failed: int = 0) -> Point:
     return Point(value, list(range(5)), [ratio * x for x in HALF], failed)
 
 
+def judged(value, ratio: float) -> Judgement:
+    """At the first look, of ten runs."""
+    return Judgement(value, list(range(10)), [ratio * x for x in (*HALF, *HALF)], first=10)
+
+
 def answer(ours: float, found: float, value: float = 10.0) -> Answer:
     points = [point(0.0, ours), point(5.0, 0.5 * (ours + found)), point(value, found)]
-    dial = DialAnswer("lag", "the delay of the output", "s", 0.0, "not printed", points, [point(value, found)])
+    dial = DialAnswer("lag", "the delay of the output", "s", 0.0, "not printed", points, [judged(value, found)])
     return Answer("c", "guo-2026", "a is 20 % better than b", 0.2, False, "s-v1", "a", "b", "horizontal_rmse",
-                  "horizontal_rmse", point("", ours), [dial])  # fmt: skip
+                  "horizontal_rmse", judged("", ours), [dial])  # fmt: skip
 
 
 def test_a_claim_holds_where_the_whole_interval_reaches_it():
@@ -56,7 +66,7 @@ def test_a_claim_holds_where_the_whole_interval_reaches_it():
     ("ours", "found", "verdict", "words"),
     [
         (0.8, 1.0, "holds", "holds with our settings"),
-        (1.0, 0.8, "holds if", "holds if the delay of the output is 10 s or more (20.0 % [18.4, 21.6], 5 runs)"),
+        (1.0, 0.8, "holds if", "holds if the delay of the output is 10 s or more (20.0 % [18.5, 21.5], 10 runs)"),
         (1.0, 0.95, "does not hold", "does not hold; tried: the delay of the output"),
         (1.0, 0.862, "undecided", "undecided: an interval lies across the limit, and more seeds may decide it"),
     ],
@@ -71,7 +81,8 @@ def test_the_range_of_a_condition_is_in_words():
 
     def words(ratios, judged, ours=None) -> str:
         points = [point(v, r) for v, r in zip(values, ratios, strict=True)]
-        return DialAnswer("x", "the factor", "", ours, "", points, [points[judged]]).condition(0.86)
+        tried = Judgement(values[judged], list(range(10)), [ratios[judged]] * 10, first=10)
+        return DialAnswer("x", "the factor", "", ours, "", points, [tried]).condition(0.86)
 
     assert words((1.0, 1.0, 0.8, 0.7), 2) == "the factor is 3 or more"
     assert words((0.7, 0.8, 1.0, 1.0), 1, 5.0) == "the factor is 2 or less"
@@ -132,7 +143,7 @@ def made_results(monkeypatch):
                 for seed in seeds:
                     ran.setdefault(r.label, set()).add(seed)
                     window = float(r.parameters.get("window", 1.0))
-                    value = math.exp(0.01 * np.random.default_rng(seed).standard_normal())
+                    value = math.exp(0.01 * np.random.default_rng([seed, len(r.label)]).standard_normal())
                     if r.name == "ship-fgo":
                         value *= 1.0 - 0.05 * window
                     kept[scenario.id, r.label, seed] = Result(
@@ -153,14 +164,14 @@ def test_the_search_finds_the_nearest_value_and_judges_it_on_other_seeds(made_re
     dial = parameter_dial("window", "the window", "row", "window", (1, 2, 4, 6, 8), ours=1.0)
     base = compared(lambda: load("ship-turn"), "ship-fgo", "ship-ekf", "horizontal_rmse")
     claim = Claim("c", "", "a is 25 % better than b", 0.25, base, (dial,))
-    found = searching.search(claim, claim.dials, tmp_path, runs=3, judged=4)
+    found = searching.search(claim, claim.dials, tmp_path, runs=3, judged=12)
     assert found.verdict == "holds if"  # 1 - 0.05 * 4 = 0.8 is below the limit of 0.825; 0.9 is not
     (along,) = found.dials
     assert along.judged is not None
     assert along.judged.value == 4.0
     assert along.condition(claim.limit) == "the window is 4 or more"
     assert set(along.points[0].seeds).isdisjoint(along.judged.seeds)
-    assert set(found.ours.seeds) == set(along.judged.seeds) == set(range(10000, 10004))
+    assert set(found.ours.seeds) == set(along.judged.seeds) == set(range(10000, 10012))
     assert made_results["ship-fgo(window=2)"] == set(range(1000, 1003))  # it was not judged
 
 
@@ -174,11 +185,11 @@ def test_where_a_judgement_fails_the_next_value_is_judged_on_other_seeds(made_re
     def lucky(value, setting, results):
         found = inner(value, setting, results)
         if value == 4.0 and min(found.seeds) >= searching.JUDGED_FROM:
-            return Point(value, found.seeds, [1.0, 1.01] * (len(found.seeds) // 2))
+            return Point(value, found.seeds, [1.0, 1.01] * (len(found.seeds) // 2), found.failed)
         return found
 
     monkeypatch.setattr(searching, "_point", lucky)
-    found = searching.search(claim, claim.dials, tmp_path, runs=3, judged=4)
+    found = searching.search(claim, claim.dials, tmp_path, runs=3, judged=12)
     (along,) = found.dials
     assert [(p.value, p.standing(claim.limit)) for p in along.tried] == [(4.0, "does not hold"), (6.0, "holds")]
     assert set(along.tried[0].seeds).isdisjoint(along.tried[1].seeds)
@@ -186,14 +197,34 @@ def test_where_a_judgement_fails_the_next_value_is_judged_on_other_seeds(made_re
 
 
 def test_an_undecided_judgement_gets_more_seeds(made_results, tmp_path):
-    dial = parameter_dial("window", "the window", "row", "window", (1, 4), ours=1.0)  # a ratio of 0.8, about the limit
+    dial = parameter_dial("window", "the window", "row", "window", (1, 4), ours=1.0)
     base = compared(lambda: load("ship-turn"), "ship-fgo", "ship-ekf", "horizontal_rmse")
-    claim = Claim("c", "", "a is 28 % better than b", 1.0 - 0.8**1.5, base, (dial,))
-    found = searching.search(claim, claim.dials, tmp_path, runs=3, judged=4)
+    limit = 0.808  # the ratio is 0.8: two thirds of a standard deviation of a run below it
+    claim = Claim("c", "", "a is 28 % better than b", 1.0 - limit**1.5, base, (dial,))
+    found = searching.search(claim, claim.dials, tmp_path, runs=3, judged=6)
     (tried,) = found.dials[0].tried
-    assert len(found.ours.seeds) == 4
-    assert len(tried.seeds) in (4, 8, 16)
-    assert tried.standing(claim.limit) != "undecided" or len(tried.seeds) == 16
+    assert len(found.ours.seeds) == 6
+    assert len(tried.seeds) in looks(6)[1:]
+    assert tried.standing(claim.limit) == "holds"
+    assert [tried.level, found.ours.level] == [LEVEL / searching.TRIES, LEVEL]
+
+
+def test_a_look_that_was_not_planned_decides_nothing(tmp_path):
+    ratios = [0.5 + 0.001 * k for k in range(13)]
+    assert deciding_interval(ratios[:12], 12).high < 0.6
+    assert math.isnan(deciding_interval(ratios, 12).high)
+    base = compared(lambda: load("ship-turn"), "ship-fgo", "ship-ekf", "horizontal_rmse")
+    with pytest.raises(simnav.RequestError, match=r"judged = 70: it is doubled up to 1120 seeds.* at most 62"):
+        searching.search(Claim("c", "", "", 0.1, base, ()), (), tmp_path, runs=3, judged=70)
+
+
+def test_a_look_allows_for_the_others_and_for_a_run_that_is_worse_than_all():
+    ratios = np.exp(np.linspace(-0.2, 0.2, 12)).tolist()
+    found, one_try = deciding_interval(ratios, 12), deciding_interval(ratios, 12, LEVEL / 3)
+    student = Point("", list(range(12)), ratios).ratio
+    assert one_try.low < found.low < student.low < student.high < found.high < one_try.high
+    worse = deciding_interval([*ratios[:-1], 2.0], 12)
+    assert worse.high - worse.value > 2.0 * (found.high - found.value)
 
 
 def test_a_score_that_a_method_lacks_is_said_after_the_first_seed(made_results, tmp_path):
@@ -266,9 +297,9 @@ def test_the_command_shows_and_lists(tmp_path):
     shown = RUNNER.invoke(app, ["paper", "claim", "guo-sw-fgo", "--plot", str(tmp_path / "c.png")])
     assert "verdict:" in shown.stdout
     assert (tmp_path / "c.png").exists()
-
-
-MINE = {"claim": "ship-fgo", "than": "ship-ekf", "gain": 9.0, "scenario": "ship-turn"}
+    refused = RUNNER.invoke(app, ["paper", "claim", "mao-2025", "--judged-from", "9000"])
+    assert refused.exit_code == 2
+    assert "'judged_from' cannot act here: the claims are listed" in refused.output
 
 
 @pytest.mark.parametrize(
@@ -281,6 +312,10 @@ MINE = {"claim": "ship-fgo", "than": "ship-ekf", "gain": 9.0, "scenario": "ship-
         ),
         ({"claim": "guo-sw-fgo", "holds_if": ["lag=a"]}, "the values should be numbers"),
         ({"claim": "guo-sw-fgo", "gain": 3.0}, "is a paper's claim"),
+        ({"claim": "guo-sw-fgo", "judged_from": 9000}, "'judged_from' cannot act here: .* --holds-if all"),
+        ({"claim": "guo-sw-fgo", "runs": 9, "workers": 1}, "'runs', 'workers' cannot act here"),
+        ({"claim": "guo-sw-fgo", "holds_if": "lag", "score": "north_rmse"}, "'score' cannot act here"),
+        ({**MINE, "runs": 9}, "'runs' cannot act here: a claim without a condition"),
         ({"claim": "auv-graph", "holds_if": ["fusion=waits"]}, "there is no choice 'waits'"),
         ({"claim": "ekf", "than": "sw-fgo", "gain": 10.0}, "'scenario' is missing"),
         ({"claim": "guo-sw-fgo", "holds_if": ["lag=nan"]}, "numbers"),
@@ -313,3 +348,32 @@ def test_mistakes_are_one_sentence_before_anything_runs(how, message, monkeypatc
     with pytest.raises(simnav.RequestError, match=message) as error:
         simnav.claim(**how)
     assert "\n" not in str(error.value)
+
+
+def test_the_claims_of_a_paper_of_ones_own_are_searched(monkeypatch, tmp_path):
+    """Its tables are run first, because none come with simnav."""
+    own = tmp_path / "mao-2025.toml"
+    text = (FOLDER / "mao-2025.toml").read_text()
+    own.write_text(text)
+    searched: list[str] = []
+    ran: list[int] = []
+
+    def search(claim, *_, **__):
+        searched.append(claim.name)
+        return answer(1.0, 0.8)
+
+    def run(paper, runs, *_, **__):
+        ran.append(runs)
+        return Reproduction(paper, range(runs), [], {}, [])
+
+    monkeypatch.setattr(searching, "search", search)
+    monkeypatch.setattr(reproduction, "reproduce", run)
+    found = simnav.reproduce(str(own), holds_if=True, output=tmp_path / "out")
+    assert found.answers is not None
+    assert len(found.answers) == len(searched) == text.count("[[claim]]") > 2
+    assert ran == [found.paper.runs]
+    own.write_text(text[: text.index("[[claim]]")])
+    reading._file.cache_clear()
+    reading._paper.cache_clear()
+    with pytest.raises(simnav.RequestError, match=r"mao-2025\.toml has no claim"):
+        simnav.reproduce(str(own), holds_if=True, output=tmp_path / "out")
