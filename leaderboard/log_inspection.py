@@ -128,8 +128,8 @@ def innovation_table(report: RunReport) -> tables.Fitted | None:
     cells = [[label, *(of.get(n, "") for n in names)] for label, of in found.items() if of]
     return tables.Fitted(
         "Innovations: normalised squares over what the row expects", columns, cells, columns, numeric=names,
-        caption="Medians, without any reference; 1 is consistent. Above it the noise figures of the draft are too small, "
-        "below it too large: 'simnav log identify' fits them.",
+        caption="Medians, without any reference; 1 is consistent. Above it the noise figures of the draft are too "
+        "small, below it too large: 'simnav log identify' fits them.",
     )  # fmt: skip
 
 

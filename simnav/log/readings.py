@@ -18,7 +18,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from simnav.geometry.rotation import dcm_from_rpy, wrap_angle
+from simnav.geometry.rotation import (
+    dcm_from_quaternion,
+    dcm_from_rpy,
+    quaternion_from_dcm,
+    rpy_from_dcm,
+    wrap_angle,
+)
 from simnav.kinds import BODY_VELOCITY, HEADING, VELOCITY
 from simnav.log.channel import Series, read_channel, skip_of
 from simnav.log.comparisons import Inertial, Streams, comparisons
@@ -49,6 +55,9 @@ _ROUNDS = 4
 _FLIPS = (1.0, -1.0)
 #: The mean specific force of a vessel points up by at least this [m/s^2].
 _UPRIGHT = 4.0
+#: From axes forward, left, up to forward, starboard, down; from east, north, up to north, east, down, and back.
+_LEFT = np.array([1.0, -1.0, -1.0])
+_EAST = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
 #: The 48 matrices that permute axes and change signs.
 _AXES = tuple(
     np.eye(3)[list(order)] * np.array(signs)[:, None]
@@ -255,7 +264,8 @@ def _readings(log: RecordedSpec, s: Streams) -> Iterator[_Reading]:
     if s.velocity is not None and log.reference.velocity is not None and log.reference.velocity.columns:
         yield from _of_vector("reference.velocity", "log.reference.velocity", log.reference.velocity, s.velocity, False)
     if s.attitude is not None and log.reference.attitude is not None and log.reference.attitude.columns:
-        yield from _of_attitude(log.reference.attitude, s.attitude)
+        of = _of_quaternion if len(log.reference.attitude.columns) == 4 else _of_attitude
+        yield from of(log.reference.attitude, s.attitude)
     yield from _reference_late(log, s)
 
 
@@ -554,6 +564,33 @@ def _of_attitude(channel: ChannelSpec, series: Series) -> Iterator[_Reading]:
         yield _Reading("reference.attitude", ("reference.attitude",),
                        _with_series("reference.attitude", value=value), number, what,
                        tuple(changes))  # fmt: skip
+
+
+def _of_quaternion(channel: ChannelSpec, series: Series) -> Iterator[_Reading]:
+    """Order of a quaternion (scalar first or last), its inverse (Hamilton, JPL), axes of the body and of the world."""
+    table, present = "log.reference.attitude", list(channel.columns)
+    dcm = dcm_from_rpy(series.value)
+    quaternion = quaternion_from_dcm(_EAST @ dcm * _LEFT if channel.frame == "enu" else dcm)
+    orders = ((0, 1, 2, 3), (3, 0, 1, 2), (1, 2, 3, 0))
+    flipped = (1, -1.0), (0, 1.0), (3, 1.0), (2, -1.0)  # turned by 180 deg about the forward axis of the body
+    for order, inverse, turned, east in itertools.product(orders, (False, True), (False, True), (False, True)):
+        other_frame = east != (channel.frame == "enu")
+        number = float((order != orders[0]) + inverse + 1.5 * turned + other_frame)
+        if not number:
+            continue
+        chosen = [(i, -1.0 if inverse and k else 1.0) for k, i in enumerate(order)]
+        if turned:
+            chosen = [(chosen[i][0], sign * chosen[i][1]) for i, sign in flipped]
+        columns = [present[i] if sign > 0.0 else _flip(present[i]) for i, sign in chosen]
+        new = dcm_from_quaternion(np.stack([sign * quaternion[:, i] for i, sign in chosen], axis=-1))
+        value = rpy_from_dcm(_EAST @ new * _LEFT if east else new)
+        changes: list[tuple[str, str, Any]] = [(table, "columns", columns)] if columns != present else []
+        changes += [(table, "frame", "enu" if east else "geodetic")] if other_frame else []
+        axes = "forward, left, up in east, north, up" if east else "forward, starboard, down in north, east, down"
+        what = f"the quaternion of the reference (scalar, x, y, z) is {_shown(columns)}"
+        what += f", of axes {axes}" if other_frame else ""
+        yield _Reading("reference.attitude", ("reference.attitude",),
+                       _with_series("reference.attitude", value=value), number, what, tuple(changes))  # fmt: skip
 
 
 def _written(log: RecordedSpec, changes: tuple[tuple[str, str, Any], ...]) -> RecordedSpec:
