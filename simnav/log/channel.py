@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import os
 import re
@@ -54,6 +55,8 @@ _REFERENCE = {
     ),
 }
 _GTSAM = "gtsam:"
+#: A longitude is no larger [rad].
+_TURN = 2.0 * math.pi
 #: No angle in degrees is as large as this, taken as one in radians.
 _DEGREES = 1e3
 #: A quaternion has the length 1, within this.
@@ -449,6 +452,12 @@ def _check_range(
         bad = np.flatnonzero(np.abs(value[:, i]) > limit + 1e-9)
         if bad.size:
             huge = abs(value[bad[0], i]) > _DEGREES
+            if kind.geodetic and i == 0 and np.abs(value[:, 1]).max() <= limit and np.abs(value[:, 0]).max() < _TURN:
+                raise LogError(
+                    f"{table.source}, line {table.line[rows[bad[0]]]}, column {columns[i]!r}: the latitude would be "
+                    f"{math.degrees(value[bad[0], i]):.6g} deg, and the longitude could be one: they are exchanged; "
+                    f"write columns = {json.dumps([columns[1], columns[0], *columns[2:]])}"
+                )
             raise LogError(
                 f"{table.source}, line {table.line[rows[bad[0]]]}, column {columns[i]!r}: {component.name} would be "
                 f"{value[bad[0], i]:.6g} rad; is its unit 'deg'" + (", or '1e-7 deg'?" if huge else "?")

@@ -568,6 +568,9 @@ def rewritten(text: str, readings: Sequence[ProbableReading]) -> str:
     """
     lines = text.splitlines()
     for reading in readings:
+        if not reading.changes:
+            first = lines.index(f"[log.instruments.{reading.stream}]") + 1
+            lines.insert(first, f"# check: {reading.what}, so with probability {reading.shown}: take it out")
         for table, key, value in reading.changes:
             first = lines.index(f"[{table}]") + 1
             ends = (k for k in range(first, len(lines)) if not lines[k] or lines[k].startswith("["))
