@@ -602,6 +602,8 @@ def _of_quaternion(channel: ChannelSpec, series: Series) -> Iterator[_Reading]:
         chosen = [(i, -1.0 if inverse and k else 1.0) for k, i in enumerate(order)]
         if turned:
             chosen = [(chosen[i][0], sign * chosen[i][1]) for i, sign in flipped]
+        scalar = chosen[0][1]  # minus a quaternion is the same turn
+        chosen = [(i, sign * scalar) for i, sign in chosen]
         columns = [present[i] if sign > 0.0 else _flip(present[i]) for i, sign in chosen]
         new = dcm_from_quaternion(np.stack([sign * quaternion[:, i] for i, sign in chosen], axis=-1))
         value = rpy_from_dcm(_EAST @ new * _LEFT if east else new)
