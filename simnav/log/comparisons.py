@@ -2,7 +2,7 @@
 
 Each comparison takes all `Streams` as they are read, and gives the differences as a `Residual`, or None where a stream
 is absent or the motion says nothing. It has parameters for what is no mistake of reading: biases, small mounting
-angles, lever arms, scale. turns against the gyroscopes; they turn with the course).
+angles, lever arms, scale.
 """
 
 from __future__ import annotations
