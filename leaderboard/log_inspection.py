@@ -15,7 +15,7 @@ from simnav.kinds import KINDS
 from simnav.leaderboard.campaign.request import requests
 from simnav.log.channel import list_recordings
 from simnav.log.check import check_log
-from simnav.log.draft import draft, rewritten
+from simnav.log.draft import draft, guesses, rewritten
 from simnav.log.inspection import Stream
 from simnav.log.readings import probable_readings
 from simnav.log.table import LogError
@@ -35,6 +35,8 @@ __all__ = ["Inspection", "drafted", "first_run", "innovation_table"]
 _ROWS, _MOST = ("ekf", "ship-ekf", "gnss-only", "dead-reckoning", "inertial"), 3
 #: Fewer readings say nothing of innovations.
 _LEAST = 5
+#: Formats whose columns are told by their names, and so many that are shown.
+_TABLES, _SHOWN = ("csv", "parquet", "mat", "hdf5"), 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,6 +65,20 @@ class Inspection:
     readings: tuple[ProbableReading, ...] = ()
     missing: str = ""
     run: RunReport | None = None
+
+    @property
+    def unknown(self) -> tuple[str, ...]:
+        """A sentence for each table whose columns are not known by their names and sizes, so that no draft has them."""
+        told = []
+        for stream in self.streams:
+            if stream.form in _TABLES and not any(guesses(stream)):
+                names = ", ".join(stream.table.names[:_SHOWN])
+                more = ", ..." if len(stream.table.names) > _SHOWN else ""
+                told.append(
+                    f"{stream.name}: what its columns are ({names}{more}) is not known by their names and sizes; if "
+                    "they are of an instrument, add it to the scenario"
+                )
+        return tuple(told)
 
 
 @dataclass(frozen=True, eq=False)

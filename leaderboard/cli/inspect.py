@@ -42,6 +42,9 @@ def show(out: Output, request: InspectCommand) -> None:
     out.print(tables.table("what the files hold", ["stream", "format", "times", "columns, guessed"], rows))
     for sentence in looked.failed:
         out.remark(sentence)
+    if looked.draft:
+        for sentence in looked.unknown:
+            out.remark(sentence)
     for reading in looked.readings:
         out.remark(f"read so, against its names and sizes: {reading.what} (probability {reading.shown})")
     if run is not None:

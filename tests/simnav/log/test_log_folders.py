@@ -100,6 +100,18 @@ def test_what_a_person_must_add_is_one_sentence(tmp_path):
     assert "\n" not in found.missing
 
 
+def test_a_table_that_is_not_known_is_told(tmp_path):
+    """Increments in g are none of KF-GINS, and no name says what they are."""
+    FOLDERS["kf-gins"](tmp_path)
+    path = tmp_path / "imu.txt"
+    table = np.array([[float(c) for c in row.split()] for row in path.read_text().splitlines()])
+    table[:, 4:] /= 9.80665
+    path.write_text("".join(" ".join(map(repr, map(float, row))) + "\n" for row in table))
+    found = inspect_log([tmp_path], output=tmp_path / "mine.toml")
+    (told,) = found.unknown
+    assert told.startswith("imu.txt: what its columns are (1, 2, 3, 4, 5, 6, 7) is not known")
+
+
 def test_an_imu_that_is_not_level_is_turned(tmp_path):
     """A phone in its holder: roll and pitch of the mounting are those of its mean specific force."""
     FOLDERS["phone"](tmp_path)
