@@ -452,7 +452,7 @@ def _check_range(
         bad = np.flatnonzero(np.abs(value[:, i]) > limit + 1e-9)
         if bad.size:
             huge = abs(value[bad[0], i]) > _DEGREES
-            if kind.geodetic and i == 0 and np.abs(value[:, 1]).max() <= limit and np.abs(value[:, 0]).max() < _TURN:
+            if kind.geodetic and i == 0 and _exchanged(value, limit):
                 raise LogError(
                     f"{table.source}, line {table.line[rows[bad[0]]]}, column {columns[i]!r}: the latitude would be "
                     f"{math.degrees(value[bad[0], i]):.6g} deg, and the longitude could be one: they are exchanged; "
@@ -462,6 +462,12 @@ def _check_range(
                 f"{table.source}, line {table.line[rows[bad[0]]]}, column {columns[i]!r}: {component.name} would be "
                 f"{value[bad[0], i]:.6g} rad; is its unit 'deg'" + (", or '1e-7 deg'?" if huge else "?")
             )
+
+
+def _exchanged(value: Array, limit: float) -> bool:
+    """Whether most latitudes [rad] are none and could be longitudes, and all longitudes could be latitudes."""
+    first, second = np.abs(value[:, 0]), np.abs(value[:, 1])
+    return bool(np.median(first) > limit and first.max() <= _TURN and second.max() <= limit)
 
 
 def geodetic_from_local(value: Array, origin: OriginSpec, frame: str) -> Array:
