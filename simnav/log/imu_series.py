@@ -83,7 +83,7 @@ def _right(size: float, spacing: float, imu: LogImuSpec) -> str:
     """What to write where a mean specific force is no gravity: the one unit, or increments, with which it is one."""
     raw = size / factor(imu.specific_force_unit) * (spacing if imu.samples == "increments" else 1.0)
     plain = "instantaneous" if imu.samples == "increments" else imu.samples
-    tried = {("increments", "m_s"): raw / spacing, **{(plain, u): raw * factor(u) for u in ("m_s2", "g", "mg")}}
+    tried = {(plain, unit): raw * factor(unit) for unit in ("m_s2", "g", "mg")} | {("increments", "m_s"): raw / spacing}
     fits = [key for key, value in tried.items() if _PULL[0] < value < _PULL[1]]
     if len(fits) != 1:
         return f"check specific_force_unit = {imu.specific_force_unit!r} and samples = {imu.samples!r}"
