@@ -9,7 +9,7 @@ from pathlib import Path
 from simnav.leaderboard.campaign.options import PathLike
 
 from .calls import option, request
-from .requests import ScenarioLike, Scenarios
+from .requests import PROGRESS, Bar, ScenarioLike, Scenarios
 
 __all__ = [
     "AlignRequest", "ExportRequest", "IdentifyRequest", "InspectRequest", "RecordingsRequest", "ScoreRequest",
@@ -120,6 +120,10 @@ class InspectRequest:
     output: PathLike | None = option(
         "--output", "-o", default=None, help="Write a scenario to begin with to this TOML file."
     )
+    run: bool = option(
+        "--run", default=False, help="Run a few rows over the scenario, without an edit, or say what it lacks."
+    )
+    progress: Bar = option(default=None, help=PROGRESS, hidden=True)
 
 
 @request

@@ -24,12 +24,12 @@ from .log_requests import (
 
 if TYPE_CHECKING:
     from simnav.log.alignment import Alignment
-    from simnav.log.inspection import Stream
     from simnav.log.noise_figures import Figure
     from simnav.scenario import Scenario
 
     from .identification.report import Identification
     from .identification.twin import Twin
+    from .log_inspection import Inspection
     from .recordings import PublicRecordings
     from .single_run import ScoreReport
 
@@ -109,22 +109,24 @@ def export(request: ExportRequest) -> list[Path]:
 
 
 @call(InspectRequest)
-def inspect_log(request: InspectRequest) -> tuple[list[Stream], list[str]]:
+def inspect_log(request: InspectRequest) -> Inspection:
     """What the files of a log hold.
 
     Returns
     -------
-    list of simnav.log.inspection.Stream, list of str
-        The streams, and a sentence for each file that cannot be read.
+    Inspection
+        The streams, and a sentence for each file that cannot be read; with ``output`` or ``run`` also a scenario to
+        begin with, what a person must add to it, and the first run.
 
     Raises
     ------
     RequestError
         If a file does not exist, or the scenario cannot be written.
     """
-    from simnav.log.draft import draft
     from simnav.log.inspection import inspect_log
+    from simnav.log.table import LogError
 
+    from .log_inspection import Inspection, drafted, first_run
     from .results.files import write_whole
 
     given = [request.files] if isinstance(request.files, (str, os.PathLike)) else list(request.files)
@@ -133,26 +135,22 @@ def inspect_log(request: InspectRequest) -> tuple[list[Stream], list[str]]:
         raise RequestError(f"output = {request.output}: the file should end in .toml")
     with mistakes(ValueError, OSError):
         streams, failed = inspect_log([absolute(path) for path in given])
-        if target is not None and streams:
-            words = "".join(c if c.isascii() and c.isalnum() else " " for c in target.stem.lower()).split()
-            text = draft(streams, "-".join(words) or "my-log", target.name)
-            write_whole(target, _as_read_probably(text, target))
-    return streams, failed
-
-
-def _as_read_probably(text: str, target: Path) -> str:
-    """The draft of a scenario with the readings of its streams that are far more likely, and their probability."""
-    from simnav.log.channel import list_recordings
-    from simnav.log.draft import rewritten
-    from simnav.log.readings import probable_readings
-    from simnav.scenario import parse
-
-    try:
-        scenario = parse(text, source=target.name)
-        assert scenario.log is not None
-        return rewritten(text, probable_readings(scenario, list_recordings(scenario.log)[0]))
-    except (ValueError, OSError):  # nothing to compare yet: 'simnav check' says what the draft lacks
-        return text
+        found = Inspection(tuple(streams), tuple(failed))
+        if not streams or (target is None and not request.run):
+            return found
+        named = target.stem if target is not None else absolute(given[0]).stem
+        words = "".join(c if c.isascii() and c.isalnum() else " " for c in named.lower()).split()
+        name = "-".join(words) or "my-log"
+        made = drafted(streams, name, f"{name}.toml" if target is None else target.name)
+        if target is not None:
+            write_whole(target, made.text)
+        found = replace(found, draft=made.text, readings=made.readings, missing=made.missing)
+        if not request.run or made.scenario is None:
+            return found
+        try:
+            return replace(found, run=first_run(made.scenario, request.progress))
+        except LogError as error:
+            return replace(found, missing=str(error))
 
 
 @call(AlignRequest)

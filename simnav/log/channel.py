@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import os
 import re
@@ -14,7 +15,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from simnav.geometry.rotation import dcm_from_rpy, wrap_angle
+from simnav.geometry.rotation import dcm_from_quaternion, dcm_from_rpy, rpy_from_dcm, wrap_angle
 from simnav.kinds import BODY_VELOCITY, Component, Kind, geodetic_components, speed_components
 from simnav.log.files import Column, FileSpec
 from simnav.log.reader import READERS
@@ -54,8 +55,12 @@ _REFERENCE = {
     ),
 }
 _GTSAM = "gtsam:"
+#: A longitude is no larger [rad].
+_TURN = 2.0 * math.pi
 #: No angle in degrees is as large as this, taken as one in radians.
 _DEGREES = 1e3
+#: A quaternion has the length 1, within this.
+_UNIT_LENGTH = 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -257,9 +262,12 @@ def read_channel(spec: RecordedSpec, channel: ChannelSpec, what: str, recording:
     table, time, rows = open_file(spec, channel.file, recording, channel.sentence, channel.talker, channel.where)
     time = time + channel.offset
     columns = _columns(channel, kind, table)
-    if len(columns) != len(names):
+    quaternion = what == "attitude" and len(columns) == 4
+    if len(columns) != len(names) and not quaternion:
+        other = ", or the 4 of a quaternion (w, x, y, z)" if what == "attitude" else ""
         raise LogError(
-            f"{table.source}: {what} needs {len(names)} columns ({', '.join(names)}), but {len(columns)} are given"
+            f"{table.source}: {what} needs {len(names)} columns ({', '.join(names)}){other}, but {len(columns)} are "
+            "given"
         )
     if channel.drop_repeated:  # before rows are chosen: else the reference has the fix of the estimator once more
         rows = _fresh(table, columns, rows)
@@ -269,8 +277,11 @@ def read_channel(spec: RecordedSpec, channel: ChannelSpec, what: str, recording:
     units = (
         (channel.units,) * len(columns) if isinstance(channel.units, str) else channel.units or ("1",) * len(columns)
     )
-    _check_units(table.source, what, kind, columns, units, local=channel.frame != "geodetic")
-    value = np.empty((len(rows), len(names)))
+    if not quaternion:
+        _check_units(table.source, what, kind, columns, units, local=channel.frame != "geodetic")
+    elif set(units) != {"1"}:
+        raise LogError(f"{table.source}: units = {channel.units!r} of {what}: a quaternion has none; leave it out")
+    value = np.empty((len(rows), len(columns)))
     given = np.ones(len(rows), dtype=bool)
     for i, (column, unit) in enumerate(zip(columns, units, strict=True)):
         sign, values = table.column(column)
@@ -289,6 +300,8 @@ def read_channel(spec: RecordedSpec, channel: ChannelSpec, what: str, recording:
         rows, value = rows[given], value[given]
     if len(rows) == 0:
         raise LogError(f"{table.source}: there is no {what} in it")
+    if quaternion:
+        value = _angles(value, columns, table, rows)
     if channel.frame != "geodetic" and kind.geodetic:
         if spec.origin is None:
             raise LogError(f"{table.source}: frame = {channel.frame!r} of {what} needs [log.origin]")
@@ -307,6 +320,19 @@ def read_channel(spec: RecordedSpec, channel: ChannelSpec, what: str, recording:
             value[:, i] = wrap_angle(value[:, i])
     sigma = _sigma(channel, kind, table, rows, what) if channel.sigma else None
     return Series(table.source, time[rows], value, table.line[rows], sigma)
+
+
+def _angles(quaternion: Array, columns: Sequence[Column], table: Table, rows: NDArray[np.int64]) -> Array:
+    """(n, 3) roll, pitch, yaw [rad] of (n, 4) quaternions, scalar first, that turn body axes to those of the frame."""
+    length = np.linalg.norm(quaternion, axis=1)
+    bad = np.flatnonzero(~(np.abs(length - 1.0) < _UNIT_LENGTH))
+    if bad.size:
+        raise LogError(
+            f"{table.source}, line {table.line[rows[bad[0]]]}: the quaternion in the columns "
+            f"{', '.join(map(str, columns))} has the length {length[bad[0]]:.4g}, not 1; are these its columns "
+            "(scalar, x, y, z)?"
+        )
+    return rpy_from_dcm(dcm_from_quaternion(quaternion / length[:, None]))
 
 
 def _fresh(table: Table, columns: Sequence[Column], rows: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -426,10 +452,22 @@ def _check_range(
         bad = np.flatnonzero(np.abs(value[:, i]) > limit + 1e-9)
         if bad.size:
             huge = abs(value[bad[0], i]) > _DEGREES
+            if kind.geodetic and i == 0 and _exchanged(value, limit):
+                raise LogError(
+                    f"{table.source}, line {table.line[rows[bad[0]]]}, column {columns[i]!r}: the latitude would be "
+                    f"{math.degrees(value[bad[0], i]):.6g} deg, and the longitude could be one: they are exchanged; "
+                    f"write columns = {json.dumps([columns[1], columns[0], *columns[2:]])}"
+                )
             raise LogError(
                 f"{table.source}, line {table.line[rows[bad[0]]]}, column {columns[i]!r}: {component.name} would be "
                 f"{value[bad[0], i]:.6g} rad; is its unit 'deg'" + (", or '1e-7 deg'?" if huge else "?")
             )
+
+
+def _exchanged(value: Array, limit: float) -> bool:
+    """Whether most latitudes [rad] are none and could be longitudes, and all longitudes could be latitudes."""
+    first, second = np.abs(value[:, 0]), np.abs(value[:, 1])
+    return bool(np.median(first) > limit and first.max() <= _TURN and second.max() <= limit)
 
 
 def geodetic_from_local(value: Array, origin: OriginSpec, frame: str) -> Array:

@@ -2,7 +2,7 @@
 
 Each comparison takes all `Streams` as they are read, and gives the differences as a `Residual`, or None where a stream
 is absent or the motion says nothing. It has parameters for what is no mistake of reading: biases, small mounting
-angles, lever arms, scale. turns against the gyroscopes; they turn with the course).
+angles, lever arms, scale.
 """
 
 from __future__ import annotations
@@ -14,13 +14,13 @@ from typing import Any
 
 import numpy as np
 
-from simnav.geometry.earth import earth_rate, gravity, relative_position
+from simnav.geometry.earth import displace, earth_rate, gravity, relative_position
 from simnav.geometry.rotation import dcm_from_rotation_vector, dcm_from_rpy, rotation_vector_from_dcm, wrap_angle
 from simnav.kinds import BODY_VELOCITY, DEPTH, HEADING, HORIZONTAL_POSITION, POSITION, VELOCITY, WATER_SPEED
 from simnav.log.channel import Series
 from simnav.log.imu_series import ImuSeries
 from simnav.log.likelihood import Residual
-from simnav.log.reference import Reference
+from simnav.log.reference import Track
 from simnav.types import KINDS, Array
 
 __all__ = ["COURSE_FROM", "GAP", "MOST", "Inertial", "Streams", "comparisons"]
@@ -40,6 +40,14 @@ _MOUNTING, _GYROSCOPE, _ACCELEROMETER = np.radians(4.0), 0.003, 0.3
 _ARM, _ANTENNA, _SCALE, _DVL_BIAS = 2.0, 5.0, 0.03, 0.05
 #: Usual sizes of differences: turn in a second [rad], force [m/s^2], velocity [m/s], heading, position [m].
 _TURN, _FORCE, _SPEED, _HEADING, _PLACE = np.radians(0.3), 0.3, 0.15, np.radians(4.0), 2.0
+
+
+#: What follows from each part of the reference.
+_FROM = {
+    "position": ("position", "moved", "velocity"),
+    "velocity": ("velocity", "given velocity"),
+    "attitude": ("attitude", "dcm", "rate"),
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,36 +139,55 @@ class Streams:
     late: float = 0.0
 
     def altered(self, **changes: Any) -> Streams:
-        """The same streams, with some read otherwise."""
-        return self._with_reference(
-            replace(self, **changes), same=not set(changes) & {"position", "velocity", "attitude"}
-        )
+        """The same streams, with some read otherwise; what does not change is not interpolated again."""
+        other = replace(self, **changes)
+        changed = set(changes) & set(_FROM)
+        if not changed:
+            other.__dict__.update(tracks=self.tracks, known=self.known)
+            return other
+        gone = {what for part in changed for what in _FROM[part]}
+        other.__dict__["tracks"] = {part: track for part, track in self.tracks.items() if part not in changed}
+        other.__dict__["known"] = {key: found for key, found in self.known.items() if key[0] not in gone}
+        return other
 
     def with_instrument(self, name: str, **changes: Any) -> Streams:
         """The same streams, with another series of one instrument."""
         kind, series, arm = self.instruments[name]
-        found = replace(self, instruments={**self.instruments, name: (kind, replace(series, **changes), arm)})
-        return self._with_reference(found, same=True)
+        return self.altered(instruments={**self.instruments, name: (kind, replace(series, **changes), arm)})
 
     def with_reference(self, part: str, **changes: Any) -> Streams:
         """The same streams, with another series of one part of the reference."""
         return self.altered(**{part: replace(getattr(self, part), **changes)})
-
-    def _with_reference(self, other: Streams, *, same: bool) -> Streams:
-        """Splines are made once."""
-        if same:
-            other.__dict__.update(reference=self.reference, known=self.known)
-        return other
 
     @cached_property
     def known(self) -> dict[tuple[Any, ...], Array]:
         """What the reference says at times at which it was asked already."""
         return {}
 
-    def _once(self, what: str, time: Array, found: Callable[[], Array]) -> Array:
+    @cached_property
+    def tracks(self) -> dict[str, Track | None]:
+        """The parts of the reference as splines, as far as they were needed."""
+        return {}
+
+    def _part(self, part: str, time: Array) -> Array:
+        """(n, 3) values of a part of the reference at n times, its clock set right; of positions metres."""
+        if part not in self.tracks:
+            series: Series | None = getattr(self, part)
+            gap = GAP * self.spacing
+            if series is None:
+                self.tracks[part] = None
+            elif part == "position":
+                self.tracks[part] = Track(series.time, relative_position(series.value, series.value[0]), gap)
+            else:
+                value = np.unwrap(series.value, axis=0) if part == "attitude" else series.value
+                self.tracks[part] = Track(series.time, value, gap)
+        track = self.tracks[part]
+        return np.full((len(time), 3), np.nan) if track is None else track.known(time + self.late)
+
+    def _once(self, what: str, time: Array, found: Callable[[], Array], span: float = 0.0) -> Array:
         if not len(time):
             return found()
-        key = (what, self.late, len(time), float(time[0]), float(time[-1]))
+        key = (what, span, self.late, len(time), float(time[0]), float(time[-1]))
         if key not in self.known:
             self.known[key] = found()
             self.known[key].flags.writeable = False
@@ -177,10 +204,6 @@ class Streams:
         return self.attitude is not None and bool(np.ptp(self.attitude.value[:, :2], axis=0).all())
 
     @cached_property
-    def reference(self) -> Reference:
-        return Reference(self.position, self.velocity, self.attitude, GAP * self.spacing)
-
-    @cached_property
     def grid(self) -> Array:
         """Times of the comparisons [s]."""
         first = max(float(self.position.time[0]), self.begin)
@@ -190,19 +213,23 @@ class Streams:
 
     def places(self, time: Array) -> Array:
         """(n, 3) positions of the reference [rad, rad, m]."""
-        return self._once("position", time, lambda: self.reference.states(time + self.late).position)
+        return self._once("position", time, lambda: displace(self.position.value[0], self._part("position", time)))
 
     def velocities(self, time: Array) -> Array:
         """(n, 3) velocities of the reference, else by differences of its positions over a few seconds [m/s]."""
 
         def both() -> Array:
-            found = self.reference.states(time + self.late).velocity
+            found = self.given_velocities(time)
             whole = bool(np.isfinite(found).all())
             return (
                 found if whole else np.where(np.isfinite(found), found, self.moved(time, max(2.0, 2.0 * self.spacing)))
             )
 
         return self._once("velocity", time, both)
+
+    def given_velocities(self, time: Array) -> Array:
+        """(n, 3) velocities that the reference states [m/s]; not a number without them."""
+        return self._once("given velocity", time, lambda: self._part("velocity", time))
 
     def moved(self, time: Array, span: float) -> Array:
         """(n, 3) mean velocities from differences of the positions about n times [m/s].
@@ -218,11 +245,11 @@ class Streams:
                 found.append(relative_position(b, a) / span)
             return np.asarray(np.mean(found, axis=0))
 
-        return self._once(f"moved {span}", time, mean)
+        return self._once("moved", time, mean, span)
 
     def attitudes(self, time: Array) -> Array:
         """(n, 3) roll, pitch, yaw of the reference [rad]."""
-        return self._once("attitude", time, lambda: self.reference.states(time + self.late).attitude)
+        return self._once("attitude", time, lambda: wrap_angle(self._part("attitude", time)))
 
     def headings(self) -> dict[str, Callable[[Array], Array]]:
         """By name, what gives the heading at n times [rad]: the reference and the compasses."""
@@ -444,7 +471,7 @@ def _heading_and_course(s: Streams, name: str) -> Residual | None:
 def _velocity_and_positions(s: Streams) -> Residual | None:
     """The velocity of the reference and the differences of its positions."""
     time, span = s.grid, max(2.0, 2.0 * s.spacing)
-    steps = [s.reference.states(time + s.late + k * 0.25 * span).velocity for k in (-2, -1, 0, 1, 2)]
+    steps = [s.given_velocities(time + k * 0.25 * span) for k in (-2, -1, 0, 1, 2)]
     mean = (steps[0] + 4.0 * steps[1] + 2.0 * steps[2] + 4.0 * steps[3] + steps[4]) / 12.0  # Simpson's rule
     way = s.moved(time, span)
     return _residual(mean - way, 2.0 * _SPEED, (np.nan_to_num(mean)[:, :, None], _SCALE))

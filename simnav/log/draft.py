@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from simnav.log.inspection import Stream
+from simnav.log.inspection import WITH_TOPICS, Stream
 from simnav.log.readings import ProbableReading
 from simnav.log.units import dimension
 from simnav.log.variation import dated
@@ -20,11 +21,23 @@ __all__ = ["Guess", "draft", "guesses", "rewritten"]
 
 _AXES = r"(?:_|\.|\[|\s|-)?"
 _LABEL = {
-    "angular_rate": r"gyr?o?|g|w|ang(ular)?[_.]?(vel(ocity)?|rate)|omega|imu[_.]g|w_rs_s",
-    "specific_force": r"acc?(el)?(eration)?|a|f|specific[_.]force|linear[_.]acc(eleration)?|imu[_.]a|a_rs_s",
+    "angular_rate": r"gyr?o?|g|w|ang(ular)?[_.]?(vel(ocity)?|rate)|omega|imu[_.]g|w_rs_s|gyro_rad|"
+    r"d_?theta|delta_?(theta|angle)",
+    "specific_force": r"acc?(el)?(eration)?|a|f|specific[_.]force|linear[_.]acc(eleration)?|imu[_.]a|a_rs_s|"
+    r"accelerometer_m_s2|d_?vel|delta_?vel(ocity)?",
 }
 #: Names of files and topics that say what their columns x, y, z are.
-_OWN_NAME = {"angular_rate": r"gyr", "specific_force": r"acc(?!urac)"}
+_OWN_NAME = {"angular_rate": r"gyr", "specific_force": r"acc(?!urac)", "dvl": r"dvl"}
+#: Axes of a phone that lies flat with its top ahead: starboard, forward, up.
+_PHONE = {"angular_rate": ("y", "x", "-z"), "specific_force": ("y", "x", "-z")}
+#: What autopilots measure: their other places, velocities and attitudes are those of their own filters.
+_MEASURED = {"dataflash": r"GPS", "ulog": r"sensor_gps|vehicle_gps_position"}
+#: Fixes of autopilots that count.
+_FIXED = {"Status": "Status >= 3", "fix_type": "fix_type >= 3"}
+#: An IMU whose specific force is so far from the vertical is not level [rad].
+_TILTED = np.radians(15.0)
+#: Specific force of a vessel, on the mean [m/s^2].
+_PULL = 9.8
 _DVL = (("x", "forward"), ("y", "starboard"), ("z", "down"))
 #: Quantity -> regular expressions of the names of its columns, in order.
 _NAMES: dict[str, tuple[str, ...]] = {
@@ -49,6 +62,9 @@ _NAMES: dict[str, tuple[str, ...]] = {
     ),
     "speed": (r"^(speed|stw|water_?speed)(_m_s)?\b",),
     "depth": (r"^depth\b|^depth_(m|meter)",),
+    "quaternion": tuple(
+        rf"^(q|quat(ernion)?|orientation|att(itude)?)[_.]?{axis}$|^q_?{i}$" for i, axis in enumerate("wxyz")
+    ),
 }
 #: Kinds of instruments that a quantity becomes, with a sigma to begin with.
 _INSTRUMENTS = {
@@ -77,13 +93,15 @@ _SPELT = {
     "m/s": "m_s", "mps": "m_s", "km/h": "km_h", "kmh": "km_h", "kt": "kn", "kts": "kn", "knots": "kn",
     "degrees": "deg", "\N{DEGREE SIGN}": "deg", "e7": "1e-7 deg", "dege7": "1e-7 deg",
 }  # fmt: skip
+#: Names of increments.
+_INCREMENTS = re.compile(r"\b(d_?theta|d_?vel|delta_?(theta|angle|vel))", re.I)
 _UNIT = re.compile(r"(?:\[([^\]]+)\]|\(([^)]+)\)|_((?:deg|rad|m|cm|mm)_s2?|[^_\W]+))\s*$")
 _LENGTH, _SPEED = "length", "speed"
 #: What each quantity is measured in; of a position the angle stands for the first two columns.
 _DIMENSIONS = {
     "position": ("angle", "angle", _LENGTH), "angular_rate": ("angular rate",) * 3,
     "specific_force": ("acceleration",) * 3, "heading": ("angle",), "level": ("angle",) * 2, "velocity": (_SPEED,) * 3,
-    "dvl": (_SPEED,) * 3, "speed": (_SPEED,), "depth": (_LENGTH,),
+    "dvl": (_SPEED,) * 3, "speed": (_SPEED,), "depth": (_LENGTH,), "quaternion": ("",) * 4,
 }  # fmt: skip
 
 
@@ -125,13 +143,16 @@ def guesses(stream: Stream) -> Iterator[Guess]:
             continue
         values = np.stack([stream.table.column(n)[1] for n in found], axis=-1)
         values = values[np.isfinite(values).all(axis=1)]
-        if not len(values):
+        if not len(values) or (quantity == "quaternion" and not _turns(values)):
             continue
         columns, units = _signed(quantity, found, values), _units(stream, quantity, values)
         if stream.form != "nmea":
             told = [_named(name, what) for name, what in zip(found, _DIMENSIONS[quantity], strict=False)]
             units = *(a or b for a, b in zip(told, units, strict=False)), *units[len(found) :]
         yield Guess(stream, quantity, columns, units)
+    numbered = [n for n in (f"q_{i}" for i in range(1, 5)) if n in names]  # PX4: scalar first
+    if len(numbered) == 4 and _turns(np.stack([stream.table.column(n)[1] for n in numbered], axis=-1)):
+        yield Guess(stream, "quaternion", tuple(numbered), ("1",) * 4)
     bare = _bare(stream, names)
     if bare is not None:
         yield bare
@@ -142,11 +163,19 @@ def guesses(stream: Stream) -> Iterator[Guess]:
         yield Guess(stream, "heading", ("heading_magnetic",), ("1",))
 
 
+def _turns(quaternion: Array) -> bool:
+    """Whether (n, 4) numbers are quaternions of a body that moves."""
+    known = quaternion[np.isfinite(quaternion).all(axis=1)]
+    length = np.linalg.norm(known, axis=1)
+    return bool(len(known) and np.abs(length - 1.0).max() < 0.1 and np.ptp(known, axis=0).max() > 0.0)
+
+
 def _bare(stream: Stream, names: Sequence[str]) -> Guess | None:
     """Columns x, y, z of a file or topic whose name says what they are, as those of phones."""
     label = stream.path.stem if stream.sentence is None else stream.sentence
     quantity = next((q for q, pattern in _OWN_NAME.items() if re.search(pattern, label, re.I)), None)
-    found = [next((n for n in names if re.split(r"[./]", n.lower())[-1] == axis), None) for axis in "xyz"]
+    fits = [re.compile(rf"(?:.*[./])?{axis}(?:\W.*)?$", re.I) for axis in "xyz"]
+    found = [next((n for n in names if fit.match(n)), None) for fit in fits]
     if quantity is None or None in found:
         return None
     columns = [n for n in found if n is not None]
@@ -154,7 +183,13 @@ def _bare(stream: Stream, names: Sequence[str]) -> Guess | None:
     values = values[np.isfinite(values).all(axis=1)]
     if not len(values) or (quantity == "specific_force" and np.linalg.norm(values.mean(axis=0)) < 0.5):
         return None  # gravity was taken out
-    return Guess(stream, quantity, _signed(quantity, columns, values), _units(stream, quantity, values))
+    units = _units(stream, quantity, values)
+    units = tuple(_named(n, _DIMENSIONS[quantity][0]) or u for n, u in zip(columns, units, strict=True))
+    if stream.form == "csv" and quantity in _PHONE:
+        own = dict(zip("xyz", columns, strict=True))
+        axes = tuple(f"-{own[a[1:]]}" if a.startswith("-") else own[a] for a in _PHONE[quantity])
+        return Guess(stream, quantity, axes, units)
+    return Guess(stream, quantity, _signed(quantity, columns, values), units)
 
 
 def _named(name: str, what: str) -> str | None:
@@ -198,13 +233,21 @@ def _units(stream: Stream, quantity: str, values: Array) -> tuple[str, ...]:
         angle = "rad" if np.abs(values[:, 0]).max() < 1.58 and np.abs(values[:, 1]).max() < 3.15 else "deg"
         if np.abs(values[:, :2]).max() > 361.0:
             angle = "1e-7 deg"
-        return angle, angle, "m"
+        return angle, angle, "mm" if angle == "1e-7 deg" and stream.form == "ulog" else "m"
+    if quantity == "quaternion":
+        return ("1",) * width
     if quantity == "angular_rate":
         return ("deg_s" if size > 4.0 else "rad_s",) * 3
     if quantity == "specific_force":
         norm = float(np.median(np.linalg.norm(values, axis=1)))
+        spacing = float(np.median(np.diff(stream.time))) if len(stream.time) > 1 else 0.0
+        named = _INCREMENTS.search(" ".join(stream.table.names)) is not None
+        if 0.8 * _PULL * spacing < norm < 1.2 * _PULL * spacing and (named or not 0.8 < norm < 1.2):
+            return ("m_s",) * 3  # increments of velocity
         return ("g" if norm < 2.0 else "m_s2" if norm < 50.0 else "mg",) * 3
     if quantity in ("heading", "level"):
+        if stream.form in ("dataflash", "ulog"):
+            return ("deg" if stream.form == "dataflash" else "rad",) * width
         return ("deg" if size > 6.3 else "rad",) * width
     return ("m" if quantity == "depth" else "m_s",) * (3 if quantity == "velocity" else width)
 
@@ -230,8 +273,13 @@ def draft(streams: Sequence[Stream], name: str = "my-log", file: str | None = No
     reference = _solution(found)
     if reference is not None:  # it is compared with, and is no instrument
         found = [g for g in found if g.stream is not reference["position"].stream]
+    attitude = None if reference is not None else _attitude(found)
+    if attitude is not None:  # of a filter: it is compared with, and is no compass
+        found = [g for g in found if g.quantity not in ("heading", "level") or g.stream is not attitude.stream]
     best: dict[str, Guess] = {}
     for guess in found:
+        if guess.quantity in ("heading", "velocity", "speed") and not _is_measured(guess.stream):
+            continue
         if guess.quantity == "velocity" and guess.columns[2] == "=nan":  # course and speed are no instrument yet
             continue
         if guess.quantity not in best or _worth(guess) > _worth(best[guess.quantity]):
@@ -250,7 +298,7 @@ def draft(streams: Sequence[Stream], name: str = "my-log", file: str | None = No
         rate, force = both[0] if both else (rate, force)
     if reference is None:
         best.pop("velocity", None)  # of the same receiver as the reference
-    used = [position, *(g for q, g in best.items() if q in _INSTRUMENTS)]
+    used = [position, *(g for q, g in best.items() if q in _INSTRUMENTS), *([attitude] if attitude is not None else [])]
     if rate is not None and force is not None:
         used += [rate, force]
     keys = _file_keys(used)
@@ -269,13 +317,13 @@ def draft(streams: Sequence[Stream], name: str = "my-log", file: str | None = No
         "attitude_deg = [1.0, 1.0, 5.0]",
         "",
         "[log]",
-        f"folder = {json.dumps(str(position.stream.path.resolve().parent))}",
+        f"folder = {_toml(str(position.stream.path.resolve().parent))}",
         'begin = "moving"                 # check: the course of the moving vessel is its heading at the start',
     ]
-    if "heading" in best or reference is not None or span < 20.0:
+    if "heading" in best or reference is not None or attitude is not None or span < 20.0:
         lines[-1] = f"# {lines[-1]}"
-    for (_, topic), (stream, key) in keys.items():
-        lines += ["", *_file(stream, key, topic)]
+    for stream, key in keys.values():
+        lines += ["", *_file(stream, key)]
     if rate is not None and force is not None:
         lines += ["", *_imu(rate, force, keys)]
     for quantity, guess in best.items():
@@ -292,11 +340,12 @@ def draft(streams: Sequence[Stream], name: str = "my-log", file: str | None = No
     lines += ["", *_channel("log.reference.position", position, keys)]
     if reference is None:
         lines.append(f"hold_out = {_EVERY}                  # ... and the others to compare with")
+        if attitude is not None:
+            lines += ["", *_channel("log.reference.attitude", attitude, keys)]
     else:
         lines += ["", *_channel("log.reference.velocity", reference["velocity"], keys)]
-        level, heading = reference["level"], reference["heading"]
-        attitude = Guess(level.stream, "attitude", level.columns + heading.columns, level.units + heading.units)
-        lines += ["", *_channel("log.reference.attitude", attitude, keys)]
+        whole = _of_angles(reference["level"], reference["heading"])
+        lines += ["", *_channel("log.reference.attitude", whole, keys)]
     if rate is not None and force is not None:
         hertz = 1.0 / float(np.median(np.diff(rate.stream.time)))
         lines += ["", "[instruments.imu]", f"rate_hz = {_round(hertz)}",
@@ -327,6 +376,29 @@ def _solution(found: Sequence[Guess]) -> dict[str, Guess] | None:
     return chosen
 
 
+def _of_angles(level: Guess, heading: Guess) -> Guess:
+    """Roll, pitch and yaw of one stream, in one unit where no name says another: small angles do not tell theirs."""
+    columns, units = level.columns + heading.columns, level.units + heading.units
+    one = "deg" if "deg" in units else "rad"
+    told = tuple(_named(c, "angle") or one for c in columns) if level.stream.form != "nmea" else units
+    return Guess(level.stream, "attitude", columns, told)
+
+
+def _attitude(found: Sequence[Guess]) -> Guess | None:
+    """The attitude of a filter beside the instruments: a quaternion, or the angles of an autopilot."""
+    whole = [g for g in found if g.quantity == "quaternion"]
+    for level in found:
+        if level.quantity == "level" and level.stream.form in _MEASURED:
+            whole += [_of_angles(level, g) for g in found if g.quantity == "heading" and g.stream is level.stream]
+    return max(whole, key=lambda g: len(g.stream.time), default=None)
+
+
+def _is_measured(stream: Stream) -> bool:
+    """Whether a stream is measured, and not of the filter of an autopilot."""
+    pattern = _MEASURED.get(stream.form)
+    return pattern is None or re.match(pattern, stream.sentence or "") is not None
+
+
 def _declared(guess: Guess, reference: dict[str, Guess] | None) -> tuple[str, str, str]:
     """Name, kind and sigma of an instrument; of positions without a height, beside a reference, a horizontal one."""
     if guess.quantity == "position" and reference is not None and guess.columns[2] == "=0":
@@ -338,19 +410,18 @@ def _round(value: float) -> str:
     return f"{float(f'{value:.4g}')!r}"
 
 
-#: Streams and the keys of their files, by path and, of the IMU in a bag, topic.
+#: Streams and the keys of their files, by path and, where a file has topics, topic.
 _Keys = dict[tuple[Path, str | None], tuple[Stream, str]]
 
 
 def _place(guess: Guess) -> tuple[Path, str | None]:
     if guess.stream.form in ("mat", "hdf5"):
         return guess.stream.path, str(guess.stream.keys["time"])
-    own = guess.quantity in _LABEL and guess.stream.form in ("mcap", "rosbag")
-    return guess.stream.path, guess.stream.sentence if own else None
+    return guess.stream.path, guess.stream.sentence if guess.stream.form in WITH_TOPICS else None
 
 
 def _file_keys(used: Sequence[Guess]) -> _Keys:
-    """A name for each file, topic of an IMU, and time of arrays."""
+    """A name for each file, topic, and time of arrays."""
     keys: _Keys = {}
     taken: set[str] = set()
     for guess in used:
@@ -368,14 +439,12 @@ def _key_of(keys: _Keys, guess: Guess) -> str:
     return keys[_place(guess)][1]
 
 
-def _file(stream: Stream, key: str, topic: str | None) -> list[str]:
-    lines = [f"[log.files.{key}]", f"path = {json.dumps(stream.path.name)}"]
+def _file(stream: Stream, key: str) -> list[str]:
+    lines = [f"[log.files.{key}]", f"path = {_toml(stream.path.name)}"]
     if stream.form != "csv":
         lines.append(f'format = "{stream.form}"')
-    if topic is not None and stream.sentence is not None:
-        lines.append(f"options = {{ topic = {json.dumps(topic)} }}")
     for name, value in stream.keys.items():
-        lines.append(f"{name} = {json.dumps(list(value) if isinstance(value, tuple) else value)}")
+        lines.append(f"{name} = {_toml(value)}")
         if name == "time_unit" and value != "iso":
             lines[-1] += "   # check"
     if stream.form == "csv" and len(stream.time) > 1 and (np.diff(stream.time) == 0.0).any():
@@ -383,18 +452,29 @@ def _file(stream: Stream, key: str, topic: str | None) -> list[str]:
     return lines
 
 
+def _toml(value: Any) -> str:
+    """A text, a number, a sequence or a table of them, as TOML."""
+    if isinstance(value, Mapping):
+        return "{ " + ", ".join(f"{name} = {_toml(inner)}" for name, inner in value.items()) + " }"
+    return json.dumps(list(value) if isinstance(value, tuple) else value, ensure_ascii=False)
+
+
 def _channel(table: str, guess: Guess, keys: _Keys) -> list[str]:
     stream = guess.stream
     lines = [f"[{table}]", f'file = "{_key_of(keys, guess)}"']
-    if stream.sentence is not None:
-        lines.append(f"sentence = {json.dumps(stream.sentence)}")
+    if stream.sentence is not None and stream.form not in WITH_TOPICS:
+        lines.append(f"sentence = {_toml(stream.sentence)}")
     if stream.talker is not None:
         lines.append(f'talker = "{stream.talker}"')
     columns = list(guess.columns)
     units = list(guess.units)
     if table == "log.instruments.fix":
         columns, units = columns[:2], units[:2]
-    lines.append(f"columns = {json.dumps(columns)}")
+    lines.append(f"columns = {_toml(columns)}")
+    if guess.quantity == "quaternion" and stream.form in ("mcap", "rosbag"):
+        lines.append('frame = "enu"                   # check: ROS has axes forward, left, up in east, north, up')
+    if guess.quantity == "position" and stream.form in _MEASURED:
+        lines += [f"where = {_toml(good)}" for name, good in _FIXED.items() if name in stream.table.names]
     if _stale(guess):
         lines.append("drop_repeated = true            # check: many values are those of the row before")
     if columns == ["heading_magnetic"]:
@@ -404,14 +484,17 @@ def _channel(table: str, guess: Guess, keys: _Keys) -> list[str]:
             else "variation_deg = 0.0            # check: the variation of the place, positive east"
         )
     if set(guess.units) != {"1"}:
-        lines.append(f"units = {json.dumps(units)}   # check")
+        lines.append(f"units = {_toml(units)}   # check")
     return lines
 
 
 def _worth(guess: Guess) -> tuple[int, int]:
-    """Of several streams a position with height and the sentence of a compass go first, then the longest."""
+    """Of several streams what is measured, a position with height and the sentence of a compass go first.
+
+    Then the longest.
+    """
     if guess.quantity == "position":
-        return int(guess.columns[2] != "=0"), len(guess.stream.time)
+        return 2 * _is_measured(guess.stream) + (guess.columns[2] != "=0"), len(guess.stream.time)
     if guess.quantity == "heading":
         return _COMPASSES.get(guess.stream.sentence or "", 0), len(guess.stream.time)
     return 0, len(guess.stream.time)
@@ -437,20 +520,39 @@ def _graded(position: Guess) -> bool:
 
 
 def _imu(rate: Guess, force: Guess, keys: _Keys) -> list[str]:
-    flipped = force.columns[2].startswith("-")
+    flipped = force.columns[2].startswith("-") and not rate.columns[2].startswith("-")
     one = _key_of(keys, rate) == _key_of(keys, force)
     two = [] if one else [f'specific_force_file = "{_key_of(keys, force)}"   # check: offset_s of its clock']
-    means = rate.columns[0].startswith("angular_rate_x") and one  # as 'simnav export' writes them
     rates = [rate.columns[0], *(f"-{c}" if flipped else c for c in rate.columns[1:])]
+    unit, samples = rate.units[0], 'samples = "instantaneous"        # check: or "means", "increments"'
+    if (rate.columns[0].startswith("angular_rate_x") and one) or force.stream.form == "ulog":
+        samples = 'samples = "means"'  # as 'simnav export' and PX4 write them
+    if force.units[0] == "m_s":
+        unit, samples = {"deg_s": "deg"}.get(unit, "rad"), 'samples = "increments"'
     return [
         "[log.imu]",
         f'file = "{_key_of(keys, rate)}"',
         *two,
-        'samples = "means"' if means else 'samples = "instantaneous"        # check: or "means", "increments"',
-        f"angular_rate = {json.dumps(rates)}   # check: forward, starboard, down; or say mounting_deg",
-        f'angular_rate_unit = "{rate.units[0]}"   # check',
-        f"specific_force = {json.dumps(list(force.columns))}",
+        samples,
+        f"angular_rate = {_toml(rates)}   # check: forward, starboard, down; or say mounting_deg",
+        f'angular_rate_unit = "{unit}"   # check',
+        f"specific_force = {_toml(force.columns)}",
         f'specific_force_unit = "{force.units[0]}"',
+        *_mounting(force),
+    ]
+
+
+def _mounting(force: Guess) -> list[str]:
+    """Roll and pitch of an IMU that is not level, from its mean specific force."""
+    signs = np.array([-1.0 if c.startswith("-") else 1.0 for c in force.columns])
+    values = np.stack([force.stream.table.column(c.removeprefix("-"))[1] for c in force.columns], axis=-1) * signs
+    x, y, z = np.nanmean(values, axis=0)
+    if np.arctan2(np.hypot(x, y), -z) < _TILTED:
+        return []
+    roll, pitch = np.degrees(np.arctan2(-y, -z)), np.degrees(np.arctan2(x, np.hypot(y, z)))
+    return [
+        f"mounting_deg = [{roll:.1f}, {pitch:.1f}, 0.0]   # check: level by its specific force; the third, its heading "
+        "in the vessel, is not known"
     ]
 
 
@@ -466,6 +568,9 @@ def rewritten(text: str, readings: Sequence[ProbableReading]) -> str:
     """
     lines = text.splitlines()
     for reading in readings:
+        if not reading.changes:
+            first = lines.index(f"[log.instruments.{reading.stream}]") + 1
+            lines.insert(first, f"# check: {reading.what}, so with probability {reading.shown}: take it out")
         for table, key, value in reading.changes:
             first = lines.index(f"[{table}]") + 1
             ends = (k for k in range(first, len(lines)) if not lines[k] or lines[k].startswith("["))

@@ -20,6 +20,8 @@ __all__ = ["ImuSeries", "read_imu"]
 _NOTICED = 0.1
 #: The longest hole that is bridged by default: this [s], or so many times the usual spacing.
 _LEAST_GAP, _SPACINGS = 1.0, 10.0
+#: Mean specific force of a vessel [m/s^2], within the errors of a poor IMU.
+_PULL = (9.4, 10.2)
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +64,7 @@ def read_imu(spec: RecordedSpec, imu: LogImuSpec, recording: str) -> ImuSeries:
     if not 8.0 < float(np.linalg.norm(force_mean)) < 12.0:
         raise LogError(
             f"{whole.source}: the mean specific force is {np.linalg.norm(force_mean):.4g} m/s^2 where gravity is 9.8; "
-            f"check specific_force_unit = {imu.specific_force_unit!r} and samples = {imu.samples!r}"
+            + _right(float(np.linalg.norm(force_mean)), float(np.median(np.diff(whole.edge))), imu)
         )
     mean = whole.mean
     if any(imu.mounting):
@@ -75,6 +77,24 @@ def read_imu(spec: RecordedSpec, imu: LogImuSpec, recording: str) -> ImuSeries:
             "mounting_deg"
         )
     return ImuSeries(whole.source, whole.edge, mean)
+
+
+def _right(size: float, spacing: float, imu: LogImuSpec) -> str:
+    """What to write where a mean specific force is no gravity: the one unit, or increments, with which it is one."""
+    raw = size / factor(imu.specific_force_unit) * (spacing if imu.samples == "increments" else 1.0)
+    plain = "instantaneous" if imu.samples == "increments" else imu.samples
+    tried = {(plain, unit): raw * factor(unit) for unit in ("m_s2", "g", "mg")} | {("increments", "m_s"): raw / spacing}
+    fits = [key for key, value in tried.items() if _PULL[0] < value < _PULL[1]]
+    if len(fits) != 1:
+        return f"check specific_force_unit = {imu.specific_force_unit!r} and samples = {imu.samples!r}"
+    samples, unit = fits[0]
+    lines = [f"specific_force_unit = {unit!r}"]
+    if samples != imu.samples:
+        angle = {"rad_s": "rad", "deg_s": "deg"}
+        other = {v: k for k, v in angle.items()} if imu.samples == "increments" else angle
+        rate = other.get(imu.angular_rate_unit, imu.angular_rate_unit)
+        lines = [f"samples = {samples!r}", *lines, f"angular_rate_unit = {rate!r}"]
+    return f"it is with {', '.join(lines)} of [log.imu]: write that"
 
 
 def _means(

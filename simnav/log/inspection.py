@@ -17,9 +17,12 @@ from simnav.log.check import described
 from simnav.log.delimited import read_csv
 from simnav.log.files import FileSpec
 from simnav.log.formats.bags import topics_of
+from simnav.log.formats.dataflash import read_dataflash
+from simnav.log.formats.kf_gins import content_of
 from simnav.log.formats.n2k import read_n2k
 from simnav.log.formats.rinex import read_rinex
 from simnav.log.formats.ubx import read_ubx
+from simnav.log.formats.ulog import read_ulog
 from simnav.log.nmea import read_nmea
 from simnav.log.reader import READERS
 from simnav.log.table import LogError, LogWarning, Table, utc_seconds
@@ -27,13 +30,13 @@ from simnav.log.text_forms import form_of_text
 from simnav.log.units import factor
 from simnav.types import Array
 
-__all__ = ["Stream", "inspect_log", "streams_of", "track_of"]
+__all__ = ["WITH_TOPICS", "Stream", "inspect_log", "streams_of", "track_of"]
 
 #: Ending of a file -> its format, where its content says nothing.
 _ENDINGS = {
     ".pos": "rtklib", ".tum": "tum", ".nmea": "nmea", ".sbet": "sbet", ".out": "sbet", ".pd0": "pd0", ".mat": "mat",
     ".h5": "hdf5", ".hdf5": "hdf5", ".parquet": "parquet", ".mcap": "mcap", ".bag": "rosbag", ".db3": "rosbag",
-    ".ubx": "ubx",
+    ".ubx": "ubx", ".ulg": "ulog",
 }  # fmt: skip
 _TIME = re.compile(r"^#?\s*(time|times|timestamp|stamp|t|utc|sec|secs|seconds|epoch|gpstime|datetime)(?![a-z])", re.I)
 _DATE = re.compile(r"^\s*(date|day|%?\s*ymd)\b", re.I)
@@ -46,6 +49,10 @@ _START, _TEXTS = "start.json", (".md", ".toml")
 #: Formats whose files hold arrays or columns by name, with a time or several.
 _OF_ARRAYS = ("mat", "hdf5", "parquet")
 #: Formats whose files have several tables, besides NMEA and bags.
+#: Formats whose files have topics, with a clock each.
+WITH_TOPICS = ("mcap", "rosbag", "dataflash", "ulog")
+#: Stamps of headers that are so near to the times of recording are taken [s].
+_NEAR = 10.0
 _OF_SENTENCES = {"n2k": read_n2k, "rinex": read_rinex, "ubx": read_ubx}
 
 
@@ -60,7 +67,7 @@ class Stream:
     form : str
         Its format.
     sentence, talker : str or None
-        Of NMEA; for bags the topic.
+        Of NMEA; for bags and logs of autopilots the topic.
     table : Table
         Its columns.
     time : (n,) array
@@ -181,7 +188,7 @@ def _format(path: Path) -> str:
             if b"\xb5\x62\x01" in stream.read(1 << 16):  # a message of UBX after sentences of NMEA
                 return "ubx"
         raise LogError(f"{path}: it is {found[0]}; say its format in a scenario: {', '.join(sorted(READERS.items()))}")
-    by_content = form_of_text(path)
+    by_content = form_of_text(path) or ("kf_gins" if content_of(path) else None)
     if by_content is not None:
         return by_content
     return by_ending if by_ending in ("tum", "rtklib", "nmea") else "csv"
@@ -201,21 +208,28 @@ def _streams(path: Path, form: str) -> Iterator[Stream]:
             time = table.column("logger" if form == "n2k" else "time")[1]
             yield Stream(path, form, sentence, talker or None, table, _known(time))
         return
-    if form in ("mcap", "rosbag"):
+    if form in WITH_TOPICS:
         reader = READERS.get(form)
         assert reader is not None
-        for topic in topics_of(path, form):
+        for topic in _topics(path, form):
+            keys: dict[str, Any] = {"options": {"topic": topic}}
             try:
                 rows = reader.read(path, FileSpec(path=path.name, format=form), topic)
             except LogError as error:  # such as images in an encoding of their own; the other topics are of use
                 warnings.warn(str(error), LogWarning, 2)
                 continue
-            yield Stream(path, form, topic, None, rows.table, _known(rows.time))
+            time = rows.time
+            if "header" in rows.table.columns and _stamped(rows.table.column("header")[1], time):
+                keys["clock"], time = "sentence", rows.table.column("header")[1]
+            counts = np.arange(len(time)) if rows.counts is None else rows.counts
+            yield Stream(path, form, topic, None, rows.table, _known(time[counts]), keys)
         return
     reader = READERS.get(form)
     assert reader is not None
     if form not in _OF_ARRAYS:
         keys = _time_keys(path) if form == "csv" else {}
+        if form == "kf_gins" and content_of(path) == "gnss":
+            keys = {"options": {"content": "gnss"}}
         rows = reader.read(path, FileSpec(path=path.name, format=form, **keys))
         yield Stream(path, form, None, None, rows.table, _known(rows.time), keys)
         return
@@ -225,6 +239,19 @@ def _streams(path: Path, form: str) -> Iterator[Stream]:
         if (unit := _time_unit(rows.table, name, rows.time)) != "s":
             keys |= {"time_unit": unit}
         yield Stream(path, form, None, None, _beside(rows.table, name), _known(rows.time) * factor(unit), keys)
+
+
+def _topics(path: Path, form: str) -> list[str]:
+    if form in ("mcap", "rosbag"):
+        return topics_of(path, form)
+    return sorted(read_dataflash(path) if form == "dataflash" else read_ulog(path))
+
+
+def _stamped(header: Array, recorded: Array) -> bool:
+    """Whether the stamps in headers are times of the same clock, in order."""
+    if len(header) < 2 or not np.isfinite(header).all():
+        return False
+    return bool((np.diff(header) > 0.0).all() and np.abs(header - recorded).max() < _NEAR)
 
 
 def track_of(stream: Stream) -> Array | None:

@@ -12,16 +12,22 @@ from __future__ import annotations
 import itertools
 import json
 import warnings
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from simnav.geometry.rotation import dcm_from_rpy, wrap_angle
+from simnav.geometry.rotation import (
+    dcm_from_quaternion,
+    dcm_from_rpy,
+    quaternion_from_dcm,
+    rpy_from_dcm,
+    wrap_angle,
+)
 from simnav.kinds import BODY_VELOCITY, HEADING, VELOCITY
 from simnav.log.channel import Series, read_channel, skip_of
-from simnav.log.comparisons import Inertial, Streams, comparisons
+from simnav.log.comparisons import COURSE_FROM, Inertial, Streams, comparisons
 from simnav.log.imu_series import read_imu
 from simnav.log.likelihood import Fit, fit, log_ratios
 from simnav.log.units import DIMENSIONS, factor
@@ -49,6 +55,9 @@ _ROUNDS = 4
 _FLIPS = (1.0, -1.0)
 #: The mean specific force of a vessel points up by at least this [m/s^2].
 _UPRIGHT = 4.0
+#: From axes forward, left, up to forward, starboard, down; from east, north, up to north, east, down, and back.
+_LEFT = np.array([1.0, -1.0, -1.0])
+_EAST = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
 #: The 48 matrices that permute axes and change signs.
 _AXES = tuple(
     np.eye(3)[list(order)] * np.array(signs)[:, None]
@@ -95,16 +104,20 @@ class ProbableReading:
     def sentence(self) -> str:
         """As text, with the line to write."""
         lines = "; ".join(f"{key} = {value} of [{table}]" for table, key, value in self.changes)
+        right = f"write {lines}" if lines else f"take [log.instruments.{self.stream}] out, or name another column"
         alike = f" ({self.alike} others fit as well, the motion does not tell them apart)" if self.alike else ""
         return (
             f"{self.what}: the other streams say so with probability {self.shown}{alike}; "
-            f"as it is read now it has {self.present:.1g}; write {lines}"
+            f"as it is read now it has {self.present:.1g}; {right}"
         )
 
 
 @dataclass(frozen=True, eq=False)
 class _Reading:
-    """A hypothesis: the streams read so, the streams that it alters, how many changes it is, and what to write."""
+    """A hypothesis: the streams read so, the streams that it alters, how many changes it is, and what to write.
+
+    With nothing to write, the stream is no such instrument. Comparisons with the stream ``apart`` say nothing of it.
+    """
 
     stream: str
     parts: tuple[str, ...]
@@ -113,6 +126,7 @@ class _Reading:
     what: str
     changes: tuple[tuple[str, str, Any], ...]
     delay: float = 0.0
+    apart: str = ""
 
 
 def probable_readings(scenario: Scenario, recording: str) -> list[ProbableReading]:
@@ -138,23 +152,26 @@ def probable_readings(scenario: Scenario, recording: str) -> list[ProbableReadin
     log = scenario.log
     assert log is not None
     found: list[ProbableReading] = []
+    unfit: set[str] = set()  # streams that are no such instrument
     for _ in range(_ROUNDS):
-        streams = _read(scenario, log, recording)
+        streams = _read(scenario, log, recording, unfit)
         best = _best(log, streams)
         if best is None:
             break
         reading, told = best
+        if not reading.changes:
+            unfit.add(reading.stream)
         try:
             log = _written(log, reading.changes)
-            _read(scenario, log, recording)
+            _read(scenario, log, recording, unfit)
         except (SpecError, ValueError):
             break
         found.append(told)
     return found
 
 
-def _read(scenario: Scenario, log: RecordedSpec, recording: str) -> Streams:
-    """All streams of a recording."""
+def _read(scenario: Scenario, log: RecordedSpec, recording: str, unfit: Collection[str]) -> Streams:
+    """All streams of a recording, but those that were found to be no such instruments."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         reference = {
@@ -167,7 +184,7 @@ def _read(scenario: Scenario, log: RecordedSpec, recording: str) -> Streams:
         instruments, field = {}, {}
         for name, spec in scenario.aids.items():
             where = log.instruments.get(name)
-            if where is None or where.source != "file":
+            if where is None or where.source != "file" or name in unfit:
                 continue
             series = read_channel(log, where.channel(), spec.kind, recording)
             instruments[name] = spec.kind, series, np.asarray(sheets[name].lever_arm, dtype=np.float64)
@@ -190,7 +207,7 @@ def _best(log: RecordedSpec, streams: Streams) -> tuple[_Reading, ProbableReadin
             present[parts] = fit(residual)
     readings: dict[str, list[tuple[_Reading, float, bool]]] = {}
     for reading in _readings(log, streams):
-        involved = [p for p in present if set(p) & set(reading.parts)]
+        involved = [p for p in present if set(p) & set(reading.parts) and reading.apart not in p]
         if not involved:
             continue
         other = reading.alter(streams)
@@ -247,6 +264,7 @@ def _readings(log: RecordedSpec, s: Streams) -> Iterator[_Reading]:
             yield from _of_vector(name, table, where, series, body)
         elif where.columns and len(components) == 1 and equation == HEADING:
             yield from _of_heading(name, table, where, series)
+            yield from _as_course(name, series, s)
         elif where.columns and len(components) == 1:
             yield from _of_scalar(name, table, where, series)
         if equation == HEADING or equation in (BODY_VELOCITY, VELOCITY) or not axes:
@@ -255,7 +273,8 @@ def _readings(log: RecordedSpec, s: Streams) -> Iterator[_Reading]:
     if s.velocity is not None and log.reference.velocity is not None and log.reference.velocity.columns:
         yield from _of_vector("reference.velocity", "log.reference.velocity", log.reference.velocity, s.velocity, False)
     if s.attitude is not None and log.reference.attitude is not None and log.reference.attitude.columns:
-        yield from _of_attitude(log.reference.attitude, s.attitude)
+        of = _of_quaternion if len(log.reference.attitude.columns) == 4 else _of_attitude
+        yield from of(log.reference.attitude, s.attitude)
     yield from _reference_late(log, s)
 
 
@@ -445,6 +464,18 @@ def _of_heading(name: str, table: str, where: LogInstrumentSpec, series: Series)
                        f"the heading of {name!r} is in {new}", ((table, "units", new),))  # fmt: skip
 
 
+def _as_course(name: str, series: Series, s: Streams) -> Iterator[_Reading]:
+    """The course over the ground in place of a heading: they part by leeway and current."""
+    if s.attitude is None:
+        return
+    way = s.moved(series.time, max(2.0, 2.0 * s.spacing))
+    moving = np.hypot(way[:, 0], way[:, 1]) > COURSE_FROM
+    apart = wrap_angle(s.attitudes(series.time)[:, 2] - np.arctan2(way[:, 1], way[:, 0]))
+    value = wrap_angle(series.value + np.where(moving & np.isfinite(apart), apart, 0.0)[:, None])
+    what = f"{name!r} is the course over the ground, and no heading"
+    yield _Reading(name, (name,), _with_series(name, value=value), 1.0, what, (), apart="reference.position")
+
+
 def _of_scalar(name: str, table: str, where: LogInstrumentSpec, series: Series) -> Iterator[_Reading]:
     """Sign and unit of a speed or a depth."""
     present = _units_of(where, 1)[0]
@@ -554,6 +585,35 @@ def _of_attitude(channel: ChannelSpec, series: Series) -> Iterator[_Reading]:
         yield _Reading("reference.attitude", ("reference.attitude",),
                        _with_series("reference.attitude", value=value), number, what,
                        tuple(changes))  # fmt: skip
+
+
+def _of_quaternion(channel: ChannelSpec, series: Series) -> Iterator[_Reading]:
+    """Order of a quaternion (scalar first or last), its inverse (Hamilton, JPL), axes of the body and of the world."""
+    table, present = "log.reference.attitude", list(channel.columns)
+    dcm = dcm_from_rpy(series.value)
+    quaternion = quaternion_from_dcm(_EAST @ dcm * _LEFT if channel.frame == "enu" else dcm)
+    orders = ((0, 1, 2, 3), (3, 0, 1, 2), (1, 2, 3, 0))
+    flipped = (1, -1.0), (0, 1.0), (3, 1.0), (2, -1.0)  # turned by 180 deg about the forward axis of the body
+    for order, inverse, turned, east in itertools.product(orders, (False, True), (False, True), (False, True)):
+        other_frame = east != (channel.frame == "enu")
+        number = float((order != orders[0]) + inverse + 1.5 * turned + other_frame)
+        if not number:
+            continue
+        chosen = [(i, -1.0 if inverse and k else 1.0) for k, i in enumerate(order)]
+        if turned:
+            chosen = [(chosen[i][0], sign * chosen[i][1]) for i, sign in flipped]
+        scalar = chosen[0][1]  # minus a quaternion is the same turn
+        chosen = [(i, sign * scalar) for i, sign in chosen]
+        columns = [present[i] if sign > 0.0 else _flip(present[i]) for i, sign in chosen]
+        new = dcm_from_quaternion(np.stack([sign * quaternion[:, i] for i, sign in chosen], axis=-1))
+        value = rpy_from_dcm(_EAST @ new * _LEFT if east else new)
+        changes: list[tuple[str, str, Any]] = [(table, "columns", columns)] if columns != present else []
+        changes += [(table, "frame", "enu" if east else "geodetic")] if other_frame else []
+        axes = "forward, left, up in east, north, up" if east else "forward, starboard, down in north, east, down"
+        what = f"the quaternion of the reference (scalar, x, y, z) is {_shown(columns)}"
+        what += f", of axes {axes}" if other_frame else ""
+        yield _Reading("reference.attitude", ("reference.attitude",),
+                       _with_series("reference.attitude", value=value), number, what, tuple(changes))  # fmt: skip
 
 
 def _written(log: RecordedSpec, changes: tuple[tuple[str, str, Any], ...]) -> RecordedSpec:

@@ -17,13 +17,13 @@ from simnav.types import Array, NavigationStates, TapStates
 if TYPE_CHECKING:
     from scipy.interpolate import CubicSpline
 
-__all__ = ["Reference"]
+__all__ = ["Reference", "Track"]
 
 #: Half the time over which the gyroscopes are averaged for a lever arm [s].
 _AROUND = 0.025
 
 
-class _Track:
+class Track:
     """One series, interpolated by a cubic spline; not a number outside of it and inside its holes."""
 
     def __init__(self, time: Array, value: Array, max_gap: float | None):
@@ -46,6 +46,12 @@ class _Track:
         inside = (left > -tolerance) & (right > -tolerance)
         near = np.minimum(np.abs(left), np.abs(right)) <= self.near
         return np.asarray(inside & ((left + right <= self.max_gap) | near))
+
+    def known(self, time: Array) -> Array:
+        """(n, 3) values at n times; not a number outside and in holes."""
+        value, covered = np.full((len(time), 3), np.nan), self.covered(time)
+        value[covered] = self(time[covered])
+        return value
 
     def __call__(self, time: Array, derivative: int = 0) -> Array:
         """(n, 3) values, or derivatives, at n times; without regard to holes."""
@@ -85,7 +91,7 @@ class Reference:
         imu: ImuSeries | None = None,
     ):
         self.time = position.time
-        self._attitude = None if attitude is None else _Track(attitude.time, np.unwrap(attitude.value, axis=0), max_gap)
+        self._attitude = None if attitude is None else Track(attitude.time, np.unwrap(attitude.value, axis=0), max_gap)
         places, speeds = position.value, None if velocity is None else velocity.value
         lever = np.asarray(lever_arm, dtype=np.float64)
         if lever.any():
@@ -94,19 +100,15 @@ class Reference:
                 turning = np.cross(self._angular_rate(velocity.time, float(places[0, 0]), imu), lever)
                 speeds = velocity.value - self._rotate(velocity.time, turning)
         self._origin = places[0]
-        self._position = _Track(position.time, relative_position(places, self._origin), max_gap)
-        self._velocity = None if velocity is None or speeds is None else _Track(velocity.time, speeds, max_gap)
+        self._position = Track(position.time, relative_position(places, self._origin), max_gap)
+        self._velocity = None if velocity is None or speeds is None else Track(velocity.time, speeds, max_gap)
 
     def states(self, time: Array) -> NavigationStates:
         """The reference at n times; not a number where it has nothing to say (outside, or in a hole)."""
         time = np.asarray(time, dtype=np.float64)
         parts = []
         for track in (self._position, self._velocity, self._attitude):
-            value = np.full((len(time), 3), np.nan)
-            if track is not None:
-                covered = track.covered(time)
-                value[covered] = track(time[covered])
-            parts.append(value)
+            parts.append(np.full((len(time), 3), np.nan) if track is None else track.known(time))
         return NavigationStates(time, displace(self._origin, parts[0]), parts[1], wrap_angle(parts[2]))
 
     def motion(self, time: Array) -> tuple[Array, Array]:

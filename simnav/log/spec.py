@@ -67,7 +67,9 @@ class ChannelSpec(_Grown):
         NMEA: e.g. ``GGA`` and ``GP``; of a proprietary sentence all up to its first number, e.g. ``PSXN,23``.
     columns : tuple
         Names or numbers (from 1), ``-`` before a name flips its sign, ``"=0"`` is a constant; empty for what the
-        sentence holds of this instrument.
+        sentence holds of this instrument. An attitude has roll, pitch and yaw, or the four columns of the quaternion
+        that turns body axes to those of the frame, scalar first (Hamilton's; of its inverse, as JPL writes it, with
+        ``-`` before the last three).
     units : str or tuple of str
         Of the columns, one or one each (keys of `LOG_UNITS`, also with a factor before, like ``"1e-7 deg"``); SI and
         radians where left out, as in NMEA sentences once they are read.

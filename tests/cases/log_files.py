@@ -14,6 +14,7 @@ from simnav.log.files import FileSpec
 from simnav.log.reader import READERS, Rows
 from simnav.satellites.rinex_navigation import read_navigation
 from simnav.sensors.gnss_raw import SHIPPED
+from tests.cases.autopilots import dataflash, ulog
 
 __all__ = ["CASES", "OTHERS", "Case", "damaged", "mutated", "read"]
 
@@ -360,6 +361,23 @@ def _bag(path: Path, change: Change = _same) -> None:
             writer.write(connection, 10**9 * (k + 1), data)
 
 
+def _dataflash(path: Path) -> None:
+    """Fixes of two receivers, and a text."""
+    formats = {130: ("GPS", "QBBLLe", "TimeUS,I,Status,Lat,Lng,Alt"), 131: ("MSG", "QZ", "TimeUS,Message")}
+    rows: list[tuple[int, tuple[Any, ...]]] = [(131, (0, b"ArduSub"))]
+    for k in range(N):
+        place = round(LATITUDE[k] * 1e7), round(LONGITUDE[k] * 1e7), round(HEIGHT[k] * 100)
+        rows += [(130, (10**6 * k, i, 3, *place)) for i in (0, 1)]
+    path.write_bytes(dataflash(formats, rows))
+
+
+def _ulog(path: Path) -> None:
+    """Fixes, with an array and a padding."""
+    layout = "uint64_t timestamp;double latitude_deg;double longitude_deg;float[2] sigma;uint8_t fix_type;"
+    rows = [("sensor_gps", (10**6 * k, LATITUDE[k], LONGITUDE[k], 1.0, 2.0, 3)) for k in range(N)]
+    path.write_bytes(ulog({"sensor_gps": layout}, rows))
+
+
 _ZERO = np.zeros(N)
 _TABLE = "time,latitude,longitude,height\n" + _rows(T, LATITUDE, LONGITUDE, HEIGHT, separator=",")
 _EUROC = "#timestamp [ns],wx,wy,wz,ax,ay,az\n" + _rows(1e9 * T, *[_ZERO] * 5, _ZERO - 9.8, separator=",")
@@ -380,6 +398,8 @@ CASES: Mapping[str, Case] = {
     "mat": Case(".mat", _mat, {"time": "imu.t"}),
     "hdf5": Case(".h5", _hdf5, {"time": "imu/t"}),
     "parquet": Case(".parquet", _parquet, {"time": "stamp"}),
+    "dataflash": Case(".bin", _dataflash, sentence="GPS"),
+    "ulog": Case(".ulg", _ulog, sentence="sensor_gps"),
     "mcap": Case(".mcap", _mcap, {"clock": "sentence"}, "/fix", inner=_mcap),
     "rosbag": Case(".bag", _bag, {"clock": "sentence"}, "/fix", inner=_bag),
 }  # fmt: skip

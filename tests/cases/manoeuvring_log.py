@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 
 from simnav.geometry.earth import displace
-from simnav.geometry.rotation import dcm_from_rpy
+from simnav.geometry.rotation import dcm_from_rpy, quaternion_from_dcm
 from simnav.inverse_strapdown import increments
 from tests.cases.tiny_log import write_csv
 
-RATE, LENGTH = 50.0, 240.0
+RATE, LENGTH = 50.0, 120.0
 #: Field of the Earth, north-east-down [nT].
 FIELD = np.array([18000.0, 700.0, 46000.0])
 
@@ -19,7 +19,7 @@ SCENARIO = """
 name = "manoeuvring-log"
 version = 1
 title = "a log with rich motion"
-duration_s = 230.0
+duration_s = 110.0
 
 [initial_error]
 position_m = [3.0, 3.0, 3.0]
@@ -145,9 +145,10 @@ def make_log(root: Path, *, steady: bool = False) -> None:
     write_csv(folder / "imu.csv", "t,gx,gy,gz,ax,ay,az", [samples.time, *rates.T, *forces.T])
     second = slice(0, None, round(RATE))
     t, v, a, where = time[second], velocity[second], attitude[second], position[second]
-    write_csv(folder / "truth.csv", "t,lat,lon,h,vn,ve,vd,roll,pitch,yaw",
-              [t, *np.degrees(where[:, :2].T), where[:, 2], *v.T, *np.degrees(a.T)])  # fmt: skip
     dcm = dcm_from_rpy(a)
+    write_csv(folder / "truth.csv", "t,lat,lon,h,vn,ve,vd,roll,pitch,yaw,qw,qx,qy,qz",
+              [t, *np.degrees(where[:, :2].T), where[:, 2], *v.T, *np.degrees(a.T),
+               *quaternion_from_dcm(dcm).T])  # fmt: skip
 
     def noise(sigma: float, *shape: int) -> np.ndarray:
         return sigma * chance.standard_normal((len(t), *shape))
@@ -157,7 +158,8 @@ def make_log(root: Path, *, steady: bool = False) -> None:
     magnetic = np.einsum("nji,j->ni", dcm, FIELD) + noise(100.0, 3) + 800.0
     write_csv(
         folder / "aids.csv",
-        "t,lat,lon,h,vx,vy,vz,hdg,stw,depth,mx,my,mz",
+        "t,lat,lon,h,vx,vy,vz,hdg,stw,depth,mx,my,mz,cog",
         [t, *np.degrees(fix[:, :2].T), fix[:, 2], *body.T, np.degrees(a[:, 2] + noise(np.radians(0.5))) % 360.0,
-         body[:, 0] + 0.2 + noise(0.1), noise(0.1) - where[:, 2], *magnetic.T],
+         body[:, 0] + 0.2 + noise(0.1), noise(0.1) - where[:, 2], *magnetic.T,
+         np.degrees(np.arctan2(v[:, 1], v[:, 0])) % 360.0],
     )  # fmt: skip

@@ -3,11 +3,29 @@
 from __future__ import annotations
 
 from simnav.log.delimited import read_csv
-from simnav.log.formats import bags, euroc, hdf5, kf_gins, mat, n2k, parquet, pd0, pd6, rinex, rtklib, sbet, tum, ubx
+from simnav.log.formats import (
+    bags,
+    dataflash,
+    euroc,
+    hdf5,
+    kf_gins,
+    mat,
+    n2k,
+    parquet,
+    pd0,
+    pd6,
+    rinex,
+    rtklib,
+    sbet,
+    tum,
+    ubx,
+    ulog,
+)
 from simnav.log.nmea import read_nmea
 
 __all__ = [
     "bags",
+    "dataflash",
     "euroc",
     "hdf5",
     "kf_gins",
@@ -23,4 +41,5 @@ __all__ = [
     "sbet",
     "tum",
     "ubx",
+    "ulog",
 ]

@@ -331,7 +331,40 @@ def test_mcap_with_protobuf(tmp_path):
     assert rows.table.column("covariance_2")[1].tolist() == [2.0] * N
 
 
-@pytest.mark.parametrize("form", ["mat", "hdf5", "mcap", "rosbag"])
+def test_dataflash(good):
+    rows = good("dataflash")
+    assert rows.time == pytest.approx(T)
+    assert rows.table.column("Lat")[1] == pytest.approx(LATITUDE, abs=1e-7)
+    assert rows.table.column("Alt")[1] == pytest.approx(HEIGHT, abs=0.006)
+    path = good.folder / "good.bin"
+    assert {s.sentence for s in streams_of(path)} == {"GPS", "GPS[1]", "MSG"}
+    reader = READERS.get("dataflash")
+    with pytest.raises(LogError, match=r"there are no messages 'GPX'; did you mean 'GPS'"):
+        reader.read(path, FileSpec(path="x"), "GPX")
+    with pytest.raises(LogError, match=r"say which messages \(sentence\); there are: GPS, GPS\[1\], MSG"):
+        reader.read(path, FileSpec(path="x"))
+    content = path.read_bytes()
+    path.write_bytes(content[:-40] + b"\x00" * 7 + content[-40:-3])
+    with pytest.warns(LogWarning, match="stretches of bytes are no messages of the log and are left out"):
+        assert len(read("dataflash", path).table) == N
+    path.write_bytes(content[:300])
+    with pytest.raises(LogError, match=r"no whole message with a time \(TimeUS\)"):
+        read("dataflash", path)
+
+
+def test_ulog(good):
+    rows = good("ulog")
+    assert rows.time == pytest.approx(T)
+    assert rows.table.names == ("timestamp", "latitude_deg", "longitude_deg", "sigma_1", "sigma_2", "fix_type")
+    assert rows.table.column("longitude_deg")[1] == pytest.approx(LONGITUDE)
+    assert rows.table.column("sigma_2")[1].tolist() == [2.0] * N
+    path = good.folder / "good.ulg"
+    path.write_bytes(path.read_bytes()[:-5])
+    with pytest.warns(LogWarning, match="the last message, at offset .* is cut off"):
+        assert len(read("ulog", path).table) == N - 1
+
+
+@pytest.mark.parametrize("form", ["mat", "hdf5", "mcap", "rosbag", "dataflash", "ulog"])
 def test_a_binary_file_given_as_a_table_is_named(good, form):
     if form in _NEEDS:
         pytest.importorskip(_NEEDS[form])

@@ -66,7 +66,7 @@ def test_the_format_of_a_file_is_found(tmp_path, form):
     path = tmp_path / f"x{CASES[form].ending}"
     CASES[form].make(path)
     found = streams_of(path)
-    tables = {"euroc": "csv", "kf_gins": "csv"}  # a table of numbers says no more of itself
+    tables = {"euroc": "csv"}  # a table of numbers says no more of itself
     assert {s.form for s in found} == {tables.get(form, form)}
     assert all(np.all(np.diff(s.time) >= 0.0) for s in found)
     if form in ("nmea", "rtklib", "pd6", "n2k", "rinex"):

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import pytest
 
+from simnav.geometry.rotation import dcm_from_rpy, quaternion_from_dcm
 from simnav.log.channel import geodetic_from_local, list_recordings, read_channel
 from simnav.log.imu_series import read_imu
 from simnav.log.spec import ChannelSpec, OriginSpec, RecordedSpec
 from simnav.log.table import LogError, LogWarning
 from simnav.plugins import load_plugin
 from simnav.spec import SpecError, register_unit
+from tests.cases.tiny_log import RATE
 
 transform = pytest.importorskip("pyins.transform")
 
@@ -141,13 +145,61 @@ def test_degrees_taken_for_radians(tiny):
         read_channel(spec, spec.reference.position, "position", "1")
 
 
+def test_latitude_for_longitude_is_named_where_it_is_no_latitude(tiny):
+    """The longitude of the log is made 121 deg: as a latitude it cannot be read at all."""
+    path = tiny.folder / "truth1.csv"
+    header, *rows = path.read_text().splitlines()
+    cells = [row.split(",") for row in rows]
+    path.write_text("\n".join([header, *(",".join([r[0], r[1], repr(121.0 + float(r[2])), *r[3:]]) for r in cells)]))
+    spec = log(tiny.replace('columns = ["lat", "lon", "h"]', 'columns = ["lon", "lat", "h"]'))
+    with pytest.raises(LogError, match=r"they are exchanged; write columns = \[\"lat\", \"lon\", \"h\"\]"):
+        read_channel(spec, spec.reference.position, "position", "1")
+
+
+@pytest.mark.parametrize(
+    ("order", "message"),
+    [
+        (["qw", "qx", "qy", "qz"], ""),
+        (["qw", "qx", "qy", "t"], r"line 2: the quaternion in the columns qw, qx, qy, t has the length 5000, not 1"),
+        (
+            ["qw", "qx"],
+            r"needs 3 columns \(roll, pitch, yaw\), or the 4 of a quaternion \(w, x, y, z\), but 2 are given",
+        ),
+    ],
+)
+def test_an_attitude_may_be_a_quaternion(tiny, order, message):
+    path, angles = tiny.folder / "truth1.csv", tiny.truth.attitude[:: round(RATE)]
+    quaternion = quaternion_from_dcm(dcm_from_rpy(angles))
+    header, *rows = path.read_text().splitlines()
+    new = [",".join([row, *map(repr, map(float, q))]) for row, q in zip(rows, quaternion, strict=True)]
+    path.write_text("\n".join([f"{header},qw,qx,qy,qz", *new]))
+    columns = f"columns = {json.dumps(order)}"
+    spec = log(tiny.replace('columns = ["roll", "pitch", "yaw"]\nunits = "deg"', columns))
+    if message == "":
+        found = read_channel(spec, spec.reference.attitude, "attitude", "1")
+        np.testing.assert_allclose(found.value, angles, atol=1e-12)
+    else:
+        with pytest.raises(LogError, match=message):
+            read_channel(spec, spec.reference.attitude, "attitude", "1")
+
+
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
         (
             'specific_force_unit = "g"',
             'specific_force_unit = "m_s2"',
-            r"mean specific force is 0\.9995 m/s\^2 where gravity",
+            r"mean specific force is 0\.9995 m/s\^2 where gravity is 9\.8; it is with specific_force_unit = 'g' of",
+        ),
+        (
+            'specific_force_unit = "g"',
+            'specific_force_unit = "mg"',
+            r"it is with specific_force_unit = 'g' of \[log\.imu\]: write that",
+        ),
+        (
+            'samples = "means"\nangular_rate = ["gy", "gx", "-gz"]\nangular_rate_unit = "deg_s"',
+            'samples = "increments"\nangular_rate = ["gy", "gx", "-gz"]\nangular_rate_unit = "deg"',
+            r"it is with samples = 'instantaneous', specific_force_unit = 'g', angular_rate_unit = 'deg_s' of \[log",
         ),
         ('"-az"', '"az"', r"points down \(9\.8\d* m/s\^2\).*put a minus before 'az'"),
         ('"-gz"', '"-gw"', "there is no column 'gw'"),

@@ -1,0 +1,59 @@
+"""Logs that are right: 'simnav check' and 'simnav log inspect' find no other reading of them.
+
+Simulated logs whose instruments have other errors than their datasheets say (`tests.identification.coverage`), and
+voyages of the catalogue, are written as files and drafted by names and sizes, as 'simnav log inspect' does.
+"""
+
+from __future__ import annotations
+
+import tempfile
+import warnings
+from collections.abc import Callable, Iterator, Mapping
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from simnav.leaderboard.log_inspection import drafted
+from simnav.leaderboard.results.formats import write
+from simnav.log.inspection import inspect_log
+from simnav.scenario import load
+from simnav.source import record
+from tests.identification.coverage import simulated
+
+__all__ = ["parts", "readings_of", "rows"]
+
+#: Logs of a part, and parts.
+LOGS, PARTS = 20, 10
+#: Voyages of the catalogue, and so much of each [s].
+NAMES, LENGTH = ("coastal-voyage", "auv-survey", "gnss-outage", "harbour-multipath", "ship-straight"), 240.0
+
+
+def readings_of(seed: int) -> list[str]:
+    """What is read otherwise in one log that is right; every second log is one of the catalogue."""
+    if seed % 2:
+        recording = simulated(seed)[1]
+    else:
+        scenario = load(NAMES[seed // 2 % len(NAMES)])
+        short = {"duration": min(scenario.duration, LENGTH), "faults": ()}
+        recording = record(scenario.model_copy(update=short), 5800 + seed)
+    with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        write("recording", "csv", recording, Path(folder) / "run")
+        made = drafted(inspect_log([Path(folder) / "run"])[0], "right", "right.toml")
+    return [f"seed {seed}: {text}" for text in (made.missing, *(r.what for r in made.readings)) if text]
+
+
+def _part(number: int) -> list[str]:
+    return [text for k in range(LOGS) for text in readings_of(LOGS * number + k)]
+
+
+def parts() -> Mapping[str, Callable[[], Any]]:
+    """Twenty logs each."""
+    return {f"logs {LOGS * k} to {LOGS * (k + 1) - 1}": partial(_part, k) for k in range(PARTS)}
+
+
+def rows(found: Mapping[str, Any]) -> Iterator[tuple[str, str, str, bool]]:
+    """A row for all logs."""
+    wrong = [text for part in found.values() for text in part]
+    figure = f"{len(wrong)} other readings in {LOGS * len(found)} logs"
+    yield "logs that are right", "; ".join([figure, *wrong])[:300], "0 other readings", not wrong
