@@ -18,8 +18,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-
-from simnav.types import Array
+from numpy.typing import NDArray
 
 __all__ = ["filled", "length", "structure"]
 
@@ -49,7 +48,7 @@ def length(kind: np.dtype[Any]) -> int:
     return kind.itemsize // 8
 
 
-def filled(kind: np.dtype[Any], **values: Any) -> Array:
+def filled(kind: np.dtype[Any], **values: Any) -> NDArray[np.float64]:
     """An array that holds a structure with these values; what is not named is zero.
 
     Examples

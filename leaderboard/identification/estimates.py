@@ -259,7 +259,7 @@ def enlarged(scenario: Scenario, instruments: Instruments, names: Iterable[str])
     table = _Table(scenario)
     for name in names:
         sheet = getattr(instruments.imu, name) if name in _TRIADS else instruments[name]
-        size = sheet.bias_instability
+        size: Any = sheet.bias_instability
         table.put(name, "bias_instability", size if name in _TRIADS else dict(enumerate(size.tolist())))
         table.put(name, "correlation_time", sheet.correlation_time)
     return table.finished()

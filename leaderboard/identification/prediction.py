@@ -136,6 +136,7 @@ class Predictions:
         assert truth is not None
         for time, estimate in likelihood.estimates(assumed):
             row = int(np.argmin(np.abs(truth.time - time)))
+            assert estimate.position is not None
             error = relative_position(estimate.position[None], truth.position[row : row + 1])[0, :2]
             if estimate.covariance is not None and np.isfinite(error).all() and abs(truth.time[row] - time) < 0.5:
                 yield error, estimate.covariance[:2, :2]

@@ -199,7 +199,7 @@ class _Used:
 
 def _used(scenario: Scenario, predictions: Predictions, fitted: Fitted, changes: dict[str, dict[str, Any]]) -> _Used:
     """The figures with which positions after a time without fixes are the most likely: all, or without some of them."""
-    tries = []
+    tries: list[Any] = []
     for left_out, some in (
         ("", changes),
         ("lever arms and delays", without(changes, PLACES)),

@@ -108,7 +108,7 @@ def _track(recording: Recording) -> Array:
         trial = run_trial(make("ekf" if recording.instruments.imu is not None else "ship-ekf"), recording)
         own = np.vstack([recording.start.attitude, trial.attitude])
         angles = np.where(np.isfinite(angles).all(axis=0), angles, own)  # whole columns: two sources would jump
-    known = np.isfinite(place).all(axis=1) & np.isfinite(angles).all(axis=1)
+    known: Any = np.isfinite(place).all(axis=1) & np.isfinite(angles).all(axis=1)
     if known.sum() < _LEAST or not known[0]:
         raise SpecError(f"{recording.scenario}: the reference has {known.sum()} poses; a track needs {_LEAST} or more")
     time, place, angles = time[known], place[known], angles[known]

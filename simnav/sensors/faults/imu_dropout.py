@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import ClassVar, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,8 +34,9 @@ class ImuDropout(ImuFaultSpec):
 
     def build(self, index: int, seed: int, occurrence: int | None = None) -> FaultLayer:
         """See `FaultSpec.build`."""
-        layer = {"last": HeldSamples, "zero": _ZeroSamples, "missing": _MissingSamples}[self.output]
-        return layer(self, index, seed, self.key_of_streams(index, occurrence))
+        layer: Any = {"last": HeldSamples, "zero": _ZeroSamples, "missing": _MissingSamples}[self.output]
+        made: FaultLayer = layer(self, index, seed, self.key_of_streams(index, occurrence))
+        return made
 
 
 class HeldSamples(ReplacedSamples):
@@ -51,7 +52,7 @@ class HeldSamples(ReplacedSamples):
 
     def __init__(self, spec: FaultSpec, index: int, seed: int, key: str, columns: tuple[int, ...] = tuple(range(6))):
         super().__init__(spec, index, seed, key)
-        self._columns = list(columns)
+        self._columns = np.array(columns)
         self._before: Array | None = None
         self._held: tuple[int, Array] | None = None
 

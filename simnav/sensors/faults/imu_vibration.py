@@ -54,7 +54,7 @@ class _Vibration(AddedErrors):
         self._phase = self.rng("phase").uniform(0.0, 2.0 * pi, 3)
 
     def errors(self, since: Array, length: Array) -> Array:
-        error = self._rectified[None].repeat(len(since), axis=0)
+        error: Array = self._rectified[None].repeat(len(since), axis=0)
         end, begin = (np.cos(self._turns * t[:, None] + self._phase) for t in (since, since - length))
         error[:, 3:] += self._amplitude * (begin - end) / (self._turns * length[:, None])
         return error
