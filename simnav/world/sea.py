@@ -61,7 +61,7 @@ class Sea(Spec):
     components : int
         Number of components, each of the same energy.
     spectrum_end : float or None
-        Highest frequency of the components over that of the peak [-]. None: 99.9 % of the energy is below it (5.4 for
+        Highest frequency of the components over that of the peak [-]. None: 99.9 % of the energy is below it (5.3 for
         JONSWAP with peakedness 3.3, 5.9 for Pierson-Moskowitz).
     heave_period, roll_period, pitch_period : float
         Natural periods of the responses [s].
