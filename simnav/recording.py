@@ -508,9 +508,7 @@ def _instruments(sheets: Mapping[str, Any], step: float) -> Instruments:
     """The datasheets from their dictionaries: the inverse of `_sheets`."""
     imu = sheets["imu"]
     if imu is not None:
-        triads = {
-            n: TriadDatasheet(**{k: tuple(v) if k == "assumed" else v for k, v in imu[n].items()}) for n in _TRIADS
-        }
+        triads = {n: TriadDatasheet(**{**imu[n], "assumed": tuple(imu[n].get("assumed", ()))}) for n in _TRIADS}
         imu = ImuDatasheet(**{**imu, **triads})
     aids = []
     for aid in sheets["aids"]:
