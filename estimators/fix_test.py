@@ -20,11 +20,10 @@ from typing import NamedTuple
 from simnav.compiled import kernel
 from simnav.estimators.algebra.chi_square import chi_square_limits, normal_quantile
 from simnav.geometry.earth import radii_scalar
-from simnav.kernel_types import Vector
 from simnav.kinds import kinds_with
 from simnav.types import Array, Datasheet, Estimate, Instruments, Measurement, Measurements
 
-from .persistence import add_innovation, begun, is_correlated, is_large
+from .persistence import Courses, add_innovation, is_correlated, is_large, no_innovations
 
 __all__ = ["FixTest"]
 
@@ -37,7 +36,7 @@ def _judge(
     estimated: tuple[float, float],
     measured: tuple[float, float],
     limits: tuple[float, float, float],
-    course: Vector,
+    course: Courses,
 ) -> int:
     """Whether the fixes of a receiver are off in one direction; -1 if this one cannot be compared.
 
@@ -53,8 +52,8 @@ def _judge(
         Variances of the estimate and of a fix, north and east [m^2].
     limits : (float, float, float)
         Limit of chi-square for one fix; normal quantiles of a direction, and of too large a distance.
-    course : array
-        The course of the receiver (`simnav.estimators.persistence`); updated.
+    course : Courses
+        The course of the receiver; updated.
     """
     north, east = antenna
     limit, persistent, large = limits
@@ -64,14 +63,14 @@ def _judge(
     u, v = north / sqrt(estimated[0] + measured[0]), east / sqrt(estimated[1] + measured[1])
     if not isfinite(u + v):
         return -1
-    add_innovation(course, u, v, 0.0, 2, fix[0], u * u + v * v > limit)
-    return 1 if is_correlated(course, persistent) and is_large(course, large) else 0
+    add_innovation(course, 0, u, v, 0.0, 2, fix[0], u * u + v * v > limit)
+    return 1 if is_correlated(course, 0, persistent) and is_large(course, 0, large) else 0
 
 
 class _Receiver(NamedTuple):
     """A receiver: the horizontal lever arm, forward and starboard [m], and the variances of a fix [m^2]."""
 
-    course: Array
+    course: Courses
     forward: float
     starboard: float
     north: float
@@ -161,4 +160,4 @@ def _receiver(sheet: Datasheet) -> _Receiver:
     if isfinite(sheet.correlation_time):
         variance = variance + sheet.bias_instability**2
     forward, starboard, _ = sheet.lever_arm.tolist()
-    return _Receiver(begun(1)[0], forward, starboard, float(variance[0]), float(variance[1]))
+    return _Receiver(no_innovations(1), forward, starboard, float(variance[0]), float(variance[1]))

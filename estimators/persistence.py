@@ -15,69 +15,17 @@ from math import sqrt
 import numpy as np
 
 from simnav.compiled import helper
-from simnav.types import Array
+from simnav.kernel_types import FlagVector, Matrix, Vector
+from simnav.records import Record
 
-__all__ = ["COURSE", "TIME", "Course", "add_innovation", "begun", "is_correlated", "is_directed", "is_large"]
+__all__ = ["Courses", "add_innovation", "is_correlated", "is_directed", "is_large", "no_innovations"]
 
 #: Memory of a course [innovations].
 MEMORY = 20
-#: Places in the array of a course: time of the last innovation [s], its three components, their number, and whether it
-#: failed its test; the fading sums of products, of their squares, of squares, and of components; of the present run,
-#: number of pairs and sum of their cosines. And the length of the array.
-TIME, BEFORE, COUNT, FAILED, PRODUCT, SQUARE, SQUARES, FREEDOM, PAIRS, COSINES, COURSE = 0, 1, *range(4, 13)
 
 
-def begun(count: int, more: int = 0) -> Array:
-    """(count, COURSE + more) array: courses without innovations, each with so many further zeros."""
-    courses = np.zeros((count, COURSE + more))
-    courses[:, TIME], courses[:, COUNT] = -np.inf, 1.0
-    return courses
-
-
-@helper
-def add_innovation(course: Array, u0: float, u1: float, u2: float, count: int, time: float, failed: bool) -> None:
-    """Do `Course.add` on the array of a course."""
-    b0, b1, b2 = course[BEFORE], course[BEFORE + 1], course[BEFORE + 2]
-    fading = 1.0 - 1.0 / MEMORY
-    p0, p1, p2 = u0 * b0, u1 * b1, u2 * b2
-    course[PRODUCT] = fading * course[PRODUCT] + p0 + p1 + p2
-    course[SQUARE] = fading * course[SQUARE] + p0 * p0 + p1 * p1 + p2 * p2
-    course[SQUARES] = fading * course[SQUARES] + u0 * u0 + u1 * u1 + u2 * u2
-    course[FREEDOM] = fading * course[FREEDOM] + count
-    if failed and course[FAILED] > 0.0:
-        course[PAIRS] += 1.0
-        course[COSINES] += (p0 + p1 + p2) / sqrt((u0 * u0 + u1 * u1 + u2 * u2) * (b0 * b0 + b1 * b1 + b2 * b2))
-    else:
-        course[PAIRS], course[COSINES] = 0.0, 0.0
-    course[BEFORE], course[BEFORE + 1], course[BEFORE + 2], course[TIME] = u0, u1, u2, time
-    course[FAILED], course[COUNT] = 1.0 if failed else 0.0, count
-
-
-@helper
-def is_correlated(course: Array, quantile: float) -> bool:
-    """Do `Course.correlated` on the array of a course."""
-    found: bool = course[PRODUCT] > 0.0 and course[PRODUCT] * course[PRODUCT] > quantile * quantile * course[SQUARE]
-    return found
-
-
-@helper
-def is_directed(course: Array, quantile: float) -> bool:
-    """Do `Course.directed` on the array of a course."""
-    found: bool = course[PAIRS] > 0.0 and course[COSINES] * sqrt(course[COUNT] / course[PAIRS]) > quantile
-    return found
-
-
-@helper
-def is_large(course: Array, quantile: float) -> bool:
-    """Do `Course.large` on the array of a course."""
-    spread = 2.0 / (9.0 * course[FREEDOM])
-    root = 1.0 - spread + quantile * sqrt(spread)
-    found: bool = course[SQUARES] > course[FREEDOM] * (root * root * root)
-    return found
-
-
-class Course:
-    """The recent innovations of one instrument, standardised by ``H P H' + R`` with the datasheet's noise R.
+class Courses(Record):
+    """The recent innovations of i instruments, standardised by ``H P H' + R`` with the datasheet's noise R.
 
     The sums fade with a memory of `MEMORY` innovations. With the product p of a component in two successive
     innovations, ``sum(p) / sqrt(sum(p^2))`` over all components is about standard normal if the innovations are
@@ -90,43 +38,103 @@ class Course:
 
     Attributes
     ----------
-    array : (COURSE,) array
-        Its numbers, in the order of the constants of this module.
+    time : (i,) array
+        Time of the last innovation [s].
+    before : (i, 3) array
+        Its components, with zeros up to three.
+    components : (i,) array
+        Their number.
+    failed : (i,) array of bool
+        Whether it failed its chi-square test.
+    product, product_squared, squares, freedom : (i,) arrays
+        Fading sums: of p, of p^2, of the squared components, and of the numbers of components.
+    pairs, cosines : (i,) arrays
+        Of the present run: number of pairs, and sum of their cosines.
     """
 
-    __slots__ = ("array",)
+    time: Vector
+    before: Matrix
+    components: Vector
+    failed: FlagVector
+    product: Vector
+    product_squared: Vector
+    squares: Vector
+    freedom: Vector
+    pairs: Vector
+    cosines: Vector
 
-    def __init__(self) -> None:
-        self.array = begun(1)[0]
 
-    def add(self, components: tuple[float, float, float], count: int, time: float, failed: bool = False) -> None:
-        """Add an innovation.
+def no_innovations(count: int) -> Courses:
+    """The courses of so many instruments, before their first innovations."""
+    sums = {name: np.zeros(count) for name in ("product", "product_squared", "squares", "freedom", "pairs", "cosines")}
+    return Courses(
+        time=np.full(count, -np.inf), before=np.zeros((count, 3)), components=np.ones(count),
+        failed=np.zeros(count, np.bool_), **sums,
+    )  # fmt: skip
 
-        Parameters
-        ----------
-        components : (float, float, float)
-            Standardised components, with zeros up to three.
-        count : int
-            Number of components.
-        time : float
-            Time [s].
-        failed : bool
-            Whether the innovation has failed its chi-square test.
-        """
-        add_innovation(self.array, *components, count, time, failed)
 
-    def correlated(self, quantile: float) -> bool:
-        """Whether successive innovations have a correlation above zero, by a quantile of the normal distribution."""
-        return bool(is_correlated(self.array, quantile))
+@helper
+def add_innovation(
+    courses: Courses, i: int, u0: float, u1: float, u2: float, count: int, time: float, failed: bool
+) -> None:
+    """Add an innovation of instrument i to its course.
 
-    def directed(self, quantile: float) -> bool:
-        """Whether the innovations of the present run have a common direction, by a normal quantile."""
-        return bool(is_directed(self.array, quantile))
+    Parameters
+    ----------
+    courses : Courses
+        Updated.
+    i : int
+        The instrument.
+    u0, u1, u2 : float
+        Standardised components, with zeros up to three.
+    count : int
+        Number of components.
+    time : float
+        Time [s].
+    failed : bool
+        Whether the innovation has failed its chi-square test.
+    """
+    before, fading = courses.before[i], 1.0 - 1.0 / MEMORY
+    b0, b1, b2 = before[0], before[1], before[2]
+    p0, p1, p2 = u0 * b0, u1 * b1, u2 * b2
+    courses.product[i] = fading * courses.product[i] + p0 + p1 + p2
+    courses.product_squared[i] = fading * courses.product_squared[i] + p0 * p0 + p1 * p1 + p2 * p2
+    courses.squares[i] = fading * courses.squares[i] + u0 * u0 + u1 * u1 + u2 * u2
+    courses.freedom[i] = fading * courses.freedom[i] + count
+    if failed and courses.failed[i]:
+        courses.pairs[i] += 1.0
+        courses.cosines[i] += (p0 + p1 + p2) / sqrt((u0 * u0 + u1 * u1 + u2 * u2) * (b0 * b0 + b1 * b1 + b2 * b2))
+    else:
+        courses.pairs[i], courses.cosines[i] = 0.0, 0.0
+    before[0], before[1], before[2] = u0, u1, u2
+    courses.time[i], courses.failed[i], courses.components[i] = time, failed, count
 
-    def large(self, quantile: float) -> bool:
-        """Whether the squares are too large for R and H P H', by a quantile of the normal distribution.
 
-        The limit of chi-square follows from it by the approximation of E. B. Wilson and M. M. Hilferty, *The
-        distribution of chi-square*, PNAS 17, 1931.
-        """
-        return bool(is_large(self.array, quantile))
+@helper
+def is_correlated(courses: Courses, i: int, quantile: float) -> bool:
+    """Whether successive innovations have a correlation above zero, by a quantile of the normal distribution."""
+    total = courses.product[i]
+    found: bool = total > 0.0 and total * total > quantile * quantile * courses.product_squared[i]
+    return found
+
+
+@helper
+def is_directed(courses: Courses, i: int, quantile: float) -> bool:
+    """Whether the innovations of the present run have a common direction, by a normal quantile."""
+    pairs = courses.pairs[i]
+    found: bool = pairs > 0.0 and courses.cosines[i] * sqrt(courses.components[i] / pairs) > quantile
+    return found
+
+
+@helper
+def is_large(courses: Courses, i: int, quantile: float) -> bool:
+    """Whether the squares are too large for R and H P H', by a quantile of the normal distribution.
+
+    The limit of chi-square follows from it by the approximation of E. B. Wilson and M. M. Hilferty, *The
+    distribution of chi-square*, PNAS 17, 1931.
+    """
+    freedom = courses.freedom[i]
+    spread = 2.0 / (9.0 * freedom)
+    root = 1.0 - spread + quantile * sqrt(spread)
+    found: bool = courses.squares[i] > freedom * (root * root * root)
+    return found

@@ -84,12 +84,13 @@ def site(request: SiteRequest) -> SiteReport:
     ranking = ranked(found, tracks=own, requested=requested.read(request.results))
     correlations = () if request.against is None else tuple(rank_correlations(ranking, rank(request.against)))
     output = absolute(request.output)
+    by_trouble = profiles(found, tracks=own)
     index = build(
         found, ranking, output, home=linked_from(output, request.docs), progress=request.progress, workers=processes,
         papers=pages_in(Path(request.papers)), runs_shown=shown, figures=request.figures, seeds=seeds,
-        sweeps=[*swept.sweeps_in(Path(request.sweeps)), *stored_sweeps(found)],
+        sweeps=[*swept.sweeps_in(Path(request.sweeps)), *stored_sweeps(found)], profiles=by_trouble,
     )  # fmt: skip
-    return SiteReport(index, found, ranking, correlations, profiles(found, tracks=own))
+    return SiteReport(index, found, ranking, correlations, by_trouble)
 
 
 @dataclass(frozen=True)

@@ -90,7 +90,7 @@ class SiteRequest:
         help="Documentation that the pages link to: a web address, or the folder that 'make docs' built.",
         more="Without that folder, the pages link to the address that this installation of simnav names, if any.",
     )
-    runs_shown: int = option(default=2, help="Runs of each scenario of which the site has track and errors.", least=1)
+    runs_shown: int = option(default=1, help="Runs of each scenario of which the site has track and errors.", least=1)
     figures: bool = option("--print", default=False, help="Write the charts as SVG and PNG, too.")
     against: PathLike | None = option(
         default=None, metavar="FOLDER", help="Results of another campaign, for the rank correlation."

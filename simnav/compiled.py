@@ -308,7 +308,7 @@ def _value_text(value: Any) -> list[str]:
         return [f"{value.dtype}{value.shape}", value.tobytes().hex()]
     if isinstance(value, tuple):
         return [type(value).__name__, *(t for v in value for t in _value_text(v)), ")"]
-    if isinstance(value, (bool, int, float, complex, str, bytes, np.generic)):
+    if isinstance(value, (bool, int, float, complex, str, bytes, np.generic, np.dtype)):
         return [f"{type(value).__name__} {value!r}"]
     plain = getattr(value, "py_func", None)  # a function compiled by Numba directly
     if isinstance(plain, types.FunctionType):

@@ -53,6 +53,11 @@ class WithoutCompiler(_Cache):  # type: ignore[misc]
         with self._guard_against_spurious_io_errors():
             return self._load_overload(sig, target_context)
 
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Not a helper that takes functions: no other process has the same ones, and finds it."""
+        if not any(isinstance(kind, types.Dispatcher) for kind in getattr(sig, "args", sig)):
+            super().save_overload(sig, data)
+
 
 class WithDigests(_Files):  # type: ignore[misc]
     """Index and data file of a kernel, with their digests at the end. Pickle does not read what follows an object."""

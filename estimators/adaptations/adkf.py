@@ -10,8 +10,9 @@ import numpy as np
 
 from simnav.compiled import helper, kernel
 from simnav.estimators.algebra.direct_update import normalised_square
-from simnav.estimators.models.filtering import Prediction
+from simnav.estimators.models.filtering import Prediction, Readings
 from simnav.kernel_types import Matrix, Vector
+from simnav.structures import filled, structure
 from simnav.types import Array, Instruments
 
 from .base import Innovation
@@ -67,13 +68,13 @@ def _published_residual(residual: Vector, predicted: Matrix, noise: Matrix) -> f
     return square / sqrt(trace)
 
 
-#: Places in the settings: whether the statistic is the printed one; the factor function, by its place in `FACTORS`; its
-#: thresholds and its exponent; and the smallest factor.
-PRINTED, FUNCTION, C0, C1, TWO, SMALLEST = range(6)
+#: Whether the statistic is the printed one; which factor function (neither: the exponential one), with its thresholds
+#: and its exponent; and the smallest factor.
+SETTINGS = structure(printed=int, two_segment=int, three_segment=int, c0=float, c1=float, two=float, smallest=float)
 
 
 @kernel(passed=True)
-def adkf_noise(settings: Vector, memory: Vector, shared: Vector, prediction: Prediction) -> float:
+def adkf_noise(settings: Vector, memory: Vector, readings: Readings, k: int, prediction: Prediction) -> float:
     """Divide the nominal noise by the factor of the residual statistic (`AdaptiveFactor`).
 
     Returns
@@ -81,28 +82,23 @@ def adkf_noise(settings: Vector, memory: Vector, shared: Vector, prediction: Pre
     float
         The factor; 0 if S is singular, and then the noise is the nominal one.
     """
-    innovation, predicted, nominal, noise = (
-        prediction.innovation,
-        prediction.predicted,
-        prediction.nominal,
-        prediction.noise,
-    )
+    innovation, _, predicted, nominal, noise = prediction
+    own = settings.view(SETTINGS)[0]
     copied(nominal, noise)
-    if settings[PRINTED] > 0.0:
+    if own.printed:
         statistic = _published_residual(innovation, predicted, nominal)
     else:
         nis = normalised_square(innovation, predicted, nominal)
         if nis < 0.0:
             return 0.0
         statistic = sqrt(nis / innovation.size)
-    c0, c1, two, smallest = settings[C0], settings[C1], settings[TWO], float(settings[SMALLEST])
-    if settings[FUNCTION] == 0.0:
-        factor = two_segment(statistic, c0, c1)
-    elif settings[FUNCTION] == 1.0:
-        factor = three_segment(statistic, c0, c1, two)
+    if own.two_segment:
+        factor = two_segment(statistic, own.c0, own.c1)
+    elif own.three_segment:
+        factor = three_segment(statistic, own.c0, own.c1, own.two)
     else:
-        factor = exponential(statistic, c0, c1, two)
-    factor = max(factor, smallest)
+        factor = exponential(statistic, own.c0, own.c1, own.two)
+    factor = max(factor, float(own.smallest))
     if factor != 1.0:
         for i in range(innovation.size):
             for j in range(innovation.size):
@@ -197,7 +193,7 @@ class AdaptiveFactor(NoiseAdaptation):
         self.c1 = PRESETS[preset].c1 if c1 is None else c1
         if not (self.c0 > 0.0 and (factor != "three-segment" or self.c1 > self.c0)):
             raise ValueError(f"c0 = {self.c0:g} and c1 = {self.c1:g}: it must be 0 < c0 < c1")
-        self.function, self.factor = list(FACTORS).index(factor), FACTORS[factor]
+        self.function, self.factor = factor, FACTORS[factor]
         self.together = 0 if self.as_published or target == "P" else together
         self.inflates = target == "P"
         self.inflates_motion = not self.inflates
@@ -212,9 +208,12 @@ class AdaptiveFactor(NoiseAdaptation):
         """As `NoiseAdaptation.ruled`: with the residual statistic and target R."""
         return super().ruled and self.statistic == "residual" and self.target == "R"
 
-    def settings_of(self, longer: float) -> list[float]:
+    def settings_of(self, longer: float) -> Array:
         """As `NoiseAdaptation.settings_of`."""
-        return [self.as_published, self.function, self.c0, self.c1, 2.0, self.SMALLEST]
+        return filled(
+            SETTINGS, printed=self.as_published, two_segment=self.function == "two-segment",
+            three_segment=self.function == "three-segment", c0=self.c0, c1=self.c1, two=2.0, smallest=self.SMALLEST,
+        )  # fmt: skip
 
     def choose(self, innovation: Innovation) -> Array:
         """The noise to use: R divided by the factor if R is the target. Otherwise sets the inflation of P."""

@@ -13,11 +13,12 @@ import numpy as np
 
 from simnav.compiled import kernel
 from simnav.estimators.models.filtering import Prediction, Readings
-from simnav.kernel_types import FlagMatrix, FlagVector, IntegerMatrix, IntegerVector, Matrix, Vector
+from simnav.kernel_types import FlagVector, IntegerVector, Matrix, Vector
 from simnav.records import Record
+from simnav.types import Instruments
 
-from .prediction import BLAMED, HAS_PASSED, IS_DISTURBED, IS_WRONG, joint_inflation, judge_prediction
-from .rules import INFLATION, REJECT, TIME, copied
+from .prediction import PredictionTest, TestedPrediction, joint_inflation, judge_prediction
+from .rules import copied
 
 __all__ = ["Choice", "choose_noise", "keep_nominal", "no_choice"]
 
@@ -33,8 +34,6 @@ class Choice(Record):
         Whether the rule estimates the noise, so that the last one stands while a prediction is poor.
     inflates_disturbed : bool
         Whether the covariance of a disturbed prediction is inflated.
-    tests : bool
-        Whether the prediction is tested.
     index : (i,) array of int
         Index of each instrument of the filter among those of the run.
     in_scope : (i,) array of bool
@@ -47,29 +46,23 @@ class Choice(Record):
         The memories of all instruments, one after the other.
     first : (j + 1,) array of int
         Index of the first element of each memory.
-    shared : array
-        What all instruments share (`simnav.estimators.adaptations.rules`).
-    limits, sort, recent, witness, memory, kept : arrays
-        Settings and memory of the test (`simnav.estimators.adaptations.prediction.judge_prediction`).
+    before : (1,) array
+        Time of the last reading for which the rule was asked [s]; NaN before the first.
+    tested : TestedPrediction
+        The tests of the prediction.
     """
 
-    rule: Callable[[Vector, Vector, Vector, Prediction], float]
+    rule: Callable[[Vector, Vector, Readings, int, Prediction], float]
     estimates: bool
     inflates_disturbed: bool
-    tests: bool
     index: IntegerVector
     in_scope: FlagVector
     last: Matrix
     settings: Matrix
     memories: Vector
     first: IntegerVector
-    shared: Vector
-    limits: Vector
-    sort: IntegerMatrix
-    recent: Vector
-    witness: FlagMatrix
-    memory: Matrix
-    kept: Vector
+    before: Vector
+    tested: TestedPrediction
 
 
 @kernel
@@ -112,7 +105,7 @@ def choose_noise(choice: Choice, covariance: Matrix, readings: Readings, k: int,
     covariance : (n, n) array
         Covariance of the model's error before the reading.
     readings : Readings
-        Of reading k, ``sigma``, ``reported``, ``inflation``, ``rejected`` and ``wrong`` are set.
+        Of reading k, ``sigma``, ``reported``, ``elapsed``, ``inflation``, ``rejected`` and ``wrong`` are set.
     k : int
         The reading.
     prediction : Prediction
@@ -126,47 +119,40 @@ def choose_noise(choice: Choice, covariance: Matrix, readings: Readings, k: int,
     copied(nominal, noise)
     if not has_noise(nominal):
         return
-    judged = 0
-    if choice.tests:
-        known = choice.sort, choice.recent, choice.witness
-        judged = judge_prediction(
-            innovation, predicted, nominal, i, readings.time[k], choice.limits, known, choice.memory
-        )
-    if judged & HAS_PASSED:
-        choice.kept[BLAMED] = 0.0
-    if judged & IS_WRONG:
-        readings.wrong[k] = True
-        if judged & IS_DISTURBED and choice.inflates_disturbed:
-            readings.inflation[k] = joint_inflation(
-                innovation, predicted, nominal, covariance, choice.limits, choice.kept
-            )
-    elif choice.in_scope[row]:
+    tested, wrong = choice.tested, False
+    if tested.tests:
+        judged = judge_prediction(innovation, predicted, nominal, i, readings.time[k], tested)
+        wrong = judged.wrong
+        if judged.passed:
+            tested.blamed[0] = 0.0
+        if judged.disturbed and choice.inflates_disturbed:
+            readings.inflation[k] = joint_inflation(innovation, predicted, nominal, covariance, tested)
+    readings.wrong[k] = wrong
+    if not wrong and choice.in_scope[row]:
         if choice.estimates and is_poor(predicted, nominal, last):
             if last[0] > 0.0:
                 copied(last[: m * m].reshape((m, m)), noise)
         else:
-            shared, memory = choice.shared, choice.memories[choice.first[i] : choice.first[i + 1]]
-            shared[TIME], shared[INFLATION], shared[REJECT] = readings.time[k], 1.0, 0.0
-            readings.reported[k] = choice.rule(choice.settings[i], memory, shared, prediction)
-            readings.inflation[k], readings.rejected[k] = shared[INFLATION], shared[REJECT] > 0.0
+            readings.elapsed[k] = readings.time[k] - choice.before[0]
+            choice.before[0] = readings.time[k]
+            memory = choice.memories[choice.first[i] : choice.first[i + 1]]
+            readings.reported[k] = choice.rule(choice.settings[i], memory, readings, k, prediction)
             if readings.rejected[k]:
                 return
     remember(noise, last, readings.sigma[k])
 
 
 @kernel(passed=True)
-def keep_nominal(settings: Vector, memory: Vector, shared: Vector, prediction: Prediction) -> float:
+def keep_nominal(settings: Vector, memory: Vector, readings: Readings, k: int, prediction: Prediction) -> float:
     """The rule that uses the noise of the datasheet."""
-    nominal, noise = prediction.nominal, prediction.noise
-    copied(nominal, noise)
+    copied(prediction.nominal, prediction.noise)
     return 0.0
 
 
 def no_choice() -> Choice:
     """What a filter without an adaptation hands over in its place."""
     return Choice(
-        rule=keep_nominal, estimates=False, inflates_disturbed=False, tests=False, index=np.empty(0, np.int64),
+        rule=keep_nominal, estimates=False, inflates_disturbed=False, index=np.empty(0, np.int64),
         in_scope=np.empty(0, np.bool_), last=np.empty((0, 9)), settings=np.empty((0, 0)), memories=np.empty(0),
-        first=np.empty(0, np.int64), shared=np.empty(0), limits=np.empty(0), sort=np.empty((0, 2), np.int64),
-        recent=np.empty(0), witness=np.empty((0, 0), np.bool_), memory=np.empty((0, 0)), kept=np.empty(0),
+        first=np.empty(0, np.int64), before=np.empty(0), tested=PredictionTest(Instruments()).tested(0),
     )  # fmt: skip

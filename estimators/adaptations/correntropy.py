@@ -9,8 +9,10 @@ import numpy as np
 
 from simnav.compiled import kernel
 from simnav.estimators.algebra.direct_update import posterior
-from simnav.estimators.models.filtering import Prediction
+from simnav.estimators.models.filtering import Prediction, Readings
 from simnav.kernel_types import Matrix, Vector
+from simnav.structures import filled, structure
+from simnav.types import Array
 
 from .noise import WeightedNoise
 
@@ -71,17 +73,17 @@ def correntropy_noise(
     return least
 
 
+#: Bandwidth [sigma], smallest weight, largest number of iterations, and whether the first follows the update.
+SETTINGS = structure(bandwidth=float, smallest=float, iterations=int, from_update=int)
+
+
 @kernel(passed=True)
-def correntropy_rule(settings: Vector, memory: Vector, shared: Vector, prediction: Prediction) -> float:
-    """Call `correntropy_noise`; settings: bandwidth, smallest weight, iterations, whether it begins with the update."""
-    innovation, predicted, nominal, noise = (
-        prediction.innovation,
-        prediction.predicted,
-        prediction.nominal,
-        prediction.noise,
-    )
+def correntropy_rule(settings: Vector, memory: Vector, readings: Readings, k: int, prediction: Prediction) -> float:
+    """Call `correntropy_noise`."""
+    own = settings.view(SETTINGS)[0]
+    innovation, _, predicted, nominal, noise = prediction
     return correntropy_noise(
-        innovation, predicted, nominal, settings[0], settings[1], int(settings[2]), settings[3] > 0.0, noise
+        innovation, predicted, nominal, own.bandwidth, own.smallest, own.iterations, own.from_update > 0, noise
     )
 
 
@@ -129,6 +131,9 @@ class MaximumCorrentropy(WeightedNoise):
             raise ValueError(f"begin = {begin!r}: it must be 'update' or 'prediction'")
         self.bandwidth, self.iterations, self.smallest, self.begin = bandwidth, iterations, smallest, begin
 
-    def settings_of(self, longer: float) -> list[float]:
+    def settings_of(self, longer: float) -> Array:
         """As `NoiseAdaptation.settings_of`."""
-        return [self.bandwidth, self.smallest, self.iterations, self.begin == "update"]
+        return filled(
+            SETTINGS, bandwidth=self.bandwidth, smallest=self.smallest, iterations=self.iterations,
+            from_update=self.begin == "update",
+        )  # fmt: skip

@@ -5,23 +5,26 @@ from __future__ import annotations
 from math import exp, isnan
 
 from simnav.compiled import kernel
-from simnav.estimators.models.filtering import Prediction
+from simnav.estimators.models.filtering import Prediction, Readings
 from simnav.kernel_types import Vector
+from simnav.structures import filled, structure
+from simnav.types import Array
 
 from .noise import NoiseAdaptation
-from .rules import INFLATION, OWN, TIME, copied
+from .rules import copied
 
 __all__ = ["FadingMemory", "fading_noise"]
 
+#: Time in which the weight of information decreases by a factor of e [s].
+SETTINGS = structure(memory=float)
+
 
 @kernel(passed=True)
-def fading_noise(settings: Vector, memory: Vector, shared: Vector, prediction: Prediction) -> float:
+def fading_noise(settings: Vector, memory: Vector, readings: Readings, k: int, prediction: Prediction) -> float:
     """Inflate P by the time since the last measurement (`FadingMemory`); the noise is the nominal one; 0."""
-    nominal, noise = prediction.nominal, prediction.noise
-    copied(nominal, noise)
-    if not isnan(shared[OWN]):
-        shared[INFLATION] = exp((shared[TIME] - shared[OWN]) / settings[0])
-    shared[OWN] = shared[TIME]
+    copied(prediction.nominal, prediction.noise)
+    if not isnan(readings.elapsed[k]):
+        readings.inflation[k] = exp(readings.elapsed[k] / settings.view(SETTINGS)[0].memory)
     return 0.0
 
 
@@ -47,6 +50,6 @@ class FadingMemory(NoiseAdaptation):
             raise ValueError(f"memory = {memory:g} s: it must be above 0")
         self.memory = memory
 
-    def settings_of(self, longer: float) -> list[float]:
+    def settings_of(self, longer: float) -> Array:
         """As `NoiseAdaptation.settings_of`."""
-        return [self.memory]
+        return filled(SETTINGS, memory=self.memory)

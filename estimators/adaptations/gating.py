@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from math import isnan, nan
+from typing import Any
 
 import numpy as np
 
@@ -10,35 +11,36 @@ from simnav.compiled import kernel
 from simnav.estimators.algebra.chi_square import chi_square_limits
 from simnav.estimators.algebra.direct_update import normalised_square
 from simnav.estimators.models.channels import ChannelDatasheet
-from simnav.estimators.models.filtering import Prediction
+from simnav.estimators.models.filtering import Prediction, Readings
 from simnav.kernel_types import Vector
+from simnav.structures import filled, structure
 from simnav.types import Array, Instruments, Measurement
 
 from .base import Innovation
 from .noise import NoiseAdaptation
-from .rules import REJECT, TIME, copied
+from .rules import copied
 
 __all__ = ["ChiSquareGate", "gate_noise"]
 
-#: Places in the settings: patience [s], and the limits of chi-square for 0 to 3 components; in the memory: time of the
-#: last measurement of the instrument, and the time since which all have failed, NaN if the last one has passed.
-PATIENCE, LIMITS = range(2)
-HEARD, FAILING = range(2)
+#: Patience [s], and the limits of chi-square for 0 to 3 components.
+SETTINGS = structure(patience=float, limits=4)
+#: Time of the last measurement of the instrument [s], and the time since which all have failed; NaN if it has passed.
+MEMORY = structure(heard=float, failing=float)
 
 
 @kernel(passed=True)
-def gate_noise(settings: Vector, memory: Vector, shared: Vector, prediction: Prediction) -> float:
+def gate_noise(settings: Vector, memory: Vector, readings: Readings, k: int, prediction: Prediction) -> float:
     """Make the test of `ChiSquareGate`, without the witnesses among channels; 1 if it fails, else 0."""
+    gate, instrument = settings.view(SETTINGS)[0], memory.view(MEMORY)[0]
     copied(prediction.nominal, prediction.noise)
-    time = memory[HEARD] = shared[TIME]
+    time = instrument.heard = readings.time[k]
     square = normalised_square(prediction.innovation, prediction.predicted, prediction.nominal)
-    if square <= settings[LIMITS + prediction.innovation.size]:
-        memory[FAILING] = nan
+    if square <= gate.limits[prediction.innovation.size]:
+        instrument.failing = nan
         return 0.0
-    if isnan(memory[FAILING]):
-        memory[FAILING] = time
-    if not time - memory[FAILING] >= settings[PATIENCE]:
-        shared[REJECT] = 1.0
+    if isnan(instrument.failing):
+        instrument.failing = time
+    readings.rejected[k] = not time - instrument.failing >= gate.patience
     return 1.0
 
 
@@ -79,29 +81,28 @@ class ChiSquareGate(NoiseAdaptation):
         """As `NoiseAdaptation.ruled`; the channels of an instrument are counted in Python."""
         return super().ruled and not self._siblings
 
-    def settings_of(self, longer: float) -> list[float]:
+    def settings_of(self, longer: float) -> Array:
         """As `NoiseAdaptation.settings_of`."""
-        return [self.patience, *chi_square_limits(self.probability)]
+        return filled(SETTINGS, patience=self.patience, limits=chi_square_limits(self.probability))
 
     def begun(self, longer: float, m: int) -> Array:
         """As `NoiseAdaptation.begun`."""
-        return np.array([-np.inf, np.nan])
+        return filled(MEMORY, heard=-np.inf, failing=np.nan)
 
     def choose(self, innovation: Innovation) -> Array | None:
         """The nominal noise, or None."""
         if self.ask(gate_noise, innovation, np.empty_like(innovation.noise)) == 0.0:
             return innovation.noise
-        doubted = self.rule_shared[REJECT] == 0.0 and self._doubtful(innovation.measurement)
+        doubted = not self._reading.rejected[0] and self._doubtful(innovation.measurement)
         return innovation.noise if doubted else None
 
-    def _fails(self, name: str) -> bool:
-        since: float = self.memory_of(name)[1][FAILING]
-        return since == since
+    def _memory(self, name: str) -> Any:
+        return self.memory_of(name)[1].view(MEMORY)[0]
 
     def _doubtful(self, measurement: Measurement) -> bool:
         """Whether the filter is doubted, and not a channel: most channels of the instrument fail."""
         siblings = self._siblings.get(measurement.instrument)
         if siblings is None:
             return True
-        heard = [n for n in siblings if measurement.time - self.memory_of(n)[1][HEARD] <= self.patience]
-        return 2 * sum(map(self._fails, heard)) > len(heard)
+        heard = [n for n in siblings if measurement.time - self._memory(n).heard <= self.patience]
+        return 2 * sum(not isnan(self._memory(n).failing) for n in heard) > len(heard)

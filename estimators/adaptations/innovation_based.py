@@ -9,8 +9,9 @@ import numpy as np
 
 from simnav.compiled import helper, kernel
 from simnav.estimators.algebra.direct_update import posterior
-from simnav.estimators.models.filtering import Prediction
+from simnav.estimators.models.filtering import Prediction, Readings
 from simnav.kernel_types import Matrix, Vector
+from simnav.structures import filled, length, structure
 from simnav.types import Array
 
 from .base import Innovation
@@ -154,21 +155,23 @@ def _contradiction(length: int, significance: float) -> tuple[float, float]:
     return float(chdtri(length, 1.0 - significance)) / length, float(chdtri(length, significance)) / length
 
 
-#: Places in the settings: smallest and largest length of the window; bounds v_min and v_max; weight of the new
-#: estimate; whether the newest H P H' is subtracted, the data are residuals, and NumPy bounds the estimate; bounds of
-#: the variance ratios; and from LIMITS on lower and upper limit of a mean square, for the shortest, the middle and the
-#: longest window.
-SHORTEST, LONGEST, LOW, HIGH, FORGETTING, NEWEST, RESIDUAL, FULL, LOWEST, HIGHEST, LIMITS = range(11)
-#: Places in the memory: number of rows so far; whether there is an estimate; its elements (room for 3 by 3), and the
-#: rows of `_push`.
-COUNT, BEGUN, ESTIMATE, ROWS = 0, 1, 2, 11
+#: Smallest and largest length of the window; bounds v_min and v_max; weight of the new estimate; whether the newest
+#: H P H' is subtracted, the data are residuals, and NumPy bounds the estimate; bounds of the variance ratios; lower and
+#: upper limit of a mean square, for the shortest, the middle and the longest window.
+SETTINGS = structure(
+    shortest=int, longest=int, low=float, high=float, forgetting=float, newest=int, residual=int, full=int,
+    lowest=float, highest=float, of_shortest=2, of_middle=2, of_longest=2,
+)  # fmt: skip
+#: Number of rows so far, whether there is an estimate, and its elements. In the memory the rows of `_push` follow.
+MEMORY = structure(count=int, begun=int, estimate=9)
+_HEAD = length(MEMORY)
 
 
 @helper
 def _rows(settings: Array, memory: Array, m: int) -> Array:
     """The ring buffer in the memory."""
-    count, width = int(settings[LONGEST]), m + 3 * m * m
-    return memory[ROWS : ROWS + count * width].reshape((count, width))
+    count, width = settings.view(SETTINGS)[0].longest, m + 3 * m * m
+    return memory[_HEAD : _HEAD + count * width].reshape((count, width))
 
 
 @kernel
@@ -177,25 +180,26 @@ def _remember(settings: Vector, memory: Vector, innovation: Vector, predicted: M
     m = innovation.size
     residual, after = np.empty(m), np.empty((m, m))
     posterior(innovation, predicted, noise, residual, after)
-    _push(_rows(settings, memory, m), int(memory[COUNT]), innovation, residual, -1.0, after)
-    memory[COUNT] += 1.0
+    kept = memory[:_HEAD].view(MEMORY)[0]
+    _push(_rows(settings, memory, m), kept.count, innovation, residual, -1.0, after)
+    kept.count += 1
 
 
 @helper
-def _contradicted(settings: Array, place: int, estimate: Array, nominal: Array, predicted: Array) -> bool:
-    """Whether the innovations contradict the nominal noise in a component, by the limits from a place on."""
-    low, high = settings[place], settings[place + 1]
+def _contradicted(limits: Array, residual: int, estimate: Array, nominal: Array, predicted: Array) -> bool:
+    """Whether the innovations, or residuals, contradict the nominal noise in a component."""
+    low, high = limits[0], limits[1]
     for i in range(nominal.shape[0]):
         noise, prior = nominal[i, i], predicted[i, i]
         # Variance of the squared quantity: an innovation, or a residual, which is R S^-1 times the innovation.
-        variance = noise * noise / (noise + prior) if settings[RESIDUAL] > 0.0 else noise + prior
+        variance = noise * noise / (noise + prior) if residual else noise + prior
         if not low <= 1.0 + (estimate[i, i] - noise) / variance <= high:
             return True
     return False
 
 
 @kernel(passed=True)
-def innovation_noise(settings: Vector, memory: Vector, shared: Vector, prediction: Prediction) -> float:
+def innovation_noise(settings: Vector, memory: Vector, readings: Readings, k: int, prediction: Prediction) -> float:
     """Estimate the noise (`InnovationBased`), and write it into ``noise`` within its bounds, or the nominal one.
 
     Returns
@@ -203,34 +207,28 @@ def innovation_noise(settings: Vector, memory: Vector, shared: Vector, predictio
     float
         Length of the window; its negative if the innovations contradict the nominal noise.
     """
-    innovation, predicted, nominal, noise = (
-        prediction.innovation,
-        prediction.predicted,
-        prediction.nominal,
-        prediction.noise,
-    )
+    innovation, _, predicted, nominal, noise = prediction
     m = innovation.size
+    own, kept = settings.view(SETTINGS)[0], memory[:_HEAD].view(MEMORY)[0]
     rows = _rows(settings, memory, m)
-    if settings[RESIDUAL] == 0.0:
-        _push(rows, int(memory[COUNT]), innovation, innovation, 1.0, predicted)
-        memory[COUNT] += 1.0
-    forgetting = settings[FORGETTING]
-    if memory[BEGUN] == 0.0:
-        memory[BEGUN], forgetting = 1.0, 1.0
-    estimate = memory[ESTIMATE : ESTIMATE + m * m].reshape((m, m))
-    shortest, longest = int(settings[SHORTEST]), int(settings[LONGEST])
-    window = _Window(shortest, longest, settings[LOW], settings[HIGH])
-    newest = settings[NEWEST] > 0.0
-    length = _average(rows, int(memory[COUNT]), predicted, nominal, window, newest, forgetting, estimate)
-    place = LIMITS if length == shortest else LIMITS + 4 if length == longest else LIMITS + 2
-    contradicted = _contradicted(settings, place, estimate, nominal, predicted)
+    if not own.residual:
+        _push(rows, kept.count, innovation, innovation, 1.0, predicted)
+        kept.count += 1
+    forgetting = own.forgetting
+    if not kept.begun:
+        kept.begun, forgetting = 1, 1.0
+    estimate = kept.estimate[: m * m].reshape((m, m))
+    window = _Window(own.shortest, own.longest, own.low, own.high)
+    n = _average(rows, kept.count, predicted, nominal, window, own.newest > 0, forgetting, estimate)
+    limits = own.of_shortest if n == own.shortest else own.of_longest if n == own.longest else own.of_middle
+    contradicted = _contradicted(limits, own.residual, estimate, nominal, predicted)
     if contradicted:
-        bound(estimate, nominal, settings[LOWEST], settings[HIGHEST], noise)
+        bound(estimate, nominal, own.lowest, own.highest, noise)
     else:
         copied(nominal, noise)
-    if settings[RESIDUAL] > 0.0 and settings[FULL] == 0.0:
+    if own.residual and not own.full:
         _remember(settings, memory, innovation, predicted, noise)
-    return -float(length) if contradicted else float(length)
+    return -float(n) if contradicted else float(n)
 
 
 class InnovationBased(EstimatedNoise):
@@ -303,20 +301,22 @@ class InnovationBased(EstimatedNoise):
         self.source, self.shortest, self.longest = source, shortest, longest
         self.low, self.high, self.forgetting, self.newest = low, high, forgetting, newest
 
-    def settings_of(self, longer: float) -> list[float]:
+    def settings_of(self, longer: float) -> Array:
         """As `EstimatedNoise.settings_of`."""
         shortest, longest = round(self.shortest * longer), round(self.longest * longer)
-        limits = [_contradiction(n, self.significance) for n in (shortest, (shortest + longest) // 2, longest)]
         residual = self.source == "residual"
-        return [
-            shortest, longest, self.low, self.high, 1.0 - (1.0 - self.forgetting) ** (1.0 / longer),
-            self.newest and not residual, residual, self.full,
-            self.lowest * self.lowest, self.highest * self.highest, *limits[0], *limits[1], *limits[2],
-        ]  # fmt: skip
+        return filled(
+            SETTINGS, shortest=shortest, longest=longest, low=self.low, high=self.high,
+            forgetting=1.0 - (1.0 - self.forgetting) ** (1.0 / longer), newest=self.newest and not residual,
+            residual=residual, full=self.full, lowest=self.lowest**2, highest=self.highest**2,
+            of_shortest=_contradiction(shortest, self.significance),
+            of_middle=_contradiction((shortest + longest) // 2, self.significance),
+            of_longest=_contradiction(longest, self.significance),
+        )  # fmt: skip
 
     def begun(self, longer: float, m: int) -> Array:
         """As `EstimatedNoise.begun`: an empty window."""
-        return np.zeros(ROWS + round(self.longest * longer) * (m + 3 * m * m))
+        return np.concatenate([filled(MEMORY), np.zeros(round(self.longest * longer) * (m + 3 * m * m))])
 
     def estimate(self, innovation: Innovation) -> Array:
         """The bounded estimate of a full matrix, or the nominal noise."""
@@ -325,7 +325,7 @@ class InnovationBased(EstimatedNoise):
         found = self.ask(innovation_noise, innovation, np.empty_like(nominal))
         self.report(self._further[m.instrument], self.said(found))
         if found < 0.0:
-            elements = own[1][ESTIMATE : ESTIMATE + nominal.size]
+            elements = own[1][:_HEAD].view(MEMORY)[0].estimate[: nominal.size]
             noise = self.bounded(elements.reshape(nominal.shape), nominal)
         if self.source == "residual":
             _remember(*own, residual, predicted, noise)

@@ -9,13 +9,13 @@ import numpy as np
 
 from simnav.compiled import Kernel, ready
 from simnav.estimators.algebra.direct_update import posterior
-from simnav.estimators.models.filtering import Prediction, room_for
+from simnav.estimators.models.filtering import Prediction, Readings, room_for
 from simnav.types import KINDS, Array, Instruments
 
 from .base import Adaptation, Innovation
 from .choice import Choice, choose_noise
 from .prediction import PredictionTest
-from .rules import INFLATION, OWN, REJECT, TIME, bound, scale
+from .rules import bound, scale
 
 __all__ = ["EstimatedNoise", "NoiseAdaptation", "Posterior", "Scope", "WeightedNoise", "scaled"]
 
@@ -108,7 +108,6 @@ class NoiseAdaptation(Adaptation):
         begun = [self.begun(longer, len(self._labels[name])) for name, longer in self.longer.items()]
         self.rule_first = np.cumsum([0, *map(len, begun)])
         self.rule_memory = np.concatenate([*begun, np.empty(0)])
-        self.rule_shared = np.full(OWN + 1, np.nan)
         self._choice: Choice | None = None
         self._reading = room_for(1)
 
@@ -117,9 +116,9 @@ class NoiseAdaptation(Adaptation):
         """Whether a rule does all that `choose` does, with the parameters of this adaptation."""
         return self.rule is not None
 
-    def settings_of(self, longer: float) -> list[float]:
+    def settings_of(self, longer: float) -> Array:
         """What the rule needs to know of an instrument with so many measurements in a second, at least 1."""
-        return []
+        return np.empty(0)
 
     def begun(self, longer: float, m: int) -> Array:
         """What the rule keeps of an instrument of m components, at the start of a run."""
@@ -143,8 +142,8 @@ class NoiseAdaptation(Adaptation):
             index=np.array([self.index[name] for name in names], dtype=np.int64),
             in_scope=np.array([self.in_scope(sheet.kind) for sheet in sheets], dtype=np.bool_),
             last=np.zeros((len(names), 9)), settings=self.rule_settings.reshape(len(self.index), -1),
-            memories=self.rule_memory, first=self.rule_first, shared=self.rule_shared,
-            **self.prediction.arrays(size),
+            memories=self.rule_memory, first=self.rule_first, before=np.full(1, np.nan),
+            tested=self.prediction.tested(size),
         )  # fmt: skip
 
     def adapt(self, innovation: Innovation) -> Array | None:
@@ -166,10 +165,10 @@ class NoiseAdaptation(Adaptation):
         self.noted(m.instrument, reading.sigma[0].tolist(), float(reading.reported[0]))
         return prediction.noise
 
-    def _ask(self, settings: Array, memory: Array, shared: Array, prediction: Prediction) -> float:
+    def _ask(self, settings: Array, memory: Array, readings: Readings, k: int, prediction: Prediction) -> float:
         """The rule of an adaptation that chooses in Python."""
         chosen = self.choose(self._innovation)
-        shared[INFLATION], shared[REJECT] = self.inflation, chosen is None
+        readings.inflation[k], readings.rejected[k] = self.inflation, chosen is None
         if chosen is not None:
             prediction.noise[...] = chosen
         return 0.0
@@ -177,9 +176,8 @@ class NoiseAdaptation(Adaptation):
     def ask(self, rule: Kernel[..., float], innovation: Innovation, noise: Array) -> float:
         """What a kernel of a rule returns for a measurement; it overwrites the noise."""
         m, residual, predicted, nominal, *_ = innovation
-        shared, prediction = self.rule_shared, Prediction(residual, _NO_CROSS, predicted, nominal, noise)
-        shared[TIME], shared[INFLATION], shared[REJECT] = m.time, 1.0, 0.0
-        return rule(*self.memory_of(m.instrument), shared, prediction)
+        prediction = Prediction(residual, _NO_CROSS, predicted, nominal, noise)
+        return rule(*self.memory_of(m.instrument), self._reading, 0, prediction)
 
     def choose(self, innovation: Innovation) -> Array | None:
         """The (m, m) noise to use, or None to reject the measurement; for an adaptation without a rule."""

@@ -3,23 +3,28 @@
 from __future__ import annotations
 
 from math import sqrt
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from simnav.compiled import helper, kernel
 from simnav.estimators.algebra.chi_square import chi_square_limits, normal_quantile
 from simnav.estimators.models.roles import fixes_and_logs, witnesses
-from simnav.estimators.persistence import COURSE, TIME, add_innovation, begun, is_correlated, is_directed, is_large
-from simnav.kernel_types import FlagMatrix, IntegerMatrix, Matrix, Vector
-from simnav.types import Array, Flags, Instruments, Integers
+from simnav.estimators.persistence import (
+    Courses,
+    add_innovation,
+    is_correlated,
+    is_directed,
+    is_large,
+    no_innovations,
+)
+from simnav.kernel_types import FlagMatrix, FlagVector, IntegerVector, Matrix, Vector
+from simnav.records import Record
+from simnav.types import Instruments
 
 from .base import Innovation
 
-__all__ = [
-    "BLAMED", "HAS_PASSED", "IS_DISTURBED", "IS_WRONG", "PredictionTest", "joint_inflation", "judge_prediction",
-    "standardised",
-]  # fmt: skip
+__all__ = ["Judgement", "PredictionTest", "TestedPrediction", "joint_inflation", "judge_prediction", "standardised"]
 
 
 @kernel
@@ -32,77 +37,131 @@ def standardised(residual: Vector, predicted: Matrix, noise: Matrix) -> tuple[fl
     return u0, u1, u2
 
 
-#: Places in the memory of an instrument, after its course (`simnav.estimators.persistence`): time at which it last
-#: found the prediction wrong, -inf if it no longer does; number of failures in a row of its joint test, and time of the
-#: last test; and whether a log was against it since its innovations persist.
-WRONG, FAILURES, TESTED, CONDEMNED = range(COURSE, COURSE + 4)
-#: Places of the settings: number of joint failures; whether there is an IMU; the normal quantiles of the class; number
-#: of failures between two inflations; and, from LIMITS on, the limits of chi-square for 0 to 3 components.
-TOGETHER, INERTIAL, LARGE, PERSISTENT, WHITE, ALONE, RECENT, ROUND, LIMITS = range(9)
-#: Places of what is kept of inflations: number of failures of the prediction since a joint test was passed; and, from
-#: FIRST on, the variances of the state before the first inflation, or zeros.
-BLAMED, FIRST = range(2)
+class TestedPrediction(Record):
+    """The tests of `PredictionTest` as data, for k instruments and n states.
+
+    Attributes
+    ----------
+    tests : bool
+        Whether a test is made at all.
+    inertial : bool
+        Whether there is an IMU.
+    together : int
+        Number of joint failures in a row after which the prediction is taken as wrong.
+    round : int
+        Number of failures between two inflations.
+    large, persistent, white, alone : float
+        Normal quantiles of the probabilities of `PredictionTest`.
+    joint_time : float
+        Time for which a failure of another instrument counts [s].
+    limits : (4,) array
+        Limits of chi-square for 0 to 3 components.
+    group : (k,) array of int
+        Group of each instrument in the joint test: 0 a log, 1 a fix, -1 none.
+    persistence : (k,) array of bool
+        Whether the test of persistence is made for an instrument.
+    heard : (k,) array
+        Time for which an instrument counts as heard [s].
+    witness : (k, k) array of bool
+        Which others are witnesses of the prediction of an instrument.
+    courses : Courses
+        The recent innovations of the instruments.
+    wrong : (k,) array
+        Time at which an instrument last found the prediction wrong [s]; -inf if it no longer does.
+    failures : (k,) array
+        Number of failures in a row of its joint test.
+    tested : (k,) array
+        Time of its last joint test [s].
+    condemned : (k,) array of bool
+        Whether a log was against it since its innovations persist.
+    blamed : (1,) array
+        Number of failures of the prediction since a joint test was passed.
+    first : (n,) array
+        Variances of the state before the first inflation; zeros before it.
+    """
+
+    tests: bool
+    inertial: bool
+    together: int
+    round: int
+    large: float
+    persistent: float
+    white: float
+    alone: float
+    joint_time: float
+    limits: Vector
+    group: IntegerVector
+    persistence: FlagVector
+    heard: Vector
+    witness: FlagMatrix
+    courses: Courses
+    wrong: Vector
+    failures: Vector
+    tested: Vector
+    condemned: FlagVector
+    blamed: Vector
+    first: Vector
+
+
 #: The largest factor of an inflation, and the largest one of all of them together.
 LARGEST, TOTAL = 100.0, 1e8
-#: What `judge_prediction` says of an innovation: bits of an integer.
-IS_WRONG, IS_DISTURBED, HAS_PASSED = 1, 2, 4
 
 
-@helper
-def _fails_jointly(
-    i: int, time: float, square: float, limit: float, settings: Array, sort: Integers, memory: Array
-) -> int:
-    """Whether instrument i and one of the other group have failed often enough in a row, this time included.
+class Judgement(NamedTuple):
+    """What the tests say of an innovation.
 
-    The statistic is the sum of the squared standardised components of the innovation.
+    Attributes
+    ----------
+    wrong : bool
+        Whether the prediction is taken as wrong.
+    disturbed : bool
+        Whether the joint test has found that: the motion is taken as disturbed.
+    passed : bool
+        Whether the innovation has passed its part of the joint test.
     """
-    memory[i, TESTED] = time
-    if square <= limit:
-        memory[i, FAILURES] = 0.0
-        return HAS_PASSED
-    memory[i, FAILURES] += 1.0
-    if memory[i, FAILURES] >= settings[TOGETHER]:
-        for k in range(sort.shape[0]):
-            often = sort[k, 0] != sort[i, 0] and memory[k, FAILURES] >= settings[TOGETHER]
-            if often and time - memory[k, TESTED] <= settings[RECENT]:
-                return IS_DISTURBED
-    return 0
+
+    wrong: bool
+    disturbed: bool
+    passed: bool
 
 
 @helper
-def _persists(
-    i: int, time: float, settings: Array, sort: Integers, recent: Array, witness: Flags, memory: Array
-) -> bool:
+def _fails_jointly(i: int, time: float, t: TestedPrediction) -> bool:
+    """Count a failure of instrument i, and say whether it and one of the other group have failed often enough."""
+    t.failures[i] += 1.0
+    if t.failures[i] >= t.together:
+        for k in range(t.group.size):
+            often = t.group[k] != t.group[i] and t.failures[k] >= t.together
+            if often and time - t.tested[k] <= t.joint_time:
+                return True
+    return False
+
+
+@helper
+def _persists(i: int, time: float, t: TestedPrediction) -> bool:
     """Whether the innovations of instrument i persist, and no witness is against it."""
     heard, sound = False, False
-    for k in range(recent.size):
-        if witness[i, k] and time - memory[k, TIME] <= recent[k]:
+    for k in range(t.heard.size):
+        if t.witness[i, k] and time - t.courses.time[k] <= t.heard[k]:
             heard = True
-            sound = sound or not is_correlated(memory[k], settings[WHITE])
-    if sort[i, 0] == 0 and not heard and is_directed(memory[i], settings[ALONE]):
+            sound = sound or not is_correlated(t.courses, k, t.white)
+    if t.group[i] == 0 and not heard and is_directed(t.courses, i, t.alone):
         return True
-    persistent = is_correlated(memory[i], settings[PERSISTENT]) and is_large(memory[i], settings[LARGE])
+    persistent = is_correlated(t.courses, i, t.persistent) and is_large(t.courses, i, t.large)
     if not persistent or not heard:
-        memory[i, CONDEMNED] = 0.0
+        t.condemned[i] = False
         return persistent
-    if memory[i, CONDEMNED] > 0.0 or sound:
-        if sort[i, 0] == 1:
-            memory[i, CONDEMNED] = 1.0
+    if t.condemned[i] or sound:
+        if t.group[i] == 1:
+            t.condemned[i] = True
         return False
     return True
 
 
 @kernel
 def judge_prediction(
-    residual: Vector,
-    predicted: Matrix,
-    noise: Matrix,
-    i: int,
-    time: float,
-    settings: Vector,
-    known: tuple[IntegerMatrix, Vector, FlagMatrix],
-    memory: Matrix,
-) -> int:
+    residual: Vector, predicted: Matrix, noise: Matrix, i: int, time: float, t: TestedPrediction
+) -> Judgement:
     """Make the tests of `PredictionTest` for an innovation of m components.
 
     Parameters
@@ -113,63 +172,56 @@ def judge_prediction(
         Index of the instrument among the k instruments; -1 for another one.
     time : float
         Time of the measurement [s].
-    settings : array
-        See `TOGETHER` and the constants after it.
-    known : (k, 2) int, (k,) and (k, k) bool arrays
-        Group of each instrument (0 log, 1 fix, -1 none) and whether the test of persistence is made; time for which it
-        is heard [s]; which others are witnesses of its prediction.
-    memory : (k, ...) array
-        See `WRONG` and the constants after it; updated.
-
-    Returns
-    -------
-    int
-        Sum of `IS_WRONG`, `IS_DISTURBED` and `HAS_PASSED`, the last for the joint test.
+    t : TestedPrediction
+        The tests; what they keep is updated.
     """
-    sort, recent, witness = known
-    if i < 0 or (sort[i, 0] < 0 and sort[i, 1] == 0):
-        for k in range(recent.size):
-            if time - memory[k, WRONG] <= recent[k]:
-                return IS_WRONG
-        return 0
+    if i < 0 or (t.group[i] < 0 and not t.persistence[i]):
+        for k in range(t.heard.size):
+            if time - t.wrong[k] <= t.heard[k]:
+                return Judgement(True, False, False)
+        return Judgement(False, False, False)
     u0, u1, u2 = standardised(residual, predicted, noise)
-    square, limit = u0 * u0 + u1 * u1 + u2 * u2, settings[LIMITS + residual.size]
-    found = 0
-    if sort[i, 0] >= 0:
-        found = _fails_jointly(i, time, square, limit, settings, sort, memory)
-    wrong = found == IS_DISTURBED
-    if sort[i, 1] == 1:
-        add_innovation(memory[i], u0, u1, u2, residual.size, time, square > limit)
-        wrong = _persists(i, time, settings, sort, recent, witness, memory) or wrong
-    memory[i, WRONG] = time if wrong and settings[INERTIAL] > 0.0 else -np.inf
-    return found + IS_WRONG if wrong else found
+    square, limit = u0 * u0 + u1 * u1 + u2 * u2, t.limits[residual.size]
+    disturbed, passed = False, False
+    if t.group[i] >= 0:
+        t.tested[i] = time
+        if square <= limit:
+            t.failures[i], passed = 0.0, True
+        else:
+            disturbed = _fails_jointly(i, time, t)
+    wrong = disturbed
+    if t.persistence[i]:
+        add_innovation(t.courses, i, u0, u1, u2, residual.size, time, square > limit)
+        wrong = _persists(i, time, t) or wrong
+    t.wrong[i] = time if wrong and t.inertial else -np.inf
+    return Judgement(wrong, disturbed, passed)
 
 
 @kernel
-def limited_inflation(inflation: float, covariance: Matrix, kept: Vector) -> float:
+def limited_inflation(inflation: float, covariance: Matrix, first: Vector) -> float:
     """Limit an inflation of P (`PredictionTest.limited`)."""
     if inflation <= 1.0:
         return 1.0
     grown = 0.0
-    begins = kept[FIRST] == 0.0
+    begins = first[0] == 0.0
     for i in range(covariance.shape[0]):
         variance = covariance[i, i]
         if begins:
-            kept[FIRST + i] = max(variance, 1e-30)
-        grown = max(grown, variance / kept[FIRST + i])
+            first[i] = max(variance, 1e-30)
+        grown = max(grown, variance / first[i])
     return max(1.0, min(inflation, LARGEST, TOTAL / grown))
 
 
 @kernel
 def joint_inflation(
-    residual: Vector, predicted: Matrix, noise: Matrix, covariance: Matrix, settings: Vector, kept: Vector
+    residual: Vector, predicted: Matrix, noise: Matrix, covariance: Matrix, t: TestedPrediction
 ) -> float:
     """Count a failure of the prediction, and return the factor on the variances (`PredictionTest.inflation`)."""
-    kept[BLAMED] += 1.0
-    if int(kept[BLAMED] - 1.0) % int(settings[ROUND]) != 0:
+    t.blamed[0] += 1.0
+    if int(t.blamed[0] - 1.0) % t.round != 0:
         return 1.0
     u0, u1, u2 = standardised(residual, predicted, noise)
-    return limited_inflation(0.5 * sqrt((u0 * u0 + u1 * u1 + u2 * u2) / residual.size), covariance, kept)
+    return limited_inflation(0.5 * sqrt((u0 * u0 + u1 * u1 + u2 * u2) / residual.size), covariance, t.first)
 
 
 class PredictionTest:
@@ -184,7 +236,7 @@ class PredictionTest:
     fails, that instrument is wrong; if both fail, the prediction is. Gross errors of both may coincide by chance, so
     both tests must fail ``together`` times in a row. The motion is then taken as disturbed (`disturbed`).
 
-    *Persistence.* The noise of an instrument is white, the error of a state is not (`Course`). The prediction is taken
+    *Persistence.* The noise of an instrument is white, the error of a state is not (`Courses`). The prediction is taken
     as wrong if
 
     - the recent innovations of the instrument are correlated from one to the next, and too large for R and H P H'; and
@@ -204,7 +256,7 @@ class PredictionTest:
     *A log that is left alone.* Fixes that get no weight for some seconds cost little, because the next one restores the
     position. What a log says of a motion is said once: if it gets no weight, the position has lost it. So a log that no
     witness is heard beside is believed as soon as two or more successive innovations fail their tests in about the
-    same direction, which a larger noise does in one case of ten (`Course.directed`). A single gross error is no run.
+    same direction, which a larger noise does in one case of ten (`is_directed`). A single gross error is no run.
 
     *Compasses.* A lasting disagreement of a compass and the gyroscopes alone is that of the compass. But while another
     instrument finds the prediction wrong, so may be the heading, which the same IMU predicts: the compass is believed.
@@ -239,45 +291,41 @@ class PredictionTest:
         if not inertial and len(set(group.values())) < 2:
             group = {}
         against = witnesses(instruments) if together and inertial else {}
-        quantiles = [normal_quantile(p) for p in (probability, self.PERSISTENT, self.WHITE, self.ALONE)]
-        limits = chi_square_limits(probability)
-        self._settings = np.array([together, inertial, *quantiles, self.RECENT, together * len(group), *limits])
-        self.index = {name: i for i, name in enumerate(instruments)}
-        self._known = (
-            np.array([(group.get(n, -1), n in against) for n in instruments], np.int64).reshape(-1, 2),
-            np.array([max(self.RECENT, 3.0 / sheet.rate) for sheet in instruments.values()]),
-            np.array([[other in against.get(n, ()) for other in instruments] for n in instruments], bool),
-        )
-        self._memory = begun(len(instruments), more=4)
-        self._memory[:, WRONG] = -np.inf
-        self._tests = bool(group or against)
-        self._kept = np.zeros(FIRST)
-
-    def arrays(self, n: int) -> dict[str, Any]:
-        """Whether a test is made, the last three arguments of `judge_prediction`, and what is kept for n states."""
-        sort, recent, witness = self._known
-        return {
-            "tests": self._tests, "limits": self._settings, "sort": sort, "recent": recent, "witness": witness,
-            "memory": self._memory, "kept": self._kept_of(n),
+        large, persistent, white, alone = map(normal_quantile, (probability, self.PERSISTENT, self.WHITE, self.ALONE))
+        self.index, count = {name: i for i, name in enumerate(instruments)}, len(instruments)
+        self._first: dict[int, TestedPrediction] = {}
+        self._shared: dict[str, Any] = {
+            "tests": bool(group or against), "inertial": inertial, "together": together,
+            "round": max(together * len(group), 1), "large": large, "persistent": persistent, "white": white,
+            "alone": alone, "joint_time": self.RECENT, "limits": np.array(chi_square_limits(probability)),
+            "group": np.array([group.get(n, -1) for n in instruments], np.int64),
+            "persistence": np.array([n in against for n in instruments], np.bool_),
+            "heard": np.array([max(self.RECENT, 3.0 / sheet.rate) for sheet in instruments.values()], np.float64),
+            "witness": np.array(
+                [[other in against.get(n, ()) for other in instruments] for n in instruments], np.bool_
+            ).reshape(count, count),
+            "courses": no_innovations(count), "wrong": np.full(count, -np.inf), "failures": np.zeros(count),
+            "tested": np.zeros(count), "condemned": np.zeros(count, np.bool_), "blamed": np.zeros(1),
         }  # fmt: skip
 
-    def _kept_of(self, n: int) -> Array:
-        if len(self._kept) == FIRST:
-            self._kept = np.concatenate([self._kept, np.zeros(n)])
-        return self._kept
+    def tested(self, n: int) -> TestedPrediction:
+        """The tests as data, in a filter of n states."""
+        if n not in self._first:
+            self._first[n] = TestedPrediction(first=np.zeros(n), **self._shared)
+        return self._first[n]
 
     def fails(self, innovation: Innovation) -> bool:
         """Whether the prediction of this innovation is taken as wrong, by one of the tests."""
         self.disturbed = False
-        if not self._tests:
+        m, residual, predicted, noise, covariance, _ = innovation
+        tests = self.tested(0 if covariance is None else len(covariance))
+        if not tests.tests:
             return False
-        m, residual, predicted, noise, *_ = innovation
-        i = self.index.get(m.instrument, -1)
-        found = judge_prediction(residual, predicted, noise, i, m.time, self._settings, self._known, self._memory)
-        if found & HAS_PASSED:
-            self._kept[BLAMED] = 0.0
-        self.disturbed = found & IS_DISTURBED > 0
-        return found & IS_WRONG > 0
+        judged = judge_prediction(residual, predicted, noise, self.index.get(m.instrument, -1), m.time, tests)
+        if judged.passed:
+            tests.blamed[0] = 0.0
+        self.disturbed = judged.disturbed
+        return bool(judged.wrong)
 
     def inflation(self, innovation: Innovation) -> float:
         """Factor of P after a failure of the prediction: once for every ``together`` failures.
@@ -288,8 +336,7 @@ class PredictionTest:
         _, residual, predicted, noise, covariance, _ = innovation
         if covariance is None:
             return 1.0
-        kept = self._kept_of(len(covariance))
-        return joint_inflation(residual, predicted, noise, covariance, self._settings, kept)
+        return joint_inflation(residual, predicted, noise, covariance, self.tested(len(covariance)))
 
     def limited(self, inflation: float, innovation: Innovation) -> float:
         """Limit an inflation. Without the limit, the variances of unobserved states would grow without bound.
@@ -298,4 +345,4 @@ class PredictionTest:
         """
         if innovation.covariance is None:
             return 1.0
-        return limited_inflation(inflation, innovation.covariance, self._kept_of(len(innovation.covariance)))
+        return limited_inflation(inflation, innovation.covariance, self.tested(len(innovation.covariance)).first)

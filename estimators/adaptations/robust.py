@@ -6,8 +6,9 @@ from collections.abc import Callable
 from functools import partial
 
 from simnav.compiled import helper, kernel
-from simnav.estimators.models.filtering import Prediction
+from simnav.estimators.models.filtering import Prediction, Readings
 from simnav.kernel_types import Vector
+from simnav.structures import filled, structure
 from simnav.types import Array
 
 from .base import Innovation
@@ -67,33 +68,28 @@ def _weigh(w0: float, w1: float, w2: float, smallest: float, nominal: Array, noi
     return least
 
 
-@kernel(passed=True)
-def huber_noise(settings: Vector, memory: Vector, shared: Vector, prediction: Prediction) -> float:
-    """Divide the nominal noise by Huber's weights; the least. The settings are k and the smallest weight."""
-    innovation, predicted, nominal, noise = (
-        prediction.innovation,
-        prediction.predicted,
-        prediction.nominal,
-        prediction.noise,
-    )
-    u0, u1, u2 = standardised(innovation, predicted, nominal)
-    k = settings[0]
-    return _weigh(huber(u0, k), huber(u1, k), huber(u2, k), settings[1], nominal, noise)
+#: Thresholds of the weights [sigma], the exponent of IGG-III, and the smallest weight.
+HUBER, IGG3 = structure(k=float, smallest=float), structure(k0=float, k1=float, two=float, smallest=float)
 
 
 @kernel(passed=True)
-def igg3_noise(settings: Vector, memory: Vector, shared: Vector, prediction: Prediction) -> float:
-    """Divide the nominal noise by IGG-III weights; the least. The settings are k0, k1, 2 and the smallest weight."""
-    innovation, predicted, nominal, noise = (
-        prediction.innovation,
-        prediction.predicted,
-        prediction.nominal,
-        prediction.noise,
-    )
+def huber_noise(settings: Vector, memory: Vector, readings: Readings, k: int, prediction: Prediction) -> float:
+    """Divide the nominal noise by Huber's weights; the least."""
+    own = settings.view(HUBER)[0]
+    innovation, _, predicted, nominal, noise = prediction
     u0, u1, u2 = standardised(innovation, predicted, nominal)
-    k0, k1, two = settings[0], settings[1], settings[2]
+    return _weigh(huber(u0, own.k), huber(u1, own.k), huber(u2, own.k), own.smallest, nominal, noise)
+
+
+@kernel(passed=True)
+def igg3_noise(settings: Vector, memory: Vector, readings: Readings, k: int, prediction: Prediction) -> float:
+    """Divide the nominal noise by IGG-III weights; the least."""
+    own = settings.view(IGG3)[0]
+    innovation, _, predicted, nominal, noise = prediction
+    u0, u1, u2 = standardised(innovation, predicted, nominal)
+    k0, k1, two = own.k0, own.k1, own.two
     return _weigh(
-        igg3(u0, k0, k1, two), igg3(u1, k0, k1, two), igg3(u2, k0, k1, two), settings[3], nominal, noise
+        igg3(u0, k0, k1, two), igg3(u1, k0, k1, two), igg3(u2, k0, k1, two), own.smallest, nominal, noise
     )  # fmt: skip
 
 
@@ -149,9 +145,9 @@ class HuberWeights(EquivalentWeights):
         super().__init__(partial(_with_huber, k))
         self.k = k
 
-    def settings_of(self, longer: float) -> list[float]:
+    def settings_of(self, longer: float) -> Array:
         """As `NoiseAdaptation.settings_of`."""
-        return [self.k, self.smallest]
+        return filled(HUBER, k=self.k, smallest=self.smallest)
 
 
 class Igg3Weights(EquivalentWeights):
@@ -171,6 +167,6 @@ class Igg3Weights(EquivalentWeights):
         super().__init__(partial(_with_igg3, k0, k1))
         self.k0, self.k1 = k0, k1
 
-    def settings_of(self, longer: float) -> list[float]:
+    def settings_of(self, longer: float) -> Array:
         """As `NoiseAdaptation.settings_of`."""
-        return [self.k0, self.k1, 2.0, self.smallest]
+        return filled(IGG3, k0=self.k0, k1=self.k1, two=2.0, smallest=self.smallest)

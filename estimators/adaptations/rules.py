@@ -1,13 +1,13 @@
 """Rules: the functions by which adaptations choose the noise of a reading.
 
-A rule is called ``rule(settings, memory, shared, prediction)``. It receives its settings and its memory for an
-instrument, what all instruments share, and a `Prediction`: the innovation, H P H' and the nominal R. It updates its
-memory, overwrites ``prediction.noise`` with the noise to be used, and returns a number to be reported, or 0.
-What is shared are the time of the reading [s], the factor on P and the rejection, which the rule may set (before they
-are 1 and 0), and a number of its own, at first NaN.
+A rule is called ``rule(settings, memory, readings, k, prediction)``. It receives its settings and its memory for an
+instrument, the readings of the step with the index k of this one, and a `Prediction`: the innovation, H P H' and the
+nominal R. It updates its memory, overwrites ``prediction.noise`` with the noise to be used, and returns a number to be
+reported, or 0. It may also set ``readings.rejected[k]``, and ``readings.inflation[k]``, the factor on P.
 
-A new rule is one such function, a kernel with ``passed=True`` or plain Python, in a class that says its settings and
-its memory (`simnav.estimators.adaptations.noise.NoiseAdaptation`).
+Settings and memory are structures (`simnav.structures`), so that a rule reads their numbers by name. A new rule is one
+such function, a kernel with ``passed=True`` or plain Python, in a class that says its settings and its memory
+(`simnav.estimators.adaptations.noise.NoiseAdaptation`).
 """
 
 from __future__ import annotations
@@ -17,10 +17,7 @@ from math import sqrt
 from simnav.compiled import kernel
 from simnav.kernel_types import Matrix
 
-__all__ = ["INFLATION", "OWN", "REJECT", "TIME", "bound", "copied", "scale"]
-
-#: Places in what is shared.
-TIME, INFLATION, REJECT, OWN = range(4)
+__all__ = ["bound", "copied", "scale"]
 
 
 @kernel

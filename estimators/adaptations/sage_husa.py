@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from simnav.compiled import kernel
-from simnav.estimators.models.filtering import Prediction
+from simnav.estimators.models.filtering import Prediction, Readings
 from simnav.kernel_types import Vector
+from simnav.structures import filled, structure
 from simnav.types import Array
 
 from .base import Innovation
@@ -15,35 +16,30 @@ from .rules import bound, copied
 
 __all__ = ["SageHusa", "sage_husa_noise"]
 
-
-#: Places in the settings: forgetting factor, and bounds of the variance ratios; in the memory: weight of the estimate
-#: [innovations], whether there is one, and its elements.
-FADING, LOWEST, HIGHEST = range(3)
-COUNT, BEGUN, ESTIMATE = range(3)
+#: Forgetting factor, and bounds of the variance ratios.
+SETTINGS = structure(fading=float, lowest=float, highest=float)
+#: Weight of the estimate [innovations], whether there is one, and its elements.
+MEMORY = structure(count=float, begun=int, estimate=9)
 
 
 @kernel(passed=True)
-def sage_husa_noise(settings: Vector, memory: Vector, shared: Vector, prediction: Prediction) -> float:
+def sage_husa_noise(settings: Vector, memory: Vector, readings: Readings, k: int, prediction: Prediction) -> float:
     """Update the estimate by the recursion of `SageHusa`, and write it into ``noise`` within its bounds; 0."""
-    innovation, predicted, nominal, noise = (
-        prediction.innovation,
-        prediction.predicted,
-        prediction.nominal,
-        prediction.noise,
-    )
+    innovation, _, predicted, nominal, noise = prediction
+    own, kept = settings.view(SETTINGS)[0], memory.view(MEMORY)[0]
     m = innovation.size
-    estimate = memory[ESTIMATE : ESTIMATE + m * m].reshape((m, m))
-    if memory[BEGUN] == 0.0:
-        memory[BEGUN] = 1.0
+    estimate = kept.estimate[: m * m].reshape((m, m))
+    if not kept.begun:
+        kept.begun = 1
         copied(nominal, estimate)
-    memory[COUNT] += 1.0
-    b, k = settings[FADING], memory[COUNT]
-    d = 1.0 / (k + 1.0) if b == 1.0 else (1.0 - b) / (1.0 - b ** (k + 1.0))
+    kept.count += 1.0
+    b, n = own.fading, kept.count
+    d = 1.0 / (n + 1.0) if b == 1.0 else (1.0 - b) / (1.0 - b ** (n + 1.0))
     for i in range(m):
         for j in range(m):
             sample = innovation[i] * innovation[j] - predicted[i, j]
             estimate[i, j] += d * (sample - estimate[i, j])
-    bound(estimate, nominal, settings[LOWEST], settings[HIGHEST], noise)
+    bound(estimate, nominal, own.lowest, own.highest, noise)
     return 0.0
 
 
@@ -90,17 +86,17 @@ class SageHusa(EstimatedNoise):
             raise ValueError(f"prior = {prior}: it must not be negative")
         self.fading, self.prior = fading, prior
 
-    def settings_of(self, longer: float) -> list[float]:
+    def settings_of(self, longer: float) -> Array:
         """As `EstimatedNoise.settings_of`."""
-        return [self.fading ** (1.0 / longer), self.lowest * self.lowest, self.highest * self.highest]
+        return filled(SETTINGS, fading=self.fading ** (1.0 / longer), lowest=self.lowest**2, highest=self.highest**2)
 
     def begun(self, longer: float, m: int) -> Array:
         """As `EstimatedNoise.begun`."""
-        return np.array([round(self.prior * longer), *np.zeros(1 + m * m)])
+        return filled(MEMORY, count=round(self.prior * longer))
 
     def estimate(self, innovation: Innovation) -> Array:
         """The bounded estimate of a full matrix, this innovation included."""
         nominal = innovation.noise
         self.ask(sage_husa_noise, innovation, np.empty_like(nominal))
         _, memory = self.memory_of(innovation.measurement.instrument)
-        return self.bounded(memory[ESTIMATE : ESTIMATE + nominal.size].reshape(nominal.shape), nominal)
+        return self.bounded(memory.view(MEMORY)[0].estimate[: nominal.size].reshape(nominal.shape), nominal)

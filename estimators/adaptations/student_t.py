@@ -7,8 +7,9 @@ import numpy as np
 from simnav.compiled import helper, kernel
 from simnav.estimators.algebra.cholesky import factorise, invert_factor
 from simnav.estimators.algebra.direct_update import posterior
-from simnav.estimators.models.filtering import Prediction
+from simnav.estimators.models.filtering import Prediction, Readings
 from simnav.kernel_types import Matrix, Vector
+from simnav.structures import filled, structure
 from simnav.types import Array
 
 from .noise import WeightedNoise
@@ -77,16 +78,16 @@ def student_weight(innovation: Vector, predicted: Matrix, noise: Matrix, dof: fl
     return weight
 
 
+#: Degrees of freedom, and number of iterations.
+SETTINGS = structure(dof=float, iterations=int)
+
+
 @kernel(passed=True)
-def student_t_noise(settings: Vector, memory: Vector, shared: Vector, prediction: Prediction) -> float:
-    """Divide the nominal noise by `student_weight`, which is returned; settings: degrees of freedom, iterations."""
-    innovation, predicted, nominal, noise = (
-        prediction.innovation,
-        prediction.predicted,
-        prediction.nominal,
-        prediction.noise,
-    )
-    weight = student_weight(innovation, predicted, nominal, settings[0], int(settings[1]))
+def student_t_noise(settings: Vector, memory: Vector, readings: Readings, k: int, prediction: Prediction) -> float:
+    """Divide the nominal noise by `student_weight`, which is returned."""
+    own = settings.view(SETTINGS)[0]
+    innovation, _, predicted, nominal, noise = prediction
+    weight = student_weight(innovation, predicted, nominal, own.dof, own.iterations)
     for i in range(innovation.size):
         for j in range(innovation.size):
             noise[i, j] = nominal[i, j] / weight
@@ -128,6 +129,6 @@ class StudentT(WeightedNoise):
             raise ValueError(f"turns = {turns}: it must be at least 1")
         self.dof, self.turns = min(dof, 1e12), turns
 
-    def settings_of(self, longer: float) -> list[float]:
+    def settings_of(self, longer: float) -> Array:
         """As `NoiseAdaptation.settings_of`."""
-        return [self.dof, self.turns]
+        return filled(SETTINGS, dof=self.dof, iterations=self.turns)

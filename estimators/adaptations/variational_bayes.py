@@ -8,8 +8,9 @@ import numpy as np
 
 from simnav.compiled import kernel
 from simnav.estimators.algebra.direct_update import posterior
-from simnav.estimators.models.filtering import Prediction
+from simnav.estimators.models.filtering import Prediction, Readings
 from simnav.kernel_types import Matrix, Vector
+from simnav.structures import filled, structure
 from simnav.types import Array
 
 from .noise import EstimatedNoise, Scope
@@ -65,29 +66,26 @@ def variational_noise(
                 ratio[i] = min(max(scales[i] / shape, lowest), highest)
 
 
-#: Places in the settings: forgetting factor, iterations, and bounds of the variance ratios; in the memory: the shape of
-#: the densities, and their scales.
-FORGETTING, ITERATIONS, LOWEST, HIGHEST = range(4)
-SHAPE, SCALES = range(2)
+#: Forgetting factor, iterations, and bounds of the variance ratios.
+SETTINGS = structure(forgetting=float, iterations=int, lowest=float, highest=float)
+#: The shape of the densities, and their scales.
+MEMORY = structure(shape=float, scales=3)
 
 
 @kernel(passed=True)
-def variational_bayes_noise(settings: Vector, memory: Vector, shared: Vector, prediction: Prediction) -> float:
+def variational_bayes_noise(
+    settings: Vector, memory: Vector, readings: Readings, k: int, prediction: Prediction
+) -> float:
     """Make one step of `VariationalBayes`, and write the noise of its last iteration into ``noise``; 0."""
-    innovation, predicted, nominal, noise = (
-        prediction.innovation,
-        prediction.predicted,
-        prediction.nominal,
-        prediction.noise,
-    )
-    memory[SHAPE] = settings[FORGETTING] * memory[SHAPE] + 0.5
-    scales = memory[SCALES : SCALES + innovation.size]
+    innovation, _, predicted, nominal, noise = prediction
+    own, kept = settings.view(SETTINGS)[0], memory.view(MEMORY)[0]
+    kept.shape = own.forgetting * kept.shape + 0.5
+    scales = kept.scales[: innovation.size]
     for i in range(innovation.size):
-        scales[i] *= settings[FORGETTING]
+        scales[i] *= own.forgetting
     variational_noise(
-        innovation, predicted, nominal, memory[SHAPE], int(settings[ITERATIONS]), settings[LOWEST], settings[HIGHEST],
-        scales, noise,
-    )  # fmt: skip
+        innovation, predicted, nominal, kept.shape, own.iterations, own.lowest, own.highest, scales, noise
+    )
     return 0.0
 
 
@@ -138,10 +136,14 @@ class VariationalBayes(EstimatedNoise):
             raise ValueError(f"iterations = {iterations}: it must be at least 1")
         self.forgetting, self.prior, self.iterations = forgetting, prior, iterations
 
-    def settings_of(self, longer: float) -> list[float]:
+    def settings_of(self, longer: float) -> Array:
         """As `EstimatedNoise.settings_of`."""
-        return [self.forgetting ** (1.0 / longer), self.iterations, self.lowest**2, self.highest**2]
+        return filled(
+            SETTINGS, forgetting=self.forgetting ** (1.0 / longer), iterations=self.iterations,
+            lowest=self.lowest**2, highest=self.highest**2,
+        )  # fmt: skip
 
     def begun(self, longer: float, m: int) -> Array:
         """As `EstimatedNoise.begun`: shape and scales of the datasheet's noise."""
-        return np.full(1 + m, 0.5 * self.prior * longer)
+        prior = 0.5 * self.prior * longer
+        return filled(MEMORY, shape=prior, scales=prior)

@@ -15,12 +15,14 @@ from numpy.typing import NDArray
 
 from simnav.compiled import kernel
 from simnav.estimator import Estimator
+from simnav.estimators.models.filtering import Aid
 from simnav.estimators.models.inertial import InertialModel
 from simnav.estimators.models.inertial_functions import use_reading
-from simnav.estimators.models.measurements import Aid, State
+from simnav.estimators.models.measurements import State
 from simnav.estimators.models.propagation import (
     BLOCK,
-    BLOCK_COLUMNS,
+    BLOCK_NUMBERS,
+    CLOCK,
     Motion,
     Samples,
     accumulate_error,
@@ -30,7 +32,7 @@ from simnav.estimators.models.propagation import (
 from simnav.estimators.models.suitable import Suitable
 from simnav.estimators.solvers.admission import LATE
 from simnav.estimators.solvers.kalman import KalmanEstimator
-from simnav.kernel_types import FlagVector, IntegerStack, IntegerVector, Matrix, Stack, Vector
+from simnav.kernel_types import FlagVector, IntegerMatrix, IntegerVector, Matrix, Stack, Vector
 from simnav.sensors.stepwise import Delivered, ImuSteps
 from simnav.simulation.steps import SteppedRuns
 from simnav.types import Array, Estimate, InitialState, Instruments
@@ -45,19 +47,20 @@ class AidTables(NamedTuple):
 
     Attributes
     ----------
-    codes : (b, i, 4) int array
-        Measurement equation, number of components, and the first states of bias and scale factor.
-    arms : (b, i, 3) array
-        Lever arms [m].
-    noises, limits : (b, i, ...) array
-        Covariances of the noise, flattened, and largest plausible values.
+    code, components, bias_at, scale_at, lever_arm, noise : (b, i, ...) array
+        As of `simnav.estimators.models.filtering.AidTable`.
+    limits : (b, i, 3) array
+        Largest plausible values.
     used : (b, i) array
         Time of the last measurement that was used [s].
     """
 
-    codes: IntegerStack
-    arms: Stack
-    noises: Stack
+    code: IntegerMatrix
+    components: IntegerMatrix
+    bias_at: IntegerMatrix
+    scale_at: IntegerMatrix
+    lever_arm: Stack
+    noise: Stack
     limits: Stack
     used: Matrix
 
@@ -226,7 +229,7 @@ def navigate(
         Overwritten with ``estimate`` and ``spread`` of `Navigators`.
     """
     who, when, value = delivered.who, delivered.when, delivered.value
-    codes, limits, used = instruments.codes, instruments.limits, instruments.used
+    limits, used = instruments.limits, instruments.used
     sensors, decay, density = process
     position, velocity, dcm, bias, clock = state.position, state.velocity, state.dcm, state.bias, state.clock
     calibration, now = state.calibration, state.time
@@ -235,7 +238,7 @@ def navigate(
     for b in range(active.size):
         if active[b]:
             longest = max(longest, until[b] - now[b])
-    blocks = np.empty((int(longest / BLOCK) + 4, BLOCK_COLUMNS))
+    blocks = np.empty((int(longest / BLOCK) + 4, BLOCK_NUMBERS))
     transition, process_noise = np.empty((15, 15)), np.empty((15, 15))
     for b in range(active.size):
         if not active[b]:
@@ -244,11 +247,11 @@ def navigate(
         P = state.covariance[b, : n * n].reshape((n, n))
         correction = np.empty(n)
         for j in range(delivered.number[b] + 1):
-            i, code, d = -1, 0, 0
+            i, d = -1, 0
             stop = until[b]
             if j < delivered.number[b]:
                 i = who[b, j]
-                code, d, t = codes[b, i, 0], codes[b, i, 1], when[b, j]
+                d, t = instruments.components[b, i], when[b, j]
                 if d == 0:  # it is none of those that the filter uses
                     continue
                 plausible = since - LATE <= t <= until[b] + LATE and t > used[b, i]
@@ -273,9 +276,11 @@ def navigate(
                     P, transition, process_noise, calibration[b, :more], decay[b, :more], density[b, :more], elapsed
                 )
             if i >= 0:
-                aid = Aid(code, instruments.arms[b, i], codes[b, i, 2], codes[b, i, 3])
-                here = State(position[b], velocity[b], dcm[b], clock[b, 12:15], bias[b], calibration[b, : n - 15])
-                noise = instruments.noises[b, i, : d * d].reshape((d, d))
+                bias_at, scale_at = instruments.bias_at[b, i], instruments.scale_at[b, i]
+                aid = Aid(instruments.code[b, i], instruments.lever_arm[b, i], bias_at, scale_at)
+                rate = clock[b].view(CLOCK)[0].rate[:]
+                here = State(position[b], velocity[b], dcm[b], rate, bias[b], calibration[b, : n - 15])
+                noise = instruments.noise[b, i, : d * d].reshape((d, d))
                 use_reading(aid, value[b, j, :d], here, P, noise, correction)
         for k in range(3):
             estimate[b, k], estimate[b, 3 + k] = position[b, k], velocity[b, k]

@@ -24,7 +24,7 @@ from simnav.types import (
 )
 
 from .channel_readings import ChannelReadings
-from .filtering import AidTable, Dynamics, ModelFunctions
+from .filtering import Dynamics, ModelFunctions, aid_table
 from .measurement_functions import MeasurementFunction
 from .propagation import Samples
 
@@ -207,7 +207,7 @@ class ErrorModel(ABC):
             numbers=nothing, covariance=covariance, transition=none, process_noise=none, constants=nothing,
             decay=nothing, density=nothing, first_variances=covariance.diagonal().copy(),
             correction=np.empty(len(covariance)), next_sample=np.zeros(1, np.int64),
-            aids=AidTable(np.empty((0, 4), np.int64), np.empty((0, 3)), np.empty((0, 9))),
+            aids=aid_table([], [], []),
         )  # fmt: skip
 
     @abstractmethod

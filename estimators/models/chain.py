@@ -49,6 +49,7 @@ from simnav.types import (
 from .base import ErrorModel, Linearised
 from .channel_readings import ChannelReadings
 from .columns import Columns, Made
+from .filtering import Dynamics
 from .intermediate_states import IntermediateStates
 from .marginalisation import Reference, keep_covariance, marginalise, subtract_step
 
@@ -149,8 +150,10 @@ class Chain(ABC):
         """Further arrays of the model that a node stores, in addition to those of its ``state``."""
         return ()
 
-    #: The functions of a step of a window as kernels, and what they work on; None where a window has to call methods.
+    #: The functions of a step of a window as kernels; None where a window has to call methods.
     functions: FactorFunctions | None = None
+    #: What they work on, with what `growing` returns.
+    dynamics: Dynamics
     #: Components of the model's error from this index on are independent and only decay.
     coupled: ClassVar[int] = 10**9
 
@@ -219,13 +222,13 @@ class Chain(ABC):
     @property
     def window(self) -> Window:
         """The nodes and factors as kernels take them; it holds until a column is replaced."""
-        found: Window | None = self._made.get(Window)
-        if found is None:
-            found = self._made[Window] = Window(
-                nodes=self.nodes.record(Nodes), motions=self.motions.record(Motions),
-                aids=self.aids.record(AidingFactors), prior=self.prior,
-            )  # fmt: skip
-        return found
+        return self._made.once(Window, self._make_window)
+
+    def _make_window(self) -> Window:
+        return Window(
+            nodes=self.nodes.record(Nodes), motions=self.motions.record(Motions),
+            aids=self.aids.record(AidingFactors), prior=self.prior,
+        )  # fmt: skip
 
     @property
     def needs(self) -> Needs:
@@ -352,6 +355,17 @@ class Chain(ABC):
         else:
             self.front.correct(self.since_node.transition @ moved)
 
+    def growing(self, count: int) -> Any:
+        """What `functions` append the rows of so many measurements to; it holds until a column is replaced."""
+        raise NotImplementedError(f"{type(self).__name__} has no functions that append rows")
+
+    def grow(self, new: NewRows) -> None:
+        """Count the rows that `functions` have appended."""
+        rows = ((self.nodes, new.nodes), (self.motions, new.nodes), (self.aids, new.aids), (self.between, new.between))
+        for columns, appended in rows:
+            if appended:
+                columns.grow(appended)
+
     def detach(self, count: int) -> None:
         """Remove the newest aiding factors."""
         self.aids.drop_newest(count)
@@ -369,10 +383,7 @@ class Chain(ABC):
     @property
     def _states_between(self) -> IntermediateStates:
         """The intermediate states as kernels take them."""
-        found: IntermediateStates | None = self._made.get(IntermediateStates)
-        if found is None:
-            found = self._made[IntermediateStates] = self.between.record(IntermediateStates)
-        return found
+        return self._made.once(IntermediateStates, lambda: self.between.record(IntermediateStates))
 
     def copy_states(self) -> list[Array]:
         """Copies of the arrays that `retract` changes, for `restore_states`."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, TypeVar
 
 import numpy as np
@@ -18,6 +19,13 @@ class Made(dict[Any, Any]):
 
     def __reduce__(self) -> tuple[Any, ...]:
         return Made, ()
+
+    def once(self, kind: type[Kind], make: Callable[[], Kind]) -> Kind:
+        """The record of a kind; it is made if there is none."""
+        found: Kind | None = self.get(kind)
+        if found is None:
+            found = self[kind] = make()
+        return found
 
 
 class Columns(dict[str, Any]):

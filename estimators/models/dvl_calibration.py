@@ -48,8 +48,9 @@ from simnav.types import Array, Datasheet, InitialState, Instruments, Measuremen
 from .base import Linearised
 from .declared_errors import errors_of
 from .error_states import merged
+from .filtering import Aid
 from .inertial import InertialModel
-from .measurements import DVL, Aid, observe
+from .measurements import DVL, observe
 
 __all__ = ["DELAY", "LEVER_ARM", "MISALIGNMENT", "SCALE", "DvlCalibrationModel"]
 

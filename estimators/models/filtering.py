@@ -11,11 +11,35 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from simnav.kernel_types import FlagVector, IntegerMatrix, IntegerVector, Matrix, Vector
+from simnav.compiled import helper
+from simnav.kernel_types import FlagVector, IntegerVector, Matrix, Vector
 from simnav.records import Record
-from simnav.types import Measurement
+from simnav.types import Array, Measurement
 
-__all__ = ["AidTable", "Dynamics", "ModelFunctions", "Prediction", "Readings", "ReadingsOfSteps", "room_for"]
+__all__ = [
+    "Aid", "AidTable", "Dynamics", "ModelFunctions", "Prediction", "Readings", "ReadingsOfSteps", "SigmaPoints",
+    "aid_of", "aid_table", "room_for",
+]  # fmt: skip
+
+
+class Aid(NamedTuple):
+    """The parameters of an instrument.
+
+    Attributes
+    ----------
+    code : int
+        Its measurement equation, by the number that its model has for it.
+    lever_arm : (3,) array
+        In body axes [m].
+    bias_at, scale_at : int
+        Index in the error state of its first bias, and of its scale factor; -1 for none. Of an inertial model there
+        are three misalignments after a DVL's scale factor, and the current, north and east, after a log's bias.
+    """
+
+    code: int
+    lever_arm: Vector
+    bias_at: int
+    scale_at: int
 
 
 class AidTable(NamedTuple):
@@ -23,17 +47,75 @@ class AidTable(NamedTuple):
 
     Attributes
     ----------
-    codes : (i, 4) array of int
-        Measurement equation, and places in the error; the model knows their meaning.
-    lever_arms : (i, 3) array
+    code, bias_at, scale_at : (i,) array of int
+        As of `Aid`.
+    components : (i,) array of int
+        Number of components that the model predicts; 0 for an instrument that it does not observe.
+    lever_arm : (i, 3) array
         In body axes [m].
-    figures : (i, 9) array
-        Figures of the equation: of an inertial model the elements of the covariance of the white noise.
+    noise : (i, 9) array
+        Figures of the white noise: of an inertial model the elements of its covariance, of a ship
+        `simnav.estimators.models.ship_kernels.SHIP_NOISE`.
     """
 
-    codes: IntegerMatrix
-    lever_arms: Matrix
-    figures: Matrix
+    code: IntegerVector
+    components: IntegerVector
+    bias_at: IntegerVector
+    scale_at: IntegerVector
+    lever_arm: Matrix
+    noise: Matrix
+
+
+def aid_table(aids: Sequence[Aid | None], components: Sequence[int], noise: Sequence[Array]) -> AidTable:
+    """The table of some instruments; None for one that is not observed.
+
+    Parameters
+    ----------
+    aids : sequence of Aid or None
+        Parameters of each instrument.
+    components : sequence of int
+        Number of components of each.
+    noise : sequence of (at most 9,) array
+        Figures of the white noise of each.
+    """
+    i = len(aids)
+    whole: Any = np.int64
+    table = AidTable(
+        np.zeros(i, whole), np.array(components, whole), np.full(i, -1, whole), np.full(i, -1, whole),
+        np.zeros((i, 3)), np.zeros((i, 9)),
+    )  # fmt: skip
+    for row, (aid, figures) in enumerate(zip(aids, noise, strict=True)):
+        if aid is not None:
+            table.code[row], table.lever_arm[row], table.bias_at[row], table.scale_at[row] = aid
+            table.noise[row, : len(figures)] = figures
+    return table
+
+
+@helper
+def aid_of(table: AidTable, row: int) -> Aid:
+    """An instrument of a table."""
+    return Aid(table.code[row], table.lever_arm[row], table.bias_at[row], table.scale_at[row])
+
+
+class SigmaPoints(NamedTuple):
+    """The points of a filter that takes its moments from them (`simnav.estimators.models.points`).
+
+    Attributes
+    ----------
+    spread : float
+        Distance of the points from the state, in columns of the square root of the covariance.
+    weight : float
+        Weight of each point.
+    excess : float
+        Weight of the squared mean in a covariance.
+    errors : (2 n, n) array
+        Differences of the points from the state.
+    """
+
+    spread: float
+    weight: float
+    excess: float
+    errors: Matrix
 
 
 class Dynamics(Record):
@@ -57,6 +139,8 @@ class Dynamics(Record):
         Index of the first IMU sample of the step that is not completely used.
     aids : AidTable
         The instruments.
+    points : SigmaPoints
+        None of them where the filter linearises.
     """
 
     numbers: Vector
@@ -70,6 +154,7 @@ class Dynamics(Record):
     correction: Vector
     next_sample: IntegerVector
     aids: AidTable
+    points: SigmaPoints = SigmaPoints(0.0, 0.0, 0.0, np.empty((0, 0)))
 
 
 class Readings(Record):
@@ -91,6 +176,8 @@ class Readings(Record):
         Roots of the variances that an adaptation chose; NaN where none was chosen.
     reported : (k,) array
         A further number that an adaptation reports, or 0.
+    elapsed : (k,) array
+        Time since the last reading, of any instrument, for which a rule was asked [s]; NaN before the first.
     inflation : (k,) array
         Factor by which the covariance of the prediction is inflated before the reading is used.
     rejected, wrong : (k,) array of bool
@@ -105,6 +192,7 @@ class Readings(Record):
     size: Vector
     sigma: Matrix
     reported: Vector
+    elapsed: Vector
     inflation: Vector
     rejected: FlagVector
     wrong: FlagVector
@@ -157,7 +245,7 @@ def room_for(count: int) -> Readings:
     return Readings(
         instrument=np.zeros(count, whole), components=np.zeros(count, whole), time=np.zeros(count),
         value=np.zeros((count, 3)), nis=np.zeros(count), size=np.zeros(count),
-        sigma=np.zeros((count, 3)), reported=np.zeros(count), inflation=np.ones(count),
+        sigma=np.zeros((count, 3)), reported=np.zeros(count), elapsed=np.zeros(count), inflation=np.ones(count),
         rejected=np.zeros(count, np.bool_), wrong=np.zeros(count, np.bool_),
     )  # fmt: skip
 
@@ -174,6 +262,10 @@ class ReadingsOfSteps:
     def __init__(self, components: Mapping[str, int]):
         self._row = {name: (i, d) for i, (name, d) in enumerate(components.items())}
         self._readings = room_for(8)
+
+    def components(self, instrument: str) -> int:
+        """Number of components of an instrument."""
+        return self._row[instrument][1]
 
     def fill(self, measurements: Sequence[Measurement]) -> Readings:
         """The measurements as arrays; those of the call before are overwritten."""

@@ -44,6 +44,7 @@ from simnav.estimator import UnsuitableScenario
 from simnav.estimator.needs import AID, IMU, Needs
 from simnav.estimators.algebra.joseph import joseph_sequence
 from simnav.geometry.rotation import dcm_from_rpy
+from simnav.structures import filled
 from simnav.types import (
     KINDS,
     NO_SIDE,
@@ -63,18 +64,19 @@ from .declared_errors import CURRENT, bias_of, bias_of_triad
 from .delayed import is_delayed
 from .equations import EQUATIONS, equation_of
 from .error_states import merged, merged_states
-from .filtering import AidTable, Dynamics, ModelFunctions
+from .filtering import Aid, AidTable, Dynamics, ModelFunctions, aid_table
 from .inertial_functions import INERTIAL_FUNCTIONS
 from .lever_arms import has_measurement_function, with_lever_arms
 from .measurement_functions import MeasurementFunction
 from .measurements import (
     HEADING,
-    Aid,
     State,
     has_heading,
     observe,
 )
 from .propagation import (
+    CLOCK,
+    IMU_NOISE,
     MOTION_NUMBERS,
     TURN_TIME,
     Samples,
@@ -135,12 +137,12 @@ class InertialModel(ErrorModel):
     attitude_at = 6
     moving = (slice(0, 6), slice(6, 9))
     #: True if the kernels of `simnav.estimators.models.inertial_functions` may replace `measure`, `correct` and
-    #: `loosen`. A model with another form of one of these methods sets it to False.
+    #: `loosen`. A model with another form of one of these methods, or of those of points, sets it to False.
     fused: ClassVar[bool] = True
 
     def __init_subclass__(cls) -> None:
         super().__init_subclass__()
-        own = {"measure", "correct", "loosen"} & vars(cls).keys()
+        own = {"measure", "correct", "loosen", "propagate_points", "observe_points"} & vars(cls).keys()
         if own and cls.fused and "fused" not in vars(cls):
             raise TypeError(f"{cls.__name__} has {', '.join(sorted(own))} of its own; it has to say: fused = False")
 
@@ -163,17 +165,19 @@ class InertialModel(ErrorModel):
         self.motion = motion = motion_of.function(self.numbers)
         self.position, self.velocity, self.dcm, self.bias = motion.position, motion.velocity, motion.dcm, motion.bias
         self.calibration = self.numbers[MOTION_NUMBERS:]
-        self.raw_rate, self.raw_force = motion.clock[12:15], motion.clock[6:9]
+        clock = motion.clock.view(CLOCK)
+        self.raw_rate, self.raw_force = clock["rate"][0], clock["mean_force"][0]
+        self._time, self._held = clock["time"], clock["held"]
         self._viewed = State(self.position, self.velocity, self.dcm, self.raw_rate, self.bias, self.calibration)
 
     @property
     def time(self) -> float:
         """Time of the state [s]."""
-        return float(self.motion.clock[0])
+        return float(self._time[0])
 
     @time.setter
     def time(self, time: float) -> None:
-        self.motion.clock[0] = time
+        self._time[0] = time
 
     def choose(self, instruments: Instruments, name: str) -> ErrorModel:
         """Itself; UnsuitableScenario without an IMU or without anything to aid it."""
@@ -203,7 +207,7 @@ class InertialModel(ErrorModel):
         self.numbers = np.zeros(MOTION_NUMBERS + n - _NAV)
         self._bind()
         self.position[:], self.velocity[:], self.dcm[:] = start.position, start.velocity, dcm_from_rpy(start.attitude)
-        self.motion.clock[:2] = start.time, -1e9
+        self._time[0], self.motion.clock.view(CLOCK)["used"] = start.time, -1e9
         self._jacobians = {name: np.empty((len(noise), n)) for name, noise in self.noise.items()}
         covariance = np.zeros((n, n))
         covariance[:_MOTION, :_MOTION] = start.covariance
@@ -224,14 +228,13 @@ class InertialModel(ErrorModel):
         self.blocks.add(imu.name, "accelerometer_bias", acceleration)
         dt = 1.0 / imu.rate
         gyro_white = g.random_walk**2 + float(gyro.white_density()[0])
-        self._noise = np.array([
-            gyro_white,
-            a.random_walk**2 + float(level.white_density()[0]),
-            turning[0].decay, turning[0].noise,
-            min(x.decay for x in acceleration), max(x.noise for x in acceleration),
-            g.scale**2 * TURN_TIME, g.misalignment**2 * TURN_TIME,
-            dt,
-        ])  # fmt: skip
+        self._noise = filled(
+            IMU_NOISE, gyroscope=gyro_white, accelerometer=a.random_walk**2 + float(level.white_density()[0]),
+            gyroscope_decay=turning[0].decay, gyroscope_walk=turning[0].noise,
+            accelerometer_decay=min(x.decay for x in acceleration),
+            accelerometer_walk=max(x.noise for x in acceleration),
+            scale=g.scale**2 * TURN_TIME, misalignment=g.misalignment**2 * TURN_TIME, interval=dt,
+        )  # fmt: skip
         self._rate_variance = 2.5 * gyro_white / dt  # of 3/2 of a sample less 1/2 of the one before
 
     def _aids(self) -> None:
@@ -301,13 +304,12 @@ class InertialModel(ErrorModel):
         -------
         dict of str to array, or None
             The state under the names of its attributes; ``sensors``, the noise of the IMU (`accumulate_error`); by
-            instrument ``codes`` (its code, components, and the places of its bias and scale factor; no components:
-            it is not used), ``arms``, ``noises`` (flat) and ``limits`` (values of this size are not plausible). None
-            where the model uses an instrument in a way of its own, or channel by channel.
+            instrument the fields of `AidTable`, and ``limits`` (values of this size are not plausible). None where the
+            model uses an instrument in a way of its own, or channel by channel.
         """
         if self._fused != set(self.noise) or not self.noise.keys() <= set(names):
             return None
-        codes, arms, noises = self.table(names)
+        table = self.table(names)
         limits = np.zeros((len(names), 3))
         for i, name in enumerate(names):
             if name in self.noise:
@@ -316,7 +318,7 @@ class InertialModel(ErrorModel):
             "position": self.position, "velocity": self.velocity, "dcm": self.dcm, "memory": self.motion.increments,
             "bias": self.bias, "turn": self.motion.turn, "clock": self.motion.clock, "sensors": self._noise,
             "calibration": self.calibration, "decay": self._decay, "density": self._density,
-            "codes": codes, "arms": arms, "noises": noises, "limits": limits,
+            "limits": limits, **table._asdict(),
         }  # fmt: skip
 
     def functions(self) -> ModelFunctions | None:
@@ -333,15 +335,9 @@ class InertialModel(ErrorModel):
         )  # fmt: skip
 
     def table(self, names: Sequence[str]) -> AidTable:
-        """The instruments in the order of their names; zeros for one that is not observed."""
-        codes, arms = np.zeros((len(names), 4), np.int64), np.zeros((len(names), 3))
-        noises = np.zeros((len(names), 9))
-        for i, name in enumerate(names):
-            if name in self.noise:
-                code, arms[i], bias_at, scale_at = self.aid_parameters[name]
-                d = len(self.noise[name])
-                codes[i], noises[i, : d * d] = (code, d, bias_at, scale_at), self.noise[name].ravel()
-        return AidTable(codes, arms, noises)
+        """The instruments in the order of their names."""
+        noise = [self.noise.get(name, np.empty((0, 0))) for name in names]
+        return aid_table(list(map(self.aid_parameters.get, names)), list(map(len, noise)), [n.ravel() for n in noise])
 
     def load(self, imu: ImuSamples | None) -> None:
         """Take the IMU samples of the step that follows."""
@@ -381,7 +377,7 @@ class InertialModel(ErrorModel):
     @property
     def held(self) -> float:
         """Seconds without usable IMU data so far."""
-        return float(self.motion.clock[2])
+        return float(self._held[0])
 
     def measure(self, measurement: Measurement) -> Linearised | None:
         """Linearise one measurement (`simnav.estimators.models.measurements`)."""

@@ -13,18 +13,19 @@ from numpy.typing import NDArray
 
 from simnav.compiled import helper, kernel
 from simnav.estimators.algebra.block_tridiagonal import after_step, error_after_step, whiten_one
-from simnav.estimators.algebra.factors import NewRows, Rows, Window
+from simnav.estimators.algebra.factors import Rows, Window
 from simnav.kernel_types import IntegerVector, Matrix, Stack
 from simnav.records import Record
 from simnav.types import Array, InitialState, Instruments
 
 from .chain import Chain, chain_of
 from .columns import Columns
-from .filtering import Dynamics
+from .filtering import Aid
 from .inertial import InertialModel
+from .inertial_functions import INERTIAL_FUNCTIONS
 from .intermediate_states import IntermediateStates, add_noise, through_one
 from .marginalisation import Reference
-from .measurements import OWN, Aid, State, observe_inertial
+from .measurements import OWN, State, observe_inertial
 from .new_factors import INERTIAL_FACTORS, Growing, InertialStates
 from .preintegrated import add_shift, move_shift, relative_shift, turn_covariance
 from .propagation import correct_inertial
@@ -264,7 +265,6 @@ class InertialChain(Chain):
 
     coupled = 15
     front: InertialModel
-    dynamics: Dynamics
 
     @property
     def node_arrays(self) -> tuple[str, ...]:
@@ -283,7 +283,7 @@ class InertialChain(Chain):
             bias_at=np.array([aid.bias_at for aid in known], dtype=np.int64),
             scale_at=np.array([aid.scale_at for aid in known], dtype=np.int64),
         )
-        self.functions = None if front.functions() is None else INERTIAL_FACTORS
+        self.functions = INERTIAL_FACTORS if front.functions() is INERTIAL_FUNCTIONS else None
         if self.functions is not None:
             self.dynamics = front.dynamics(covariance, self.names)
         return covariance
@@ -296,34 +296,27 @@ class InertialChain(Chain):
     @property
     def _inertial(self) -> InertialWindow:
         """The window as kernels take it; it holds until a column is replaced."""
-        found: InertialWindow | None = self._made.get(InertialWindow)
-        if found is None:
-            found = self._made[InertialWindow] = InertialWindow(
-                window=self.window, states=self.nodes.record(InertialStates), between=self._states_between,
-                predicted=self.between.record(InertialStates), moved=self.between.record(MovedStates, "now_"),
-                equations=self._equations,
-            )  # fmt: skip
-        return found
+        return self._made.once(InertialWindow, self._make_inertial)
+
+    def _make_inertial(self) -> InertialWindow:
+        return InertialWindow(
+            window=self.window, states=self.nodes.record(InertialStates), between=self._states_between,
+            predicted=self.between.record(InertialStates), moved=self.between.record(MovedStates, "now_"),
+            equations=self._equations,
+        )  # fmt: skip
 
     def growing(self, count: int) -> Growing:
-        """What so many measurements append rows to; it holds until a column is replaced."""
+        """As `Chain.growing`."""
         for columns in (self.nodes, self.motions, self.aids, self.between):
             columns.reserve(count)
-        found: Growing | None = self._made.get(Growing)
-        if found is None:
-            w = self._inertial
-            found = self._made[Growing] = Growing(
-                nodes=w.states, motions=w.window.motions, aids=w.window.aids, between=w.between,
-                between_states=w.predicted, since_node=self.since_node,
-            )  # fmt: skip
-        return found
+        return self._made.once(Growing, self._make_growing)
 
-    def grow(self, new: NewRows) -> None:
-        """Count the rows that a kernel has appended."""
-        rows = ((self.nodes, new.nodes), (self.motions, new.nodes), (self.aids, new.aids), (self.between, new.between))
-        for columns, appended in rows:
-            if appended:
-                columns.grow(appended)
+    def _make_growing(self) -> Growing:
+        w = self._inertial
+        return Growing(
+            nodes=w.states, motions=w.window.motions, aids=w.window.aids, between=w.between,
+            between_states=w.predicted, since_node=self.since_node,
+        )  # fmt: skip
 
     def linearise_from(self, node: int = 0) -> None:
         """As `Chain.linearise_from` (equations in the module)."""

@@ -9,21 +9,29 @@ from simnav.estimators.algebra.inflation import MotionStates, inflate_motion
 from simnav.estimators.algebra.joseph import joseph_update, project
 from simnav.types import Array
 
-from .filtering import Dynamics, ModelFunctions, Prediction, Readings
-from .measurements import Aid, State, observe_inertial
-from .propagation import MOTION_NUMBERS, Samples, correct_inertial, motion_of, propagate_inertial
+from .filtering import Aid, Dynamics, ModelFunctions, Prediction, Readings, aid_of
+from .measurements import State, observe_inertial
+from .propagation import CLOCK, MOTION_NUMBERS, Samples, correct_inertial, motion_of, propagate_inertial, time_of
 
-__all__ = ["INERTIAL_FUNCTIONS", "use_reading"]
+__all__ = ["INERTIAL_FUNCTIONS", "state_of", "use_reading"]
 
 #: Places of position and velocity, and of the attitude, in the error.
 _MOVING = MotionStates(linear=0, linear_end=6, attitude=6, attitude_end=9)
+
+
+@helper
+def state_of(numbers: Array) -> State:
+    """The state at which a reading is predicted, as views of the flat one."""
+    motion = motion_of(numbers)
+    rate = motion.clock.view(CLOCK)[0].rate[:]  # an array like the others
+    return State(motion.position, motion.velocity, motion.dcm, rate, motion.bias, numbers[MOTION_NUMBERS:])
 
 
 @kernel(passed=True)
 def propagate(dynamics: Dynamics, samples: Samples, until: float) -> None:
     """Advance the state and its covariance to a time, through the IMU samples."""
     state = motion_of(dynamics.numbers)
-    elapsed = until - state.clock[0]
+    elapsed = until - time_of(state)
     if elapsed > 0.0:
         dynamics.next_sample[0] = propagate_inertial(
             state, samples, dynamics.next_sample[0], until, dynamics.constants,
@@ -61,17 +69,13 @@ def use_reading(aid: Aid, value: Array, state: State, covariance: Array, noise: 
 @kernel(passed=True)
 def predict(dynamics: Dynamics, readings: Readings, k: int, prediction: Prediction) -> bool:
     """Compute what a reading should be, and the covariance of that (`observe_inertial`)."""
-    row, aids, numbers = readings.instrument[k], dynamics.aids, dynamics.numbers
-    code, d, bias_at, scale_at = aids.codes[row]
-    motion = motion_of(numbers)
-    state = State(
-        motion.position, motion.velocity, motion.dcm, motion.clock[12:15], motion.bias, numbers[MOTION_NUMBERS:]
-    )
+    row, aids = readings.instrument[k], dynamics.aids
+    d = aids.components[row]
     for a in range(d):
         for b in range(d):
-            prediction.nominal[a, b] = aids.figures[row, a * d + b]
+            prediction.nominal[a, b] = aids.noise[row, a * d + b]
     return predict_reading(
-        Aid(code, aids.lever_arms[row], bias_at, scale_at), readings.value[k, :d], state, dynamics.covariance,
+        aid_of(aids, row), readings.value[k, :d], state_of(dynamics.numbers), dynamics.covariance,
         prediction.innovation, prediction.cross, prediction.predicted,
     )  # fmt: skip
 

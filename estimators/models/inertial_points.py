@@ -18,7 +18,9 @@ the scenario of Zhan et al. 2026: -0.45), these products keep it at this value, 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from math import atan2, ceil, cos, sin, sqrt
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -30,16 +32,21 @@ from simnav.kernel_types import Matrix, Vector
 from simnav.strapdown import mechanize_step
 from simnav.types import Array, Measurement
 
+from .filtering import Aid, Dynamics, ModelFunctions, Prediction, Readings, aid_of
 from .inertial import InertialModel
+from .inertial_functions import inflate_and_predict as inflate_linearised
+from .inertial_functions import predict as linearise
+from .inertial_functions import propagate as propagate_linearised
+from .inertial_functions import retract, state_of
 from .measurements import (
     HEADING,
     NAVIGATION_STATES,
     SPEED_LOG,
-    Aid,
     State,
     observe_inertial,
 )
-from .points import PointModel
+from .points import PointModel, predict_through, propagate_through
+from .propagation import IMU_NOISE, Samples, motion_of, time_of
 
 __all__ = ["PIECE", "InertialPoints", "observe_points", "propagate_points"]
 
@@ -55,37 +62,23 @@ def _turn(dcm: Array, r0: float, r1: float, r2: float, turned: Array) -> None:
 
 
 @kernel
-def propagate_points(
-    position: Vector,
-    velocity: Vector,
-    dcm: Matrix,
-    next_velocity: Vector,
-    next_dcm: Matrix,
-    interval: float,
-    gyro_decay: float,
-    accelerometer_decay: float,
-    errors: Matrix,
-) -> None:
+def propagate_points(before: Vector, after: Vector, constants: Vector, decay: Vector, errors: Matrix) -> None:
     """Propagate points through one piece of a state's motion, in place.
 
     Parameters
     ----------
-    position, velocity : (3,) arrays
-        Position (latitude, longitude, height) and velocity (north, east, down) at the start of the piece.
-    dcm : (3, 3) array
-        Rotation from body to north-east-down at the start.
-    next_velocity : (3,) array
-        Velocity at the end.
-    next_dcm : (3, 3) array
-        Rotation at the end.
-    interval : float
-        Length of the piece [s].
-    gyro_decay, accelerometer_decay : float
-        Inverse of the biases' correlation times [1/s].
+    before, after : (45 + n - 15,) arrays
+        The flat state (`simnav.estimators.models.propagation.motion_of`) at the start and at the end of the piece.
+    constants : (9,) array
+        An `IMU_NOISE`.
+    decay : (n - 15,) array
+        Inverse correlation times of the calibration states [1/s].
     errors : (k, n) array
         Differences of the points from the state at the start; overwritten with those at the end.
     """
-    c, d = dcm, next_dcm
+    start, end = motion_of(before), motion_of(after)
+    position, velocity, dcm, next_velocity = start.position, start.velocity, start.dcm, end.velocity
+    c, d, interval, imu = dcm, end.dcm, time_of(end) - time_of(start), constants.view(IMU_NOISE)[0]
     memory = np.zeros(6)
     sample = sample_from_motion(
         position[0],
@@ -105,7 +98,11 @@ def propagate_points(
     north, east = meridian + position[2], (prime + position[2]) * cos(position[0])
     meridian, prime = radii_scalar(sin(end_latitude))
     next_north, next_east = meridian + end_height, (prime + end_height) * cos(end_latitude)
-    keep_g, keep_a = np.exp(-gyro_decay * interval), np.exp(-accelerometer_decay * interval)
+    keep_g, keep_a = np.exp(-imu.gyroscope_decay * interval), np.exp(-imu.accelerometer_decay * interval)
+    for j in range(decay.size):
+        keep = np.exp(-decay[j] * interval)
+        for k in range(errors.shape[0]):
+            errors[k, 15 + j] *= keep
     p, v, m = np.empty(3), np.empty(3), np.empty((3, 3))
     for k in range(errors.shape[0]):
         still = True
@@ -209,6 +206,83 @@ def observe_points(
             differences[k, i] = x
 
 
+@helper
+def move_in_pieces(
+    advance: Callable[[Any, Samples, float], None],
+    advanced: Any,
+    samples: Samples,
+    until: float,
+    numbers: Array,
+    constants: Array,
+    decay: Array,
+    errors: Array,
+) -> None:
+    """Advance a state to a time, and points through its motion, piece by piece.
+
+    Parameters
+    ----------
+    advance : callable
+        Advances the state to a time: ``advance(advanced, samples, time)``.
+    advanced
+        What it works on.
+    samples : Samples
+        The IMU samples of the step.
+    until : float
+        The time, later than that of the state [s].
+    numbers : (45 + n - 15,) array
+        The flat state.
+    constants, decay, errors
+        As of `propagate_points`.
+    """
+    begin = time_of(motion_of(numbers))
+    elapsed = until - begin
+    pieces = ceil(elapsed / PIECE - 1e-9)
+    for k in range(1, pieces + 1):
+        before = numbers.copy()
+        advance(advanced, samples, until if k == pieces else begin + elapsed * k / pieces)
+        propagate_points(before, numbers, constants, decay, errors)
+
+
+@kernel
+def move(dynamics: Dynamics, samples: Samples, until: float) -> None:
+    """Advance state and points; the covariance becomes that of the process noise."""
+    dynamics.covariance[:] = 0.0
+    move_in_pieces(
+        propagate_linearised, dynamics, samples, until, dynamics.numbers, dynamics.constants, dynamics.decay,
+        dynamics.points.errors,
+    )  # fmt: skip
+
+
+@kernel(passed=True)
+def propagate(dynamics: Dynamics, samples: Samples, until: float) -> None:
+    """Advance the state and its covariance to a time, through points."""
+    if until > time_of(motion_of(dynamics.numbers)):
+        propagate_through(move, retract, dynamics, samples, until)
+
+
+@kernel
+def read(dynamics: Dynamics, readings: Readings, k: int, differences: Matrix) -> None:
+    """What an instrument should read at the points, minus what it should read at the state."""
+    aid = aid_of(dynamics.aids, readings.instrument[k])
+    observe_points(aid, state_of(dynamics.numbers), dynamics.points.errors, differences)
+
+
+@kernel(passed=True)
+def predict(dynamics: Dynamics, readings: Readings, k: int, prediction: Prediction) -> bool:
+    """Compute what a reading should be, and the covariance of that, from points."""
+    return predict_through(linearise, read, dynamics, readings, k, prediction)
+
+
+@kernel(passed=True)
+def inflate_and_predict(dynamics: Dynamics, readings: Readings, k: int, prediction: Prediction) -> None:
+    """Inflate the covariance of position, velocity and attitude, and predict the reading again."""
+    inflate_linearised(dynamics, readings, k, prediction)
+    predict(dynamics, readings, k, prediction)
+
+
+POINT_FUNCTIONS = ModelFunctions(propagate, predict, retract, inflate_and_predict)
+
+
 class InertialPoints(InertialModel, PointModel):
     """`InertialModel` with sigma points.
 
@@ -218,22 +292,22 @@ class InertialPoints(InertialModel, PointModel):
         False: exactly 15 states; biases, scale factor and misalignment of the aids then count as white noise.
     """
 
+    fused: ClassVar[bool] = True
+
+    def point_functions(self) -> ModelFunctions | None:
+        """As `PointModel.point_functions`; None where `functions` is."""
+        return None if self.functions() is None else POINT_FUNCTIONS
+
     def propagate_points(self, errors: Array, until: float) -> Array:
         """Advance the state and the points; return the process noise."""
-        noise = np.zeros((self.size, self.size))
-        begin, elapsed = self.time, until - self.time
-        pieces = ceil(elapsed / PIECE - 1e-9)
-        for k in range(1, pieces + 1):
-            position, velocity, dcm, time = self.position.copy(), self.velocity.copy(), self.dcm.copy(), self.time
-            self.propagate(noise, until if k == pieces else begin + elapsed * k / pieces)
-            propagate_points.unchecked(
-                position, velocity, dcm, self.velocity, self.dcm, self.time - time, self._noise[2], self._noise[4],
-                errors,
-            )  # fmt: skip
-        errors[:, 15:] *= np.exp(-self._decay * elapsed)
+        noise, elapsed = np.zeros((self.size, self.size)), until - self.time
+        move_in_pieces(self._advance, noise, self.samples, until, self.numbers, self._noise, self._decay, errors)
         if self.blocks.clocks:
             self.blocks.carry(errors.T, elapsed)
         return noise
+
+    def _advance(self, noise: Array, samples: Samples, until: float) -> None:
+        self.propagate(noise, until)
 
     def observe_points(self, measurement: Measurement, errors: Array) -> Array:
         """What the instrument should read at the points, minus what it should read at the state."""

@@ -1,25 +1,34 @@
 """The constant-velocity model: position and velocity driven by white acceleration, for GNSS alone.
 
+It is the smallest model of simnav: four functions over one flat state, and a class that says how a run begins.
+
 Source: Y. Bar-Shalom, X. R. Li, T. Kirubarajan, *Estimation with Applications to Tracking and Navigation*, Wiley 2001,
 section 6.2.2 (continuous white noise acceleration).
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import atan2, cos, hypot, sin
 
 import numpy as np
 
+from simnav.compiled import helper, kernel
 from simnav.estimator import UnsuitableScenario
 from simnav.estimator.needs import Needs
+from simnav.estimators.algebra.inflation import MotionStates, inflate_motion
+from simnav.estimators.algebra.joseph import project
+from simnav.geometry.earth import radii_scalar
 from simnav.kinds import POSITION, VELOCITY, kinds_with
-from simnav.types import Array, Datasheet, Estimate, InitialState, Instruments, Measurement
+from simnav.structures import filled, structure
+from simnav.types import Array, Datasheet, Estimate, InitialState, Instruments
 
-from .base import ErrorModel, Linearised
 from .declared_errors import bias_of
 from .equations import equation_of
 from .error_states import with_variance
-from .measurements import radii, wrap
+from .filtering import Aid, AidTable, Dynamics, ModelFunctions, Prediction, Readings, aid_table
+from .function_model import FunctionModel
+from .propagation import Samples
 
 __all__ = ["KinematicModel"]
 
@@ -30,8 +39,93 @@ TILT, TILT_RATE = 0.04, 0.03
 #: Velocity in a seaway that fixes once a second cannot follow, one sigma [m/s].
 SEAWAY = 0.2
 
+#: The flat state: time [s], position (latitude, longitude [rad], height [m]), velocity [m/s], and last heading [rad].
+STATE = structure(time=float, position=3, velocity=3, heading=float)
+#: Variance density of the velocity, each axis [(m/s)^2/s].
+MOTION = structure(acceleration=float)
+#: What an instrument measures.
+A_POSITION, A_VELOCITY = range(2)
+_ALL = MotionStates(linear=0, linear_end=6, attitude=6, attitude_end=6)
 
-class KinematicModel(ErrorModel):
+
+@helper
+def _displace(position: Array, north: float, east: float, down: float) -> None:
+    """Move a position by metres."""
+    meridian, prime = radii_scalar(sin(position[0]))
+    position[1] += east / ((prime + position[2]) * cos(position[0]))
+    position[0] += north / (meridian + position[2])
+    position[2] -= down
+
+
+@kernel(passed=True)
+def propagate(dynamics: Dynamics, samples: Samples, until: float) -> None:
+    """Advance the state and its covariance to a time: ``P = F P F' + Q`` with ``F = [1, dt; 0, 1]``."""
+    state, P, F = dynamics.numbers.view(STATE)[0], dynamics.covariance, dynamics.transition
+    dt = until - state.time
+    if dt <= 0.0:
+        return
+    velocity, q = state.velocity, dynamics.constants.view(MOTION)[0].acceleration
+    _displace(state.position, velocity[0] * dt, velocity[1] * dt, velocity[2] * dt)
+    state.time = until
+    for i in range(3):
+        F[i, 3 + i] = dt
+        for j in range(6):
+            P[i, j] += dt * P[3 + i, j]
+    for i in range(6):
+        for j in range(3):
+            P[i, j] += dt * P[i, 3 + j]
+    for i in range(3):
+        P[i, i] += q * dt * dt * dt / 3.0
+        P[i, 3 + i] += q * dt * dt / 2.0
+        P[3 + i, i] += q * dt * dt / 2.0
+        P[3 + i, 3 + i] += q * dt
+
+
+@kernel(passed=True)
+def predict(dynamics: Dynamics, readings: Readings, k: int, prediction: Prediction) -> bool:
+    """Predict a fix or a velocity. The lever arm is turned by the course, at low speed by the last one."""
+    state, aids, row, value = dynamics.numbers.view(STATE)[0], dynamics.aids, readings.instrument[k], readings.value[k]
+    position, velocity, arm, innovation = state.position, state.velocity, aids.lever_arm[row], prediction.innovation
+    H = np.zeros((3, 6))
+    if aids.code[row] == A_VELOCITY:
+        for i in range(3):
+            innovation[i], H[i, 3 + i] = value[i] - velocity[i], 1.0
+    else:
+        if hypot(velocity[0], velocity[1]) > SLOWEST:
+            state.heading = atan2(velocity[1], velocity[0])
+        c, s = cos(state.heading), sin(state.heading)
+        meridian, prime = radii_scalar(sin(position[0]))
+        east = value[1] - position[1]
+        innovation[0] = (value[0] - position[0]) * (meridian + position[2]) - (c * arm[0] - s * arm[1])
+        innovation[1] = atan2(sin(east), cos(east)) * (prime + position[2]) * cos(position[0])
+        innovation[1] -= s * arm[0] + c * arm[1]
+        innovation[2] = position[2] - value[2] - arm[2]
+        for i in range(3):
+            H[i, i] = 1.0
+    for i in range(3):
+        for j in range(3):
+            prediction.nominal[i, j] = aids.noise[row, i] if i == j else 0.0
+    project(dynamics.covariance, H, prediction.cross, prediction.predicted)
+    return True
+
+
+@kernel(passed=True)
+def retract(dynamics: Dynamics) -> None:
+    """Add the correction to the state."""
+    state, dx = dynamics.numbers.view(STATE)[0], dynamics.correction
+    _displace(state.position, dx[0], dx[1], dx[2])
+    for i in range(3):
+        state.velocity[i] += dx[3 + i]
+
+
+@kernel(passed=True)
+def inflate_and_predict(dynamics: Dynamics, readings: Readings, k: int, prediction: Prediction) -> None:
+    """Inflate the whole covariance, and predict the reading again."""
+    inflate_motion(dynamics.covariance, readings.inflation[k], dynamics.first_variances, _ALL)
+    predict(dynamics, readings, k, prediction)
+
+
+class KinematicModel(FunctionModel):
     """The model of the module; six states.
 
     The bias and the slow errors of a receiver are not observable. They are added to the covariance of the estimate.
@@ -43,8 +137,7 @@ class KinematicModel(ErrorModel):
     """
 
     size = 6
-    state = ("position", "velocity")
-    memory = ("_yaw",)
+    equations = ModelFunctions(propagate, predict, retract, inflate_and_predict)
 
     def __init__(self, acceleration: float = 0.2):
         self.acceleration = acceleration
@@ -66,74 +159,30 @@ class KinematicModel(ErrorModel):
                 f"it needs an instrument of kind {' or '.join(kinds_with(POSITION))}; there is none"
             )
         self.instruments = instruments
-        self.time = start.time
-        self.position = np.array(start.position, dtype=np.float64)
-        self.velocity = np.array(start.velocity, dtype=np.float64)
-        self._yaw = np.array(start.attitude[2], dtype=np.float64)
+        self.names = [name for name, sheet in instruments.items() if self.observes(sheet)]
+        self.numbers = filled(
+            STATE, time=start.time, position=start.position, velocity=start.velocity, heading=start.attitude[2]
+        )
+        self.constants = filled(MOTION, acceleration=self.acceleration**2)
         slow = [with_variance(np.zeros(3), bias_of(r).processes) for r in receivers]
         self._slow = np.diag(np.max(slow, axis=0))
         return np.array(start.covariance[:6, :6])
 
-    def propagate(self, covariance: Array, until: float) -> None:
-        """Advance the state and its covariance."""
-        dt = until - self.time
-        if dt <= 0.0:
-            return
-        latitude, _, height = self.position.tolist()
-        vn, ve, vd = self.velocity.tolist()
-        meridian, prime = radii(latitude)
-        self.position += dt * np.array([vn / (meridian + height), ve / ((prime + height) * cos(latitude)), -vd])
-        F = np.eye(6)
-        F[range(3), range(3, 6)] = dt
-        q = self.acceleration**2
-        covariance[:] = F @ covariance @ F.T
-        covariance[range(3), range(3)] += q * dt**3 / 3.0
-        covariance[range(3), range(3, 6)] += q * dt**2 / 2.0
-        covariance[range(3, 6), range(3)] += q * dt**2 / 2.0
-        covariance[range(3, 6), range(3, 6)] += q * dt
-        self.time = until
-
-    def carry(self, error: Array, elapsed: float) -> None:
-        """Take an error through the last propagation, in place."""
-        error[:3] += elapsed * error[3:]
-
-    def measure(self, measurement: Measurement) -> Linearised:
-        """Linearise a fix or a velocity; a lever arm is turned by the course, or the last one, or the initial yaw."""
-        sheet = self.instruments[measurement.instrument]
-        H = np.zeros((3, 6))
-        if equation_of(sheet).is_fix:
-            H[:, 3:] = np.eye(3)
-            arm = sheet.lever_arm
-            noise = sheet.sigma**2 + sheet.bias**2 + SEAWAY**2 + TILT_RATE**2 * float(arm @ arm)
-            return Linearised(measurement.value - self.velocity, H, np.diag(noise))
-        vn, ve = float(self.velocity[0]), float(self.velocity[1])
-        if hypot(vn, ve) > SLOWEST:
-            self._yaw[...] = atan2(ve, vn)
-        x, y, z = sheet.lever_arm.tolist()
-        c, s = cos(self._yaw), sin(self._yaw)
-        arm = np.array([c * x - s * y, s * x + c * y, z])
-        latitude, longitude, height = self.position.tolist()
-        meridian, prime = radii(latitude)
-        offset = np.array([
-            (float(measurement.value[0]) - latitude) * (meridian + height),
-            wrap(float(measurement.value[1]) - longitude) * (prime + height) * cos(latitude),
-            height - float(measurement.value[2]),
-        ])  # fmt: skip
-        H[:, :3] = np.eye(3)
-        noise = sheet.sigma**2 + TILT**2 * float(arm @ arm)
-        return Linearised(offset - arm, H, np.diag(noise))
-
-    def correct(self, dx: Array) -> None:
-        """Add a correction to the state."""
-        latitude, _, height = self.position.tolist()
-        meridian, prime = radii(latitude)
-        self.position += np.array([dx[0] / (meridian + height), dx[1] / ((prime + height) * cos(latitude)), -dx[2]])
-        self.velocity += dx[3:]
+    def table(self, names: Sequence[str]) -> AidTable:
+        """The receivers, with the variances of their noise; what a lever arm does beside the heading is noise."""
+        sheets, aids, noise = [self.instruments[name] for name in names], [], []
+        for sheet in sheets:
+            velocity, arm = equation_of(sheet).is_fix, np.array(sheet.lever_arm, dtype=np.float64)
+            aids.append(Aid(A_VELOCITY if velocity else A_POSITION, arm, -1, -1))
+            swinging = (TILT_RATE if velocity else TILT) ** 2 * float(arm @ arm)
+            noise.append(sheet.sigma**2 + swinging + (sheet.bias**2 + SEAWAY**2 if velocity else 0.0))
+        return aid_table(aids, [3] * len(aids), noise)
 
     def estimate(self, covariance: Array) -> Estimate:
         """Position and velocity."""
+        state = self.numbers.view(STATE)[0]
         full = np.zeros((9, 9))
         full[:6, :6] = covariance
         full[:3, :3] += self._slow
         full[range(3, 6), range(3, 6)] += SEAWAY**2
-        return Estimate(self.time, self.position.copy(), self.velocity.copy(), None, full)
+        return Estimate(self.time, state.position.copy(), state.velocity.copy(), None, full)

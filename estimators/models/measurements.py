@@ -30,8 +30,10 @@ from simnav.geometry.rotation import cross
 from simnav.kernel_types import Matrix, Vector
 from simnav.types import Array
 
+from .filtering import Aid
+
 __all__ = [
-    "OWN", "Aid", "State", "has_heading", "observe", "observe_inertial", "radii", "wrap",
+    "OWN", "State", "has_heading", "observe", "observe_inertial", "radii", "wrap",
 ]  # fmt: skip
 
 #: Smallest cosine of the pitch at which there is a heading [-].
@@ -43,26 +45,6 @@ NAVIGATION_STATES = 15
 GNSS_POSITION, TERRAIN_FIX, GNSS_VELOCITY, DVL, SPEED_LOG, HEADING, DEPTH = range(7)
 #: In the place of a code: the kind of instrument has a function of its own (`simnav.kinds.Kind.observation`).
 OWN = -1
-
-
-class Aid(NamedTuple):
-    """The parameters of an instrument.
-
-    Attributes
-    ----------
-    code : int
-        Its measurement equation.
-    lever_arm : (3,) array
-        In body axes [m].
-    bias_at, scale_at : int
-        Index in the error state of its first bias, and of its scale factor; -1 for none. After a DVL's scale factor
-        come three misalignments, after a log's bias the current, north and east.
-    """
-
-    code: int
-    lever_arm: Vector
-    bias_at: int
-    scale_at: int
 
 
 class State(NamedTuple):

@@ -16,7 +16,7 @@ from .chain import FactorFunctions, MotionSinceNode, attach_one, begin_motion
 from .filtering import Dynamics, Readings
 from .intermediate_states import IntermediateStates
 from .measurements import HEADING, has_heading
-from .propagation import MOTION_NUMBERS, Motion, Samples, carry_errors, motion_of, propagate_inertial
+from .propagation import CLOCK, MOTION_NUMBERS, Motion, Samples, carry_errors, motion_of, propagate_inertial, time_of
 
 __all__ = ["INERTIAL_FACTORS", "Growing", "InertialStates"]
 
@@ -61,11 +61,11 @@ class Growing(Record):
 @helper
 def _keep(state: Motion, calibration: Array, kept: InertialStates, row: int) -> None:
     """Write a state into a row."""
-    clock = state.clock
-    kept.time[row] = clock[0]
+    clock = state.clock.view(CLOCK)[0]
+    kept.time[row] = clock.time
     for i in range(3):
         kept.position[row, i], kept.velocity[row, i] = state.position[i], state.velocity[i]
-        kept.raw_rate[row, i] = clock[12 + i]
+        kept.raw_rate[row, i] = clock.rate[i]
         for j in range(3):
             kept.dcm[row, i, j] = state.dcm[i, j]
     for i in range(6):
@@ -78,7 +78,7 @@ def _keep(state: Motion, calibration: Array, kept: InertialStates, row: int) -> 
 def advance(dynamics: Dynamics, growing: Growing, samples: Samples, until: float) -> None:
     """Propagate the front, and the motion since the newest node."""
     state, since = motion_of(dynamics.numbers), growing.since_node
-    elapsed = until - state.clock[0]
+    elapsed = until - time_of(state)
     if elapsed > 0.0:
         dynamics.next_sample[0] = propagate_inertial(
             state, samples, dynamics.next_sample[0], until, dynamics.constants,
@@ -92,7 +92,7 @@ def advance(dynamics: Dynamics, growing: Growing, samples: Samples, until: float
 @kernel(passed=True)
 def use_nominal(dynamics: Dynamics, readings: Readings, k: int) -> bool:
     """The noise is that of the datasheet; False for a heading of a body that points up or down."""
-    code = dynamics.aids.codes[readings.instrument[k], 0]
+    code = dynamics.aids.code[readings.instrument[k]]
     return code != HEADING or has_heading(motion_of(dynamics.numbers).dcm)
 
 
@@ -107,7 +107,7 @@ def make_node(dynamics: Dynamics, growing: Growing, rows: Rows, new: NewRows) ->
     )  # fmt: skip
     for i in range(motions.begin_shift.shape[1]):
         motions.begin_shift[row, i], motions.end_shift[row, i] = 0.0, 0.0
-    motions.time[row], motions.weight[row] = state.clock[0], 1.0
+    motions.time[row], motions.weight[row] = time_of(state), 1.0
     since.elapsed[0] = 0.0
     _keep(state, dynamics.numbers[MOTION_NUMBERS:], growing.nodes, rows.first_node + rows.nodes + new.nodes)
     return NewRows(new.nodes + 1, new.aids, new.between)
@@ -129,11 +129,11 @@ def attach(dynamics: Dynamics, growing: Growing, rows: Rows, new: NewRows, readi
     """Make a reading a factor of the newest node with its nominal noise; an intermediate state, if it is later."""
     state, since, aids = motion_of(dynamics.numbers), growing.since_node, growing.aids
     s, newest, here, added = readings.instrument[k], rows.base + rows.nodes - 1 + new.nodes, -1, new.between
-    d, noise = dynamics.aids.codes[s, 1], dynamics.aids.figures[s]
+    d, noise = dynamics.aids.components[s], dynamics.aids.noise[s]
     if since.elapsed[0] > 0.0:
         row = rows.first_between + rows.between + added
         known = rows.between + added > 0 and growing.between.node[row - 1] == newest
-        if not known or growing.between_states.time[row - 1] != state.clock[0]:
+        if not known or growing.between_states.time[row - 1] != time_of(state):
             _append_between(growing.between, row, since, newest)
             _keep(state, dynamics.numbers[MOTION_NUMBERS:], growing.between_states, row)
             added += 1

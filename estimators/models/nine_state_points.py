@@ -20,6 +20,10 @@ __all__ = ["NineStatePoints"]
 class NineStatePoints(NineStateModel, InertialPoints):
     """`NineStateModel` with sigma points; the parameters are its own."""
 
+    def point_functions(self) -> None:
+        """As `PointModel.point_functions`: those of the inertial model have fifteen states."""
+        return None
+
     def propagate_points(self, errors: Array, until: float) -> Array:
         """Advance the state and the points; return the process noise."""
         full = _with_biases(errors)

@@ -9,7 +9,7 @@ covariance is touched once a measurement (`propagate_covariance`). The equations
 from __future__ import annotations
 
 from math import cos, exp, sin
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -27,13 +27,18 @@ from simnav.geometry.earth import EQUATORIAL_GRAVITY, ROTATION_RATE, SEMI_MAJOR_
 from simnav.geometry.rotation import rotate_left, rotation_coefficients
 from simnav.kernel_types import Matrix, Vector
 from simnav.strapdown import mechanize_step
+from simnav.structures import length as numbers_of
+from simnav.structures import structure
 from simnav.types import Array
 
 __all__ = [
     "BLOCK",
-    "BLOCK_COLUMNS",
+    "BLOCK_NUMBERS",
+    "CLOCK",
+    "CLOCK_NUMBERS",
     "HELD_ATTITUDE",
     "HELD_VELOCITY",
+    "IMU_NOISE",
     "MOTION_NUMBERS",
     "TURN_TIME",
     "Motion",
@@ -47,6 +52,7 @@ __all__ = [
     "next_interval",
     "propagate_covariance",
     "propagate_inertial",
+    "time_of",
 ]
 
 #: Longest block over which attitude and specific force count as constant in the transition matrix [s].
@@ -60,9 +66,23 @@ LARGEST_RATE, LARGEST_FORCE = 50.0, 500.0
 #: Relative growth of gravity from the equator to the poles [-].
 GRAVITY_FLATTENING = 0.0053024
 
-#: Columns of a block: duration, time held; latitude, height; velocity; mean DCM; mean specific force, north-east-down;
-#: averaged body rate.
-BLOCK_COLUMNS = 22
+#: A block over which the error is propagated at once: its length and the part of it without data [s]; latitude, height,
+#: velocity, elements of the mean DCM, mean specific force in north-east-down, and averaged body rate.
+ERROR_BLOCK = structure(
+    length=float, held=float, latitude=float, height=float, velocity=3, dcm=9, specific_force=3, rate=3
+)
+#: Time of the state, end of the last sample used, and seconds held so far [s]; that sample's mean rate and force; the
+#: mean rate of the one before; and the rate at the time of the state, extrapolated from both: a mean is half a sample
+#: old, which over the lever arm of a DVL in a seaway would be taken for a misalignment.
+CLOCK = structure(time=float, used=float, held=float, mean_rate=3, mean_force=3, rate_before=3, rate=3)
+#: Noise of an IMU: densities of the white noises of gyroscopes and accelerometers; decay and noise density of their
+#: biases; ``scale^2 TURN_TIME`` and ``misalignment^2 TURN_TIME`` of the gyroscopes; and the nominal interval [s].
+IMU_NOISE = structure(
+    gyroscope=float, accelerometer=float, gyroscope_decay=float, gyroscope_walk=float, accelerometer_decay=float,
+    accelerometer_walk=float, scale=float, misalignment=float, interval=float,
+)  # fmt: skip
+#: Numbers of a block and of a clock.
+BLOCK_NUMBERS, CLOCK_NUMBERS = numbers_of(ERROR_BLOCK), numbers_of(CLOCK)
 #: Columns of the matrices of a block: the 15 states, and one of zeros, so that they are a multiple of eight.
 WIDTH = 16
 
@@ -99,10 +119,8 @@ class Motion(NamedTuple):
         Angle and velocity increments of the last whole sample.
     turn : (3,) array
         Averaged body rate [rad/s].
-    clock : (15,) array
-        Time of the state; end of the last sample used; seconds held so far; that sample's mean rate and force; the mean
-        rate of the one before; and the rate at the time of the state, extrapolated from both: a mean is half a sample
-        old, which over the lever arm of a DVL in a seaway would be taken for a misalignment.
+    clock : array
+        A `CLOCK`.
     """
 
     position: Vector
@@ -128,6 +146,13 @@ def motion_of(numbers: Array) -> Motion:
 
 
 @helper
+def time_of(state: Motion) -> float:
+    """Time of a state [s]."""
+    time: float = state.clock.view(CLOCK)[0].time
+    return time
+
+
+@helper
 def _usable(w0: float, w1: float, w2: float, f0: float, f1: float, f2: float) -> bool:
     rate = abs(w0) + abs(w1) + abs(w2)
     force = abs(f0) + abs(f1) + abs(f2)
@@ -135,15 +160,15 @@ def _usable(w0: float, w1: float, w2: float, f0: float, f1: float, f2: float) ->
 
 
 @helper
-def _dynamics(F: Array, block: Array, gyro_decay: float, accelerometer_decay: float) -> None:
+def _dynamics(F: Array, block: Any, gyro_decay: float, accelerometer_decay: float) -> None:
     """Compute the system matrix F of the error dynamics for one block."""
-    height = block[3]
-    s, cl = sin(block[2]), cos(block[2])
+    height = block.height
+    s, cl = sin(block.latitude), cos(block.latitude)
     meridian, prime = radii_scalar(s)
     a, b = 1.0 / (meridian + height), 1.0 / (prime + height)
     t = s / cl
-    v0, v1, v2 = block[4], block[5], block[6]
-    f0, f1, f2 = block[16], block[17], block[18]
+    v0, v1, v2 = block.velocity[0], block.velocity[1], block.velocity[2]
+    f0, f1, f2 = block.specific_force[0], block.specific_force[1], block.specific_force[2]
     e0, e2 = ROTATION_RATE * cl, -ROTATION_RATE * s
     k0, k1, k2 = v1 * b, -v0 * a, -v1 * b * t
     F[0, 0], F[0, 2], F[0, 3] = -v2 * a, v0 * a, 1.0
@@ -176,10 +201,11 @@ def _dynamics(F: Array, block: Array, gyro_decay: float, accelerometer_decay: fl
     F[8, 6], F[8, 7] = w1, -w0
     F[6, 0], F[8, 0] = -e2 * a, e0 * a
     F[6, 4], F[7, 3], F[8, 4] = -b, a, b * t
+    dcm = block.dcm
     for i in range(3):
         for j in range(3):
-            F[3 + i, 12 + j] = -block[7 + 3 * i + j]
-            F[6 + i, 9 + j] = -block[7 + 3 * i + j]
+            F[3 + i, 12 + j] = -dcm[3 * i + j]
+            F[6 + i, 9 + j] = -dcm[3 * i + j]
         F[9 + i, 9 + i] = -gyro_decay
         F[12 + i, 12 + i] = -accelerometer_decay
 
@@ -203,22 +229,22 @@ def _advance_rows(value: Array, half: Array, column: Places, count: Places, M: A
 
 
 @helper
-def _add_noise(Q: Array, block: Array, noise: Array) -> None:
+def _add_noise(Q: Array, block: Any, noise: Any) -> None:
     """Add half the noise of a block to Q: white, biases, turns, a time without data."""
-    dt, held = 0.5 * block[0], 0.5 * block[1]
-    scale, misalignment = noise[6], noise[7]
-    t0, t1, t2 = block[19] * block[19], block[20] * block[20], block[21] * block[21]
-    g0 = (noise[0] + scale * t0 + misalignment * (t1 + t2)) * dt
-    g1 = (noise[0] + scale * t1 + misalignment * (t0 + t2)) * dt
-    g2 = (noise[0] + scale * t2 + misalignment * (t0 + t1)) * dt
+    dt, held, dcm, rate = 0.5 * block.length, 0.5 * block.held, block.dcm, block.rate
+    white, scale, misalignment = noise.gyroscope, noise.scale, noise.misalignment
+    t0, t1, t2 = rate[0] * rate[0], rate[1] * rate[1], rate[2] * rate[2]
+    g0 = (white + scale * t0 + misalignment * (t1 + t2)) * dt
+    g1 = (white + scale * t1 + misalignment * (t0 + t2)) * dt
+    g2 = (white + scale * t2 + misalignment * (t0 + t1)) * dt
     for i in range(3):
-        c0, c1, c2 = block[7 + 3 * i] * g0, block[8 + 3 * i] * g1, block[9 + 3 * i] * g2
+        c0, c1, c2 = dcm[3 * i] * g0, dcm[1 + 3 * i] * g1, dcm[2 + 3 * i] * g2
         for j in range(3):
-            Q[6 + i, 6 + j] += c0 * block[7 + 3 * j] + c1 * block[8 + 3 * j] + c2 * block[9 + 3 * j]
-        Q[3 + i, 3 + i] += noise[1] * dt + HELD_VELOCITY * HELD_VELOCITY * held
+            Q[6 + i, 6 + j] += c0 * dcm[3 * j] + c1 * dcm[1 + 3 * j] + c2 * dcm[2 + 3 * j]
+        Q[3 + i, 3 + i] += noise.accelerometer * dt + HELD_VELOCITY * HELD_VELOCITY * held
         Q[6 + i, 6 + i] += HELD_ATTITUDE * HELD_ATTITUDE * held
-        Q[9 + i, 9 + i] += noise[3] * dt
-        Q[12 + i, 12 + i] += noise[5] * dt
+        Q[9 + i, 9 + i] += noise.gyroscope_walk * dt
+        Q[12 + i, 12 + i] += noise.accelerometer_walk * dt
 
 
 @kernel
@@ -227,14 +253,12 @@ def accumulate_error(blocks: Matrix, count: int, noise: Vector, transition: Matr
 
     Parameters
     ----------
-    blocks : (k, 22) array
-        The blocks from `advance_inertial`.
+    blocks : (k, ...) array
+        An `ERROR_BLOCK` in each row, from `advance_inertial`.
     count : int
         Number of blocks that are used.
     noise : (9,) array
-        Gyroscope and accelerometer white noise density; decay and noise density of the gyroscopes' bias, of the
-        accelerometers'; ``scale^2 TURN_TIME`` and ``misalignment^2 TURN_TIME`` of the gyroscopes; nominal interval.
-        (Order: 0, 1 white; 2, 3 gyroscope bias; 4, 5 accelerometer bias; 6, 7; 8.)
+        An `IMU_NOISE`.
     transition, process_noise : (15, 15) arrays
         Overwritten: the error at the end is ``transition`` times the error at the start, plus noise.
     """
@@ -245,15 +269,16 @@ def accumulate_error(blocks: Matrix, count: int, noise: Vector, transition: Matr
         np.empty((15, 15), np.uint64),
         np.empty(15, np.uint64),
     )
+    imu = noise.view(IMU_NOISE)[0]
     for i in range(15):
         Phi[i, i] = 1.0
     for k in range(count):
-        block = blocks[k]
-        _dynamics(F, block, noise[2], noise[4])
-        _list_elements(F, block[0], value, half, column, elements)
+        block = blocks[k].view(ERROR_BLOCK)[0]
+        _dynamics(F, block, imu.gyroscope_decay, imu.accelerometer_decay)
+        _list_elements(F, block.length, value, half, column, elements)
         _advance_rows(value, half, column, elements, Phi, A)
         # Half of the noise is added before the block and half after it: accurate to second order in its length.
-        _add_noise(Q, block, noise)
+        _add_noise(Q, block, imu)
         _advance_rows(value, half, column, elements, Q, A)
         for i in range(15):  # (Phi Q)' to the left of which Phi makes Phi Q Phi'
             for j in range(i):
@@ -262,7 +287,7 @@ def accumulate_error(blocks: Matrix, count: int, noise: Vector, transition: Matr
         for i in range(15):
             for j in range(i):
                 Q[j, i] = Q[i, j]
-        _add_noise(Q, block, noise)
+        _add_noise(Q, block, imu)
     for i in range(15):
         for j in range(15):
             transition[i, j] = Phi[i, j]
@@ -291,13 +316,13 @@ class SampleInterval(NamedTuple):
 
 
 @helper
-def next_interval(clock: Array, samples: Samples, i: int, t: float, until: float, nominal: float) -> SampleInterval:
+def next_interval(clock: Any, samples: Samples, i: int, t: float, until: float, nominal: float) -> SampleInterval:
     """Find the next interval that is covered by one sample, or by none.
 
     Parameters
     ----------
-    clock : (15,) array
-        The clock of `Motion`; its entries about samples are updated.
+    clock : CLOCK
+        What it says of samples is updated.
     samples : Samples
         The IMU samples.
     i : int
@@ -310,6 +335,7 @@ def next_interval(clock: Array, samples: Samples, i: int, t: float, until: float
     SampleInterval
     """
     time, interval, rate, force = samples.time, samples.interval, samples.angular_rate, samples.specific_force
+    mean_rate, mean_force, rate_before, extrapolated = clock.mean_rate, clock.mean_force, clock.rate_before, clock.rate
     eps = 1e-7
     n = time.size
     while i < n and (
@@ -320,21 +346,21 @@ def next_interval(clock: Array, samples: Samples, i: int, t: float, until: float
     if i < n and time[i] - interval[i] <= t + 0.5 * nominal:
         stop = min(time[i], until)
         started = time[i] - interval[i]
-        if t <= started + eps or clock[1] < started - 0.5 * nominal:
-            adjacent = clock[1] >= started - 0.5 * nominal
+        if t <= started + eps or clock.used < started - 0.5 * nominal:
+            adjacent = clock.used >= started - 0.5 * nominal
             for r in range(3):
-                clock[9 + r] = clock[3 + r] if adjacent else rate[i, r]
+                rate_before[r] = mean_rate[r] if adjacent else rate[i, r]
         ahead = (stop - started) / interval[i] - 0.5
         for r in range(3):
-            clock[3 + r], clock[6 + r] = rate[i, r], force[i, r]
-            clock[12 + r] = rate[i, r] + ahead * (rate[i, r] - clock[9 + r])
-        clock[1] = stop
+            mean_rate[r], mean_force[r] = rate[i, r], force[i, r]
+            extrapolated[r] = rate[i, r] + ahead * (rate[i, r] - rate_before[r])
+        clock.used = stop
         if stop >= time[i] - eps:
             whole = interval[i]
     elif i < n:
         stop, hold = min(time[i] - interval[i], until), True
-    elif t < clock[1] + 1.5 * nominal:
-        stop = min(clock[1] + 2.0 * nominal, until)  # the step ends between samples: the last sample is extrapolated
+    elif t < clock.used + 1.5 * nominal:
+        stop = min(clock.used + 2.0 * nominal, until)  # the step ends between samples: the last sample is extrapolated
     else:
         hold = True
     return SampleInterval(i, stop, whole, hold)
@@ -365,8 +391,8 @@ def advance_inertial(
     until : float
         Time to which the state is propagated [s].
     noise : (9,) array
-        Noise parameters of the IMU, see `accumulate_error`.
-    blocks : (m, 22) array
+        An `IMU_NOISE`.
+    blocks : (m, ...) array
         Overwritten with the blocks for `accumulate_error`; m must be large enough.
 
     Returns
@@ -374,20 +400,23 @@ def advance_inertial(
     int, int
         Index of the first sample that is not completely used, and number of blocks.
     """
-    position, velocity, dcm, bias, memory, turn, clock = state
+    position, velocity, dcm, bias, memory, turn, _ = state
+    clock, imu = state.clock.view(CLOCK)[0], noise.view(IMU_NOISE)[0]
     eps = 1e-7
     before = np.empty(9)
     keep = np.empty(6)
-    t, i, count = clock[0], first, 0
-    nominal = noise[8]
+    rate, force = clock.mean_rate, clock.mean_force
+    t, i, count = clock.time, first, 0
+    nominal = imu.interval
     while t < until - eps:
-        block = blocks[count]
+        block = blocks[count].view(ERROR_BLOCK)[0]
+        mean = block.dcm
         count += 1
         begin, end = t, min(until, t + BLOCK)
         v0, v1, v2 = velocity[0], velocity[1], velocity[2]
         for r in range(9):
             before[r] = dcm[r // 3, r % 3]
-            block[7 + r] = 0.0
+            mean[r] = 0.0
         held, s0, s1, s2 = 0.0, 0.0, 0.0, 0.0
         while t < end - eps:
             covered = next_interval(clock, samples, i, t, end, nominal)
@@ -402,8 +431,8 @@ def advance_inertial(
                     memory[r] = 0.0
                 held += dt
             else:
-                w0, w1, w2 = clock[3] - bias[0], clock[4] - bias[1], clock[5] - bias[2]
-                f0, f1, f2 = clock[6] - bias[3], clock[7] - bias[4], clock[8] - bias[5]
+                w0, w1, w2 = rate[0] - bias[0], rate[1] - bias[1], rate[2] - bias[2]
+                f0, f1, f2 = force[0] - bias[3], force[1] - bias[4], force[2] - bias[5]
                 for r in range(6):
                     keep[r] = memory[r]
                 mechanize_step(position, velocity, dcm, memory, (w0, w1, w2), (f0, f1, f2), dt)
@@ -415,13 +444,13 @@ def advance_inertial(
                         memory[r] = keep[r]
                 s0, s1, s2 = s0 + w0 * dt, s1 + w1 * dt, s2 + w2 * dt
             for r in range(9):
-                block[7 + r] += dcm[r // 3, r % 3] * dt
+                mean[r] += dcm[r // 3, r % 3] * dt
             t = stop
         length = end - begin
         # The sum has the attitude at the ends of the samples; their middles are half a sample earlier.
         shift = 0.5 * min(nominal, length)
         for r in range(9):
-            block[7 + r] = (block[7 + r] - shift * (dcm[r // 3, r % 3] - before[r])) / length
+            mean[r] = (mean[r] - shift * (dcm[r // 3, r % 3] - before[r])) / length
         # Mean specific force from the change of velocity: f = v' + (2 w_ie + w_en) x v - g
         sl, cl = sin(position[0]), cos(position[0])
         meridian, prime = radii_scalar(sl)
@@ -429,22 +458,23 @@ def advance_inertial(
         east = m1 / (prime + position[2])
         x0, x1 = 2.0 * ROTATION_RATE * cl + east, -m0 / (meridian + position[2])
         x2 = -2.0 * ROTATION_RATE * sl - east * sl / cl
-        block[16] = (velocity[0] - v0) / length + x1 * m2 - x2 * m1
-        block[17] = (velocity[1] - v1) / length + x2 * m0 - x0 * m2
-        block[18] = (velocity[2] - v2) / length + x0 * m1 - x1 * m0 - gravity_scalar(sl, position[2])
+        block.specific_force[0] = (velocity[0] - v0) / length + x1 * m2 - x2 * m1
+        block.specific_force[1] = (velocity[1] - v1) / length + x2 * m0 - x0 * m2
+        block.specific_force[2] = (velocity[2] - v2) / length + x0 * m1 - x1 * m0 - gravity_scalar(sl, position[2])
         weight = min(1.0, length / TURN_TIME)
         turn[0] += weight * (s0 / length - turn[0])
         turn[1] += weight * (s1 / length - turn[1])
         turn[2] += weight * (s2 / length - turn[2])
-        block[0], block[1], block[2], block[3] = length, held, position[0], position[2]
-        block[4], block[5], block[6] = m0, m1, m2
-        block[19], block[20], block[21] = turn[0], turn[1], turn[2]
-        clock[2] += held
-        decay_g, decay_a = exp(-noise[2] * length), exp(-noise[4] * length)
+        block.length, block.held, block.latitude, block.height = length, held, position[0], position[2]
+        block.velocity[0], block.velocity[1], block.velocity[2] = m0, m1, m2
+        for r in range(3):
+            block.rate[r] = turn[r]
+        clock.held += held
+        decay_g, decay_a = exp(-imu.gyroscope_decay * length), exp(-imu.accelerometer_decay * length)
         for r in range(3):
             bias[r] *= decay_g
             bias[3 + r] *= decay_a
-    clock[0] = until
+    clock.time = until
     return i, count
 
 
@@ -563,7 +593,7 @@ def propagate_inertial(
         Index of the first sample that is not completely used.
     """
     transition, process_noise, covariance = matrices
-    blocks = np.empty((int((until - state.clock[0]) / BLOCK) + 2, BLOCK_COLUMNS))
+    blocks = np.empty((int((until - time_of(state)) / BLOCK) + 2, BLOCK_NUMBERS))
     first, count = advance_inertial(state, samples, first, until, noise, blocks)
     accumulate_error(blocks, count, noise, transition, process_noise)
     calibration, rate, density = others

@@ -25,12 +25,12 @@ from math import cos, radians, sin
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from simnav import kinds
 from simnav.blocks import StateBlock
 from simnav.estimator import UnsuitableScenario
 from simnav.estimator.needs import Needs
+from simnav.structures import filled
 from simnav.types import KINDS, NO_SIDE, Array, Datasheet, Estimate, InitialState, Instruments, Measurement
 
 from .base import ErrorModel, Linearised
@@ -38,17 +38,18 @@ from .channel_readings import channel_readings_of
 from .declared_errors import bias_of
 from .equations import equation_of
 from .error_states import merged_states, with_variance
-from .filtering import AidTable, Dynamics, ModelFunctions
+from .filtering import Aid, AidTable, Dynamics, ModelFunctions, aid_table
 from .lever_arms import has_measurement_function, with_lever_arms
 from .measurements import wrap
 from .moving_chain import MovingModel
-from .ship_functions import SHIP_FUNCTIONS, SHIP_NUMBERS, ship_state
+from .ship_functions import SHIP_FUNCTIONS, SHIP_MOTION, SHIP_NUMBERS, ship_state
 from .ship_kernels import (
     BODY_VELOCITY,
     HEADING,
     LOG,
     POSITION,
     PSI,
+    SHIP_NOISE,
     VELOCITY,
     E,
     N,
@@ -98,9 +99,8 @@ class ShipModel(MovingModel):
         Transition matrix of the last propagation.
     decay, density : (n,) array
         Inverse correlation times of the states [1/s], and their noise densities.
-    aids : dict of str to (3,) array of int, (7,) array, int
-        Parameters of each observed instrument for `simnav.estimators.models.ship_kernels`, and its number of
-        components.
+    aids : dict of str to Aid
+        Parameters of each observed instrument for `simnav.estimators.models.ship_kernels`.
     own : dict of str to ShipObservation
         The observed instruments whose kind has a measurement equation of its own.
     bias_at, scale_at : dict of str to int
@@ -108,8 +108,7 @@ class ShipModel(MovingModel):
     """
 
     state = ("position", "x")
-    #: True if the kernels of `simnav.estimators.models.ship_functions` may replace its methods.
-    fused: ClassVar[bool] = True
+    equations: ClassVar[ModelFunctions] = SHIP_FUNCTIONS
     moving = (slice(0, 0), slice(0, 0))  # there is no IMU: the process noise covers manoeuvres
 
     def __init__(
@@ -147,20 +146,22 @@ class ShipModel(MovingModel):
 
     def functions(self) -> ModelFunctions | None:
         """As `ErrorModel.functions`; None if an instrument has an equation of its own."""
-        return SHIP_FUNCTIONS if self.fused and not self.own else None
+        return self.equations if not self.own else None
 
     def dynamics(self, covariance: Array, names: Sequence[str]) -> Dynamics:
         """As `ErrorModel.dynamics`."""
-        codes, figures = np.zeros((len(names), 4), np.int64), np.zeros((len(names), 9))
-        for i, name in enumerate(names):
-            if name in self.aids:
-                codes[i, :3], figures[i, :7], _ = self.aids[name]
         return Dynamics(
             numbers=self.numbers, covariance=covariance, transition=self.transition, process_noise=np.empty((0, 0)),
-            constants=np.array([self.turn_time]), decay=self.decay, density=self.density,
+            constants=self.constants, decay=self.decay, density=self.density,
             first_variances=covariance.diagonal().copy(), correction=np.empty(self.size),
-            next_sample=np.zeros(1, np.int64), aids=AidTable(codes, np.zeros((len(names), 3)), figures),
+            next_sample=np.zeros(1, np.int64), aids=self.table(names),
         )  # fmt: skip
+
+    def table(self, names: Sequence[str]) -> AidTable:
+        """The instruments in the order of their names; those with an equation of their own have no components."""
+        aids = [self.aids.get(name) for name in names]
+        components = [0 if aid is None else components_of(aid) for aid in aids]
+        return aid_table(aids, components, [self._noise.get(name, np.empty(0)) for name in names])
 
     def observes(self, instrument: Datasheet) -> bool:
         """Whether it is a position, velocity, speed or heading, or has an observation of its own and no clock."""
@@ -198,7 +199,7 @@ class ShipModel(MovingModel):
         self.size = n = self.blocks.size
         variance, decay, density = self.blocks.columns(U)
         self.decay, self.density = np.concatenate([[0.0, 0.0], decay]), np.concatenate([[0.0, 0.0], density])
-        self.transition = np.eye(n)
+        self.transition, self.constants = np.eye(n), filled(SHIP_MOTION, turn_time=self.turn_time)
         self._height_variance = float(start.covariance[2, 2])
         self.numbers = np.zeros(SHIP_NUMBERS + n)
         self._bind()
@@ -216,8 +217,8 @@ class ShipModel(MovingModel):
         north, east = start.velocity[:2].tolist()
         self.x[U] = cos(psi) * north + sin(psi) * east
         residual, H, noise = np.empty(2), np.zeros((2, n)), np.empty((2, 2))
-        ground = np.array([VELOCITY, -1, -1]), np.zeros(7)
-        observe_ship(*ground, self.position, self.x, north, east, residual, H, noise)
+        ground = Aid(VELOCITY, np.zeros(3), -1, -1)
+        observe_ship(ground, filled(SHIP_NOISE), self.position, self.x, north, east, residual, H, noise)
         cross = P @ H.T
         noise = start.covariance[3:5, 3:5] + self.sway**2 * np.eye(2)
         gain = np.linalg.solve(H @ cross + noise, cross.T).T
@@ -251,7 +252,8 @@ class ShipModel(MovingModel):
 
     def _tabulate(self) -> None:
         """The instruments: those for the kernels, and those with an equation of their own."""
-        self.aids: dict[str, tuple[NDArray[np.int64], Array, int]] = {}
+        self.aids: dict[str, Aid] = {}
+        self._noise: dict[str, Array] = {}
         self.own: dict[str, ShipObservation] = {}
         for name, sheet in self.instruments.items():
             if not self.observes(sheet):
@@ -260,15 +262,15 @@ class ShipModel(MovingModel):
                 bias_at, white, places = self.bias_at.get(name, -1), _white(sheet), self.blocks.places(name, 0)
                 self.own[name] = ShipObservation(sheet, places, bias_at, white, self._height_variance, self.sway**2)
             else:
-                kind, numbers = _aid(sheet, self.sway)
-                code = np.array([kind, self.bias_at.get(name, -1), self.scale_at.get(name, -1)], dtype=np.int64)
-                self.aids[name] = code, np.array(numbers), 1 if kind in (HEADING, LOG) else 2
+                code, self._noise[name] = _noise(sheet, self.sway)
+                arm = np.array(sheet.lever_arm, dtype=np.float64)
+                self.aids[name] = Aid(code, arm, self.bias_at.get(name, -1), self.scale_at.get(name, -1))
         self.many = channel_readings_of(self.own, self.bias_at, ShipReadings)
 
     def components(self, instrument: Datasheet) -> int:
         """Without the height and the velocity down."""
         known = self.aids.get(instrument.name)
-        return super().components(instrument) if known is None else known[2]
+        return super().components(instrument) if known is None else components_of(known)
 
     def propagate(self, covariance: Array, until: float) -> None:
         """Advance the state and its covariance."""
@@ -288,10 +290,11 @@ class ShipModel(MovingModel):
         if measurement.instrument in self.own:
             own = self.own[measurement.instrument]
             return own.measure(measurement.time, measurement.value, self.position, self.x, measurement.side)
-        code, aid, m = self.aids[measurement.instrument]
+        aid, figures = self.aids[measurement.instrument], self._noise[measurement.instrument]
+        m = components_of(aid)
         residual, jacobian, noise = np.empty(m), np.zeros((m, self.size)), np.empty((m, m))
         first, second = float(measurement.value[0]), float(measurement.value[m - 1])
-        observe_ship(code, aid, self.position, self.x, first, second, residual, jacobian, noise)
+        observe_ship(aid, figures, self.position, self.x, first, second, residual, jacobian, noise)
         return Linearised(residual, jacobian, noise)
 
     def observe_own(
@@ -338,20 +341,28 @@ class ShipModel(MovingModel):
         return estimate
 
 
-def _aid(sheet: Datasheet, sway: float) -> tuple[int, list[float]]:
-    """Kind and numbers of an instrument, for the kernels (`simnav.estimators.models.ship_kernels`)."""
-    lx, ly, lz = sheet.lever_arm.tolist()
+def components_of(aid: Aid) -> int:
+    """Number of components of an instrument that the model predicts."""
+    return 1 if aid.code in (HEADING, LOG) else 2
+
+
+def _noise(sheet: Datasheet, sway: float) -> tuple[int, Array]:
+    """Measurement equation of an instrument, and its noise, for `simnav.estimators.models.ship_kernels`."""
+    lz = float(sheet.lever_arm[2])
     white, equation = _white(sheet), equation_of(sheet)
     if equation.is_heading or equation.through_water:
-        kind = LOG if equation.through_water else HEADING
-        return kind, [lx, ly, float(white[0]), 0.0, 0.0, 0.0, 0.0]
+        return LOG if equation.through_water else HEADING, filled(SHIP_NOISE, first=white[0])
     if equation.is_position:
-        return POSITION, [lx, ly, *(white[:2] + (HEEL * lz) ** 2).tolist(), 0.0, 0.0, 0.0]
-    white = with_variance(white, bias_of(sheet).slow)[:2]  # a velocity's bias has no state
+        first, second = white[:2] + (HEEL * lz) ** 2
+        return POSITION, filled(SHIP_NOISE, first=first, second=second)
+    first, second = with_variance(white, bias_of(sheet).slow)[:2]  # a velocity's bias has no state
     if equation.is_fix:
-        return VELOCITY, [lx, ly, *white.tolist(), sway**2, 0.0, 0.0]
-    white = white + (HEEL * sway) ** 2
-    return BODY_VELOCITY, [lx, ly, *white.tolist(), sway**2, sheet.scale**2, float(sheet.misalignment[2]) ** 2]
+        return VELOCITY, filled(SHIP_NOISE, first=first, second=second, sway=sway**2)
+    aside = (HEEL * sway) ** 2
+    return BODY_VELOCITY, filled(
+        SHIP_NOISE, first=first + aside, second=second + aside, sway=sway**2, scale=sheet.scale**2,
+        misalignment=float(sheet.misalignment[2]) ** 2,
+    )  # fmt: skip
 
 
 def _white(sheet: Datasheet) -> Array:

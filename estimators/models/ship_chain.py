@@ -14,11 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simnav.compiled import kernel
-from simnav.kernel_types import IntegerMatrix, IntegerVector, Matrix, Stack
+from simnav.kernel_types import IntegerVector, Matrix, Stack
 from simnav.types import Array, InitialState, Instruments
 
 from .chain import Chain, chain_of
 from .columns import Columns
+from .filtering import AidTable, aid_of
 from .moving_chain import MovingChain
 from .ship import ShipModel
 from .ship_kernels import VELOCITY, fill_jacobian, residual_of
@@ -38,8 +39,7 @@ class _Measured(NamedTuple):
 def _linearise_aids(
     first: int,
     measured: _Measured,
-    codes: IntegerMatrix,
-    aids: Matrix,
+    aids: AidTable,
     position: Matrix,
     x: Matrix,
     residual: Matrix,
@@ -53,8 +53,8 @@ def _linearise_aids(
         Index of the first measurement that is computed.
     measured : _Measured
         The measurements.
-    codes, aids : (i,), (i, ...) arrays
-        Parameters of each instrument for `simnav.estimators.models.ship_kernels.residual_of`.
+    aids : AidTable
+        The instruments.
     position, x : (K, 3), (K, n) arrays
         The states at which the measurements are predicted.
     residual : (M, 3) array
@@ -67,12 +67,13 @@ def _linearise_aids(
         k, s = measured.row[i], measured.instrument[i]
         if k < 0:
             continue
-        a, b = residual_of(codes[s], aids[s], position[k], x[k], value[i, 0], value[i, 1])
+        aid = aid_of(aids, s)
+        a, b = residual_of(aid, position[k], x[k], value[i, 0], value[i, 1])
         residual[i, 0], residual[i, 1], residual[i, 2] = a, b, 0.0
         for r in range(3):
             for c in range(x.shape[1]):
                 jacobian[i, r, c] = 0.0
-        fill_jacobian(codes[s], aids[s], x[k], jacobian[i])
+        fill_jacobian(aid, x[k], jacobian[i])
 
 
 class ShipChain(MovingChain):
@@ -89,21 +90,15 @@ class ShipChain(MovingChain):
     def begin(self, start: InitialState, instruments: Instruments) -> Array:
         """One node, at the start; its covariance. UnsuitableScenario without any aid."""
         covariance = super().begin(start, instruments)
-        known = self.front.aids
-        self._codes = np.zeros((len(self.names), 3), dtype=np.int64)
-        self._aids = np.zeros((len(self.names), 7))
-        for i, name in enumerate(self.names):
-            if name in known:
-                self._codes[i], self._aids[i], _ = known[name]
-            else:  # no bias: what the compiled loop writes for it is overwritten
-                self._codes[i] = VELOCITY, -1, -1
+        self._table = self.front.table(self.names)
+        self._table.code[self._table.components == 0] = VELOCITY  # what the kernel writes for it is overwritten
         return covariance
 
     def observe(self, first: int, row: NDArray[np.int64], states: Columns, prefix: str, jacobian: Array) -> None:
         """As `Chain.observe`."""
         aids = self.aids
         _linearise_aids.unchecked(
-            first, _Measured(row, aids["instrument"], aids["value"]), self._codes, self._aids,
+            first, _Measured(row, aids["instrument"], aids["value"]), self._table,
             states[f"{prefix}position"], states[f"{prefix}x"], aids["residual"], jacobian,
         )  # fmt: skip
         if self.front.own:

@@ -9,13 +9,14 @@ import numpy as np
 from simnav.compiled import helper, kernel
 from simnav.estimators.algebra.joseph import project
 from simnav.kernel_types import Vector
+from simnav.structures import length, structure
 from simnav.types import Array
 
-from .filtering import Dynamics, ModelFunctions, Prediction, Readings
+from .filtering import Dynamics, ModelFunctions, Prediction, Readings, aid_of
 from .propagation import Samples
-from .ship_kernels import advance_ship, correct_ship, observe_ship
+from .ship_kernels import SHIP_NOISE, advance_ship, correct_ship, observe_ship
 
-__all__ = ["SHIP_FUNCTIONS", "SHIP_NUMBERS", "ShipState", "ship_state"]
+__all__ = ["SHIP_FUNCTIONS", "SHIP_MOTION", "SHIP_NUMBERS", "ShipState", "ship_state"]
 
 
 class ShipState(NamedTuple):
@@ -36,8 +37,11 @@ class ShipState(NamedTuple):
     x: Vector
 
 
-#: Numbers of a flat state before its n states.
-SHIP_NUMBERS = 4
+#: Figures of the motion: correlation time of the turn rate [s]. Of a ship that stands still without a fix: time after
+#: the last fix from which it stands, and the time of the last fix [s].
+SHIP_MOTION = structure(turn_time=float, patience=float, last_fix=float)
+#: Numbers of a flat state before its n states, and of the noise of an instrument.
+SHIP_NUMBERS, SHIP_NOISE_NUMBERS = 4, length(SHIP_NOISE)
 
 
 @helper
@@ -48,13 +52,13 @@ def ship_state(numbers: Array) -> ShipState:
 
 @kernel(passed=True)
 def propagate(dynamics: Dynamics, samples: Samples, until: float) -> None:
-    """Advance the state and its covariance to a time; the constant of the motion is the time of the turn rate."""
+    """Advance the state and its covariance to a time."""
     state = ship_state(dynamics.numbers)
     elapsed = until - state.clock[0]
     if elapsed > 0.0:
         advance_ship(
             state.position, state.x, dynamics.covariance, dynamics.transition, dynamics.decay, dynamics.density,
-            dynamics.constants[0], elapsed,
+            dynamics.constants.view(SHIP_MOTION)[0].turn_time, elapsed,
         )  # fmt: skip
         state.clock[0] = until
 
@@ -64,10 +68,10 @@ def predict(dynamics: Dynamics, readings: Readings, k: int, prediction: Predicti
     """Compute what a reading should be, and the covariance of that (`observe_ship`)."""
     row, d, aids, state = readings.instrument[k], readings.components[k], dynamics.aids, ship_state(dynamics.numbers)
     jacobian = np.zeros((d, state.x.size))
+    aid, noise, value = aid_of(aids, row), aids.noise[row, :SHIP_NOISE_NUMBERS], readings.value[k]
     observe_ship(
-        aids.codes[row], aids.figures[row], state.position, state.x, readings.value[k, 0], readings.value[k, d - 1],
-        prediction.innovation, jacobian, prediction.nominal,
-    )  # fmt: skip
+        aid, noise, state.position, state.x, value[0], value[d - 1], prediction.innovation, jacobian, prediction.nominal
+    )
     project(dynamics.covariance, jacobian, prediction.cross, prediction.predicted)
     return True
 

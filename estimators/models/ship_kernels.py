@@ -5,9 +5,7 @@ then biases and scale factors; x[0] and x[1] are zero, or metres north and east 
 it.
 Equations and sources are those of `simnav.estimators.models.ship`.
 
-An instrument is a row of three integers (one of the kinds `POSITION` to `BODY_VELOCITY`; index of its first bias and of
-its scale factor, or -1) and a row of seven numbers: forward and starboard lever arm; variance of its two components;
-variance of the sideways velocity; squared scale factor and squared yaw misalignment that count as noise.
+An instrument is an `Aid`, whose code is one of `POSITION` to `BODY_VELOCITY`, with figures of its noise (`SHIP_NOISE`).
 """
 
 from __future__ import annotations
@@ -19,8 +17,11 @@ import numpy as np
 
 from simnav.compiled import helper, kernel
 from simnav.geometry.earth import radii_scalar
-from simnav.kernel_types import IntegerVector, Matrix, Stack, Vector
-from simnav.types import Array, Integers
+from simnav.kernel_types import Matrix, Stack, Vector
+from simnav.structures import structure
+from simnav.types import Array
+
+from .filtering import Aid
 
 __all__ = [
     "BODY_VELOCITY",
@@ -48,6 +49,9 @@ __all__ = [
 
 N, E, U, PSI, R, CN, CE = range(7)
 POSITION, HEADING, LOG, VELOCITY, BODY_VELOCITY = range(5)
+#: The noise of an instrument: variances of its two components and of the sideways velocity; squared scale factor and
+#: squared yaw misalignment that count as noise.
+SHIP_NOISE = structure(first=float, second=float, sway=float, scale=float, misalignment=float)
 #: Longest step of the integration [s].
 STEP = 1.0
 
@@ -249,23 +253,23 @@ def differ_ships(position: Matrix, x: Matrix, other: Matrix, other_x: Matrix, di
 
 
 @helper
-def reading(code: Integers, aid: Array, x: Array) -> tuple[float, float]:
+def reading(aid: Aid, x: Array) -> tuple[float, float]:
     """What an instrument should read, up to two components; a position in metres from that of the state."""
-    kind, at, scale = code[0], code[1], code[2]
-    u, psi, r = x[U], x[PSI], x[R]
+    kind, at, scale = aid.code, aid.bias_at, aid.scale_at
+    u, psi, r, lx, ly = x[U], x[PSI], x[R], aid.lever_arm[0], aid.lever_arm[1]
     a, b = 0.0, 0.0
     if kind == HEADING:
         a = psi
     elif kind == LOG:
-        a = u - r * aid[1]
+        a = u - r * ly
         if scale >= 0:
             a *= 1.0 + x[scale]
     else:
         c, s = cos(psi), sin(psi)
         if kind == POSITION:
-            a, b = x[N] + c * aid[0] - s * aid[1], x[E] + s * aid[0] + c * aid[1]
+            a, b = x[N] + c * lx - s * ly, x[E] + s * lx + c * ly
         else:
-            ahead, across = u - r * aid[1], r * aid[0]
+            ahead, across = u - r * ly, r * lx
             if kind == VELOCITY:
                 a, b = c * ahead - s * across + x[CN], s * ahead + c * across + x[CE]
             else:
@@ -278,10 +282,10 @@ def reading(code: Integers, aid: Array, x: Array) -> tuple[float, float]:
 
 
 @helper
-def fill_jacobian(code: Integers, aid: Array, x: Array, jacobian: Array) -> None:
+def fill_jacobian(aid: Aid, x: Array, jacobian: Array) -> None:
     """The derivative of `reading`, into a matrix of zeros (or of the same instrument's last one)."""
-    kind, at, scale = code[0], code[1], code[2]
-    u, psi, r, lx, ly = x[U], x[PSI], x[R], aid[0], aid[1]
+    kind, at, scale = aid.code, aid.bias_at, aid.scale_at
+    u, psi, r, lx, ly = x[U], x[PSI], x[R], aid.lever_arm[0], aid.lever_arm[1]
     if kind == HEADING:
         jacobian[0, PSI] = 1.0
     elif kind == LOG:
@@ -314,27 +318,25 @@ def fill_jacobian(code: Integers, aid: Array, x: Array, jacobian: Array) -> None
 
 
 @helper
-def residual_of(
-    code: Integers, aid: Array, position: Array, x: Array, first: float, second: float
-) -> tuple[float, float]:
+def residual_of(aid: Aid, position: Array, x: Array, first: float, second: float) -> tuple[float, float]:
     """Measured minus predicted: metres, radians or metres per second; the second is 0 of a single component."""
-    a, b = reading(code, aid, x)
-    if code[0] == POSITION:
+    a, b = reading(aid, x)
+    if aid.code == POSITION:
         meridian, prime = radii_scalar(sin(position[0]))
         east = second - position[1]
         first = (first - position[0]) * (meridian + position[2])
         second = atan2(sin(east), cos(east)) * (prime + position[2]) * cos(position[0])
-    elif code[0] == HEADING:
+    elif aid.code == HEADING:
         return atan2(sin(first - a), cos(first - a)), 0.0
-    elif code[0] == LOG:
+    elif aid.code == LOG:
         return first - a, 0.0
     return first - a, second - b
 
 
 @kernel
 def observe_ship(
-    code: IntegerVector,
-    aid: Vector,
+    aid: Aid,
+    figures: Vector,
     position: Vector,
     x: Vector,
     first: float,
@@ -347,10 +349,10 @@ def observe_ship(
 
     Parameters
     ----------
-    code : (3,) array of int
-        The instrument: kind, and indices of its first bias and its scale factor (see the module).
-    aid : (7,) array
-        The instrument (see the module).
+    aid : Aid
+        The instrument.
+    figures : (5,) array
+        The `SHIP_NOISE` of the instrument.
     position : (3,) array
         Latitude, longitude [rad] and height [m].
     x : (n,) array
@@ -364,31 +366,32 @@ def observe_ship(
     noise : (m, m) array
         Overwritten.
     """
-    a, b = residual_of(code, aid, position, x, first, second)
+    white = figures.view(SHIP_NOISE)[0]
+    a, b = residual_of(aid, position, x, first, second)
     residual[0] = a
-    noise[0, 0] = aid[2]
-    fill_jacobian(code, aid, x, jacobian)
+    noise[0, 0] = white.first
+    fill_jacobian(aid, x, jacobian)
     if residual.size == 1:
         return
     residual[1] = b
-    noise[0, 1], noise[1, 0], noise[1, 1] = 0.0, 0.0, aid[3]
-    if code[0] == VELOCITY:
+    noise[0, 1], noise[1, 0], noise[1, 1] = 0.0, 0.0, white.second
+    if aid.code == VELOCITY:
         c, s = cos(x[PSI]), sin(x[PSI])
-        noise[0, 0] += s * s * aid[4]
-        noise[0, 1] -= s * c * aid[4]
-        noise[1, 0] -= s * c * aid[4]
-        noise[1, 1] += c * c * aid[4]
-    elif code[0] == BODY_VELOCITY:
-        v, w = reading(code, aid, x)
-        noise[0, 0] += aid[5] * v * v + aid[6] * w * w
-        noise[1, 1] += aid[5] * w * w + aid[6] * v * v + aid[4]
+        noise[0, 0] += s * s * white.sway
+        noise[0, 1] -= s * c * white.sway
+        noise[1, 0] -= s * c * white.sway
+        noise[1, 1] += c * c * white.sway
+    elif aid.code == BODY_VELOCITY:
+        v, w = reading(aid, x)
+        noise[0, 0] += white.scale * v * v + white.misalignment * w * w
+        noise[1, 1] += white.scale * w * w + white.misalignment * v * v + white.sway
 
 
 @kernel
-def read_ships(code: IntegerVector, aid: Vector, states: Matrix, readings: Matrix) -> None:
+def read_ships(aid: Aid, states: Matrix, readings: Matrix) -> None:
     """Fill in (k, m) what an instrument should read at (k, n) states; a position in metres."""
     for k in range(states.shape[0]):
-        a, b = reading(code, aid, states[k])
+        a, b = reading(aid, states[k])
         readings[k, 0] = a
         if readings.shape[1] > 1:
             readings[k, 1] = b
@@ -427,11 +430,10 @@ def describe_ship(x: Vector, covariance: Matrix, sway: float, velocity: Vector, 
         Rows and columns 0, 1, 3, 4 and 8 are overwritten.
     """
     n = x.size
-    code, aid = np.empty(3, dtype=np.int64), np.zeros(7)
-    code[0], code[1], code[2] = VELOCITY, -1, -1
-    velocity[0], velocity[1] = reading(code, aid, x)
+    aid = Aid(VELOCITY, np.zeros(3), -1, -1)
+    velocity[0], velocity[1] = reading(aid, x)
     G = np.zeros((2, n))
-    fill_jacobian(code, aid, x, G)
+    fill_jacobian(aid, x, G)
     rows = np.zeros((5, n))  # of G P, G being of position, velocity, heading
     for j in range(n):
         rows[0, j], rows[1, j], rows[4, j] = covariance[N, j], covariance[E, j], covariance[PSI, j]

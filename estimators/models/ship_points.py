@@ -6,24 +6,105 @@ what is added to it, in metres for the position.
 
 from __future__ import annotations
 
+from math import atan2, cos, sin
+
 import numpy as np
 
+from simnav.compiled import helper, kernel
+from simnav.kernel_types import Matrix, Vector
 from simnav.types import Array, Measurement
 
-from .equations import equation_of
-from .points import PointModel
-from .ship import ShipModel
-from .ship_kernels import move_ships, read_ships
+from .filtering import Aid, Dynamics, ModelFunctions, Prediction, Readings, aid_of
+from .points import PointModel, predict_through, propagate_through
+from .propagation import Samples
+from .ship import ShipModel, components_of
+from .ship_functions import SHIP_MOTION, retract, ship_state
+from .ship_functions import predict as linearise
+from .ship_functions import propagate as propagate_linearised
+from .ship_kernels import HEADING, move_ships, read_ships
 
 __all__ = ["ShipPoints"]
+
+
+@helper
+def states_at(x: Array, errors: Array) -> Array:
+    """(k + 1, n) states: the one that k points differ from, and they."""
+    k, n = errors.shape
+    states = np.empty((k + 1, n))
+    for i in range(n):
+        states[0, i] = x[i]
+        for j in range(k):
+            states[j + 1, i] = x[i] + errors[j, i]
+    return states
+
+
+@kernel
+def move_points(x: Vector, decay: Vector, turn_time: float, elapsed: float, errors: Matrix) -> None:
+    """Move points from their differences from a state to those from the state after a time, in place."""
+    states = states_at(x, errors)
+    move_ships(states, decay, turn_time, elapsed)
+    for j in range(errors.shape[0]):
+        for i in range(errors.shape[1]):
+            errors[j, i] = states[j + 1, i] - states[0, i]
+
+
+@kernel
+def observe_points(aid: Aid, x: Vector, errors: Matrix, differences: Matrix) -> None:
+    """Fill in what an instrument should read at points, minus what it should read at the state."""
+    k, d = differences.shape
+    readings = np.empty((k + 1, d))
+    read_ships(aid, states_at(x, errors), readings)
+    for j in range(k):
+        for i in range(d):
+            difference = readings[j + 1, i] - readings[0, i]
+            differences[j, i] = atan2(sin(difference), cos(difference)) if aid.code == HEADING else difference
+
+
+@kernel
+def move(dynamics: Dynamics, samples: Samples, until: float) -> None:
+    """Advance state and points; the covariance becomes that of the process noise."""
+    state = ship_state(dynamics.numbers)
+    turn_time = dynamics.constants.view(SHIP_MOTION)[0].turn_time
+    move_points(state.x, dynamics.decay, turn_time, until - state.clock[0], dynamics.points.errors)
+    dynamics.covariance[:] = 0.0
+    propagate_linearised(dynamics, samples, until)
+
+
+@kernel(passed=True)
+def propagate(dynamics: Dynamics, samples: Samples, until: float) -> None:
+    """Advance the state and its covariance to a time, through points."""
+    if until > ship_state(dynamics.numbers).clock[0]:
+        propagate_through(move, retract, dynamics, samples, until)
+
+
+@kernel
+def read(dynamics: Dynamics, readings: Readings, k: int, differences: Matrix) -> None:
+    """What an instrument should read at the points, minus what it should read at the state."""
+    aid, x = aid_of(dynamics.aids, readings.instrument[k]), ship_state(dynamics.numbers).x
+    observe_points(aid, x, dynamics.points.errors, differences)
+
+
+@kernel(passed=True)
+def predict(dynamics: Dynamics, readings: Readings, k: int, prediction: Prediction) -> bool:
+    """Compute what a reading should be, and the covariance of that, from points."""
+    return predict_through(linearise, read, dynamics, readings, k, prediction)
+
+
+@kernel(passed=True)
+def predict_again(dynamics: Dynamics, readings: Readings, k: int, prediction: Prediction) -> None:
+    """There is no IMU: the process noise covers manoeuvres, and nothing is inflated."""
+    predict(dynamics, readings, k, prediction)
+
+
+POINT_FUNCTIONS = ModelFunctions(propagate, predict, retract, predict_again)
 
 
 class ShipPoints(ShipModel, PointModel):
     """`ShipModel` with points; the parameters are its own."""
 
-    def states(self, errors: Array) -> Array:
-        """(k, n) states of points: metres north and east of the model's own position, and its other states."""
-        return np.asarray(self.x + errors)
+    def point_functions(self) -> ModelFunctions | None:
+        """As `PointModel.point_functions`; None where `functions` is."""
+        return None if self.functions() is None else POINT_FUNCTIONS
 
     def move(self, states: Array, elapsed: float) -> None:
         """Advance (k, n) states by the model's motion, in place, in its own steps (`ShipModel`)."""
@@ -33,18 +114,15 @@ class ShipPoints(ShipModel, PointModel):
     def propagate_points(self, errors: Array, until: float) -> Array:
         """Advance the state and the points; return the process noise."""
         noise = np.zeros((self.size, self.size))
-        states = self.states(np.concatenate([np.zeros((1, self.size)), errors]))
-        elapsed = until - self.time
-        self.move(states, elapsed)
-        errors[:] = states[1:] - states[0]
+        move_points(self.x, self.decay, self.turn_time, until - self.time, errors)
         self.propagate(noise, until)
         return noise
 
     def read(self, measurement: Measurement, states: Array) -> Array:
         """(k, m) what an instrument should read at k states; positions in metres from the model's own."""
-        code, aid, m = self.aids[measurement.instrument]
-        readings = np.empty((len(states), m))
-        read_ships(code, aid, states, readings)
+        aid = self.aids[measurement.instrument]
+        readings = np.empty((len(states), components_of(aid)))
+        read_ships(aid, states, readings)
         return readings
 
     def observe_points(self, measurement: Measurement, errors: Array) -> Array:
@@ -52,8 +130,7 @@ class ShipPoints(ShipModel, PointModel):
         if measurement.instrument in self.own:
             own = self.own[measurement.instrument]
             return own.differences_at(measurement.time, self.position, self.x, errors, measurement.side)
-        reading = self.read(measurement, self.states(np.concatenate([np.zeros((1, self.size)), errors])))
-        difference = reading[1:] - reading[0]
-        if equation_of(self.instruments[measurement.instrument]).is_heading:
-            difference = np.arctan2(np.sin(difference), np.cos(difference))
-        return np.asarray(difference)
+        aid = self.aids[measurement.instrument]
+        differences = np.empty((len(errors), components_of(aid)))
+        observe_points(aid, self.x, errors, differences)
+        return differences

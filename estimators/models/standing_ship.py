@@ -8,16 +8,72 @@ say they did.
 
 from __future__ import annotations
 
-import numpy as np
+from typing import ClassVar
 
+from simnav.compiled import kernel
+from simnav.kernel_types import Matrix, Vector
+from simnav.structures import filled
 from simnav.types import Array, InitialState, Instruments, Measurement
 
 from .base import Linearised
 from .equations import equation_of
+from .filtering import Dynamics, ModelFunctions, Prediction, Readings
+from .propagation import Samples
 from .ship import POSITIONS, E, N, ShipModel
-from .ship_kernels import U
+from .ship_functions import SHIP_FUNCTIONS, SHIP_MOTION, ship_state
+from .ship_functions import predict as predict_ship
+from .ship_functions import propagate as propagate_ship
+from .ship_kernels import POSITION, U
 
 __all__ = ["StandingShip"]
+
+
+@kernel
+def stand(
+    position: Vector, place: Vector, covariance: Matrix, speed: float, constants: Vector, begin: float, until: float
+) -> None:
+    """Bring a ship back to where it was, if it has had no fix for a time; its position gets uncertain by its way.
+
+    Parameters
+    ----------
+    position, place : (3,) arrays
+        Where the ship is at the end of a time, overwritten, and where it was at its beginning.
+    covariance : (n, n) array
+        Covariance of the errors; updated.
+    speed : float
+        Through the water [m/s].
+    constants : array
+        A `SHIP_MOTION`.
+    begin, until : float
+        The time [s].
+    """
+    motion = constants.view(SHIP_MOTION)[0]
+    if until <= max(begin, motion.last_fix + motion.patience):
+        return
+    for i in range(3):
+        position[i] = place[i]
+    waited, waited_before = until - motion.last_fix, begin - motion.last_fix
+    grown = speed**2 * (waited**2 - waited_before**2)
+    covariance[N, N] += grown
+    covariance[E, E] += grown
+
+
+@kernel(passed=True)
+def propagate(dynamics: Dynamics, samples: Samples, until: float) -> None:
+    """Advance the state and its covariance to a time."""
+    state = ship_state(dynamics.numbers)
+    begin, place = state.clock[0], state.position.copy()
+    if until > begin:
+        propagate_ship(dynamics, samples, until)
+        stand(state.position, place, dynamics.covariance, state.x[U], dynamics.constants, begin, until)
+
+
+@kernel(passed=True)
+def predict(dynamics: Dynamics, readings: Readings, k: int, prediction: Prediction) -> bool:
+    """Predict a reading; a fix ends the standing."""
+    if dynamics.aids.code[readings.instrument[k]] == POSITION:
+        dynamics.constants.view(SHIP_MOTION)[0].last_fix = readings.time[k]
+    return predict_ship(dynamics, readings, k, prediction)
 
 
 class StandingShip(ShipModel):
@@ -31,8 +87,8 @@ class StandingShip(ShipModel):
         Time without a fix after which the position stays where it is [s].
     """
 
-    fused = False
-    memory = ("_last_fix",)
+    memory = ("constants",)
+    equations: ClassVar[ModelFunctions] = SHIP_FUNCTIONS._replace(propagate=propagate, predict=predict)
 
     def __init__(self, patience: float = 1.5):
         if not patience > 0.0:
@@ -42,24 +98,19 @@ class StandingShip(ShipModel):
 
     def begin(self, start: InitialState, instruments: Instruments) -> Array:
         """Set the state; UnsuitableScenario if there is nothing that gives a speed and a heading."""
-        self._last_fix = np.array(start.time, dtype=np.float64)
-        return super().begin(start, instruments)
+        covariance = super().begin(start, instruments)
+        self.constants = filled(SHIP_MOTION, turn_time=self.turn_time, patience=self.patience, last_fix=start.time)
+        return covariance
 
     def propagate(self, covariance: Array, until: float) -> None:
         """Advance the state and its covariance."""
         begin, place = self.time, self.position.copy()
-        super().propagate(covariance, until)
-        still_from = max(begin, float(self._last_fix) + self.patience)
-        if until <= still_from:
-            return
-        self.position[:] = place
-        waited, waited_before = until - float(self._last_fix), begin - float(self._last_fix)
-        grown = float(self.x[U]) ** 2 * (waited**2 - waited_before**2)
-        covariance[N, N] += grown
-        covariance[E, E] += grown
+        if until > begin:
+            super().propagate(covariance, until)
+            stand(self.position, place, covariance, float(self.x[U]), self.constants, begin, until)
 
     def measure(self, measurement: Measurement) -> Linearised | None:
         """Linearise one measurement; a fix ends the standing."""
         if equation_of(self.instruments[measurement.instrument]).name in POSITIONS:
-            self._last_fix[...] = measurement.time
+            self.constants.view(SHIP_MOTION)[0].last_fix = measurement.time
         return super().measure(measurement)

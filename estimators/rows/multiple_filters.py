@@ -85,6 +85,8 @@ class MidValue(
         version 1.
     3
         It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
+    4
+        The motion is suspected, too, where the weighting has rejected measurements, and where there is no log.
     """
 
-    version = 3
+    version = 4

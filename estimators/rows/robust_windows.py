@@ -50,9 +50,11 @@ class HuberFgo(_Robust, weighting=piece(TunedMEstimator, weight=huber)):
     --------
     2
         It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
+    3
+        The motion is suspected, too, where the weighting has rejected measurements, and where there is no log.
     """
 
-    version = 2
+    version = 3
 
 
 @register("tukey-fgo")
@@ -73,9 +75,11 @@ class TukeyFgo(_Robust, weighting=piece(TunedMEstimator, weight=tukey)):
     --------
     2
         It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
+    3
+        The motion is suspected, too, where the weighting has rejected measurements, and where there is no log.
     """
 
-    version = 2
+    version = 3
 
 
 @register("cauchy-fgo")
@@ -93,9 +97,11 @@ class CauchyFgo(_Robust, weighting=piece(TunedMEstimator, weight=cauchy)):
     --------
     2
         It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
+    3
+        The motion is suspected, too, where the weighting has rejected measurements, and where there is no log.
     """
 
-    version = 2
+    version = 3
 
 
 @register("gm-fgo")
@@ -116,9 +122,11 @@ class GmFgo(_Robust, weighting=piece(TunedMEstimator, weight=geman_mcclure)):
     --------
     2
         It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
+    3
+        The motion is suspected, too, where the weighting has rejected measurements, and where there is no log.
     """
 
-    version = 2
+    version = 3
 
 
 @register("dcs-fgo")
@@ -140,9 +148,11 @@ class DcsFgo(_Robust, weighting=DynamicCovarianceScaling):
     --------
     2
         It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
+    3
+        The motion is suspected, too, where the weighting has rejected measurements, and where there is no log.
     """
 
-    version = 2
+    version = 3
 
 
 @register("switchable-fgo")
@@ -163,9 +173,11 @@ class SwitchableFgo(_Robust, weighting=SwitchableConstraints):
     --------
     2
         It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
+    3
+        The motion is suspected, too, where the weighting has rejected measurements, and where there is no log.
     """
 
-    version = 2
+    version = 3
 
 
 @register("gnc-fgo")
@@ -197,9 +209,11 @@ class GncFgo(
         version 2.
     4
         It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
+    5
+        The motion is suspected, too, where the weighting has rejected measurements, and where there is no log.
     """
 
-    version = 4
+    version = 5
 
 
 @register("max-mixture-fgo")
@@ -217,9 +231,11 @@ class MaxMixtureFgo(_Robust, weighting=MaxMixture):
     --------
     2
         It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
+    3
+        The motion is suspected, too, where the weighting has rejected measurements, and where there is no log.
     """
 
-    version = 2
+    version = 3
 
 
 @register("ga-fgo")

@@ -25,13 +25,13 @@ import numpy as np
 from simnav.estimators.composition import Solver
 from simnav.estimators.models.equations import equation_of_kind
 from simnav.estimators.models.measurements import radii, wrap
+from simnav.estimators.models.points import draw_points
 from simnav.estimators.models.ship import OBSERVED, E, N
 from simnav.estimators.models.ship_points import ShipPoints
 from simnav.geometry.earth import displace
 from simnav.types import Array, Datasheet, Estimate, InitialState, Instruments, Measurement
 
 from .filterpy_adapter import FilterpyEstimator
-from .sigma_point import draw_points
 
 __all__ = ["FilterpyUnscentedEstimator"]
 

@@ -23,13 +23,13 @@ import numpy as np
 
 from simnav.compiled import kernel
 from simnav.estimators.models.base import Linearised
+from simnav.estimators.models.filtering import Aid
 from simnav.estimators.models.inertial import InertialModel
 from simnav.estimators.models.measurements import (
     DVL,
     GNSS_POSITION,
     GNSS_VELOCITY,
     SPEED_LOG,
-    Aid,
     State,
     observe_inertial,
 )

@@ -29,14 +29,17 @@ import numpy as np
 from simnav.compiled import kernel
 from simnav.estimators.models.base import NO_SAMPLES
 from simnav.estimators.models.propagation import (
+    CLOCK,
     HELD_ATTITUDE,
     HELD_VELOCITY,
+    IMU_NOISE,
     TURN_TIME,
     Samples,
     next_interval,
 )
 from simnav.geometry.rotation import cross
 from simnav.kernel_types import Matrix, Vector
+from simnav.structures import filled, length, structure
 from simnav.types import Array, ImuSamples
 
 from .tangent_frame import TangentFrame
@@ -52,6 +55,8 @@ INTEGRATION = 1e-12
 #: of velocity and position would be the same.
 HELD_PARTS, HELD_PART = 4, 0.1
 _EYE = np.eye(3)
+#: A piece of constant rate and force; held is 1 where there is no data, and the state is to be held.
+PIECE = structure(duration=float, rate=3, force=3, held=float)
 
 
 @kernel
@@ -72,8 +77,8 @@ def imu_pieces(
 
     Parameters
     ----------
-    clock : (15,) array
-        As of `simnav.estimators.models.propagation.Motion`, but for the seconds held; updated.
+    clock : array
+        A `simnav.estimators.models.propagation.CLOCK`; updated, but for the seconds held.
     memory : (6,) array
         Angle and velocity increment of the last whole sample; updated.
     bias : (6,) array
@@ -84,8 +89,8 @@ def imu_pieces(
         Index of the first sample that is not completely used.
     until, nominal : float
         End of the stretch, and the nominal interval [s].
-    pieces : (m, 8) array
-        Filled: duration, rate, force, 1 where the state is to be held. m of twice the samples and four more suffices.
+    pieces : (m, ...) array
+        Filled, a `PIECE` in each row. m of twice the samples and four more suffices.
 
     Returns
     -------
@@ -93,20 +98,22 @@ def imu_pieces(
         Index of the first sample that is not used up, and the number of pieces.
     """
     eps = 1e-7
-    t, i, count = clock[0], first, 0
+    sampled = clock.view(CLOCK)[0]
+    rate, force = sampled.mean_rate, sampled.mean_force
+    t, i, count = sampled.time, first, 0
     while t < until - eps:
-        covered = next_interval(clock, samples, i, t, until, nominal)
+        covered = next_interval(sampled, samples, i, t, until, nominal)
         i, stop, whole = covered.sample, covered.stop, covered.whole
         dt = stop - t
-        piece = pieces[count]
+        piece = pieces[count].view(PIECE)[0]
         count += 1
-        piece[0], piece[7] = dt, 0.0
+        piece.duration, piece.held = dt, 0.0
         if covered.hold:
-            piece[7] = 1.0
+            piece.held = 1.0
             memory[:] = 0.0
         else:
-            a0, a1, a2 = (clock[3] - bias[0]) * dt, (clock[4] - bias[1]) * dt, (clock[5] - bias[2]) * dt
-            n0, n1, n2 = (clock[6] - bias[3]) * dt, (clock[7] - bias[4]) * dt, (clock[8] - bias[5]) * dt
+            a0, a1, a2 = (rate[0] - bias[0]) * dt, (rate[1] - bias[1]) * dt, (rate[2] - bias[2]) * dt
+            n0, n1, n2 = (force[0] - bias[3]) * dt, (force[1] - bias[4]) * dt, (force[2] - bias[5]) * dt
             m0, m1, m2 = memory[0], memory[1], memory[2]
             q0, q1, q2 = cross(m0, m1, m2, a0, a1, a2)
             r0, r1, r2 = a0 + q0 / 12.0, a1 + q1 / 12.0, a2 + q2 / 12.0
@@ -115,16 +122,16 @@ def imu_pieces(
             s0, s1, s2 = (x0 + y0) / 12.0, (x1 + y1) / 12.0, (x2 + y2) / 12.0
             # GTSAM will turn all of it by half the sample; the sculling is in the axes at the start.
             x0, x1, x2 = cross(r0, r1, r2, s0, s1, s2)
-            piece[1], piece[2], piece[3] = r0 / dt + bias[0], r1 / dt + bias[1], r2 / dt + bias[2]
-            piece[4] = (n0 + s0 - 0.5 * x0) / dt + bias[3]
-            piece[5] = (n1 + s1 - 0.5 * x1) / dt + bias[4]
-            piece[6] = (n2 + s2 - 0.5 * x2) / dt + bias[5]
+            piece.rate[0], piece.rate[1], piece.rate[2] = r0 / dt + bias[0], r1 / dt + bias[1], r2 / dt + bias[2]
+            piece.force[0] = (n0 + s0 - 0.5 * x0) / dt + bias[3]
+            piece.force[1] = (n1 + s1 - 0.5 * x1) / dt + bias[4]
+            piece.force[2] = (n2 + s2 - 0.5 * x2) / dt + bias[5]
             if whole > 0.0:
                 scale = whole / dt
                 memory[0], memory[1], memory[2] = a0 * scale, a1 * scale, a2 * scale
                 memory[3], memory[4], memory[5] = n0 * scale, n1 * scale, n2 * scale
         t = stop
-    clock[0] = max(clock[0], until)
+    sampled.time = max(sampled.time, until)
     return i, count
 
 
@@ -160,25 +167,26 @@ class Preintegration:
     """
 
     def __init__(self, densities: Array, variance: Array, frame: TangentFrame, time: float):
-        self._noise, self._frame = densities, frame
+        self._noise: Any = densities.view(IMU_NOISE)[0]
+        self._frame = frame
+        gyroscope, accelerometer = float(self._noise.gyroscope_walk), float(self._noise.accelerometer_walk)
         self._walk = (
-            max(float(densities[3]), LEAST_WALK * float(variance[0]), LEAST_WALK * LEAST_GYROSCOPE) * _EYE,
-            max(float(densities[5]), LEAST_WALK * float(variance[3]), LEAST_WALK * LEAST_ACCELEROMETER) * _EYE,
+            max(gyroscope, LEAST_WALK * float(variance[0]), LEAST_WALK * LEAST_GYROSCOPE) * _EYE,
+            max(accelerometer, LEAST_WALK * float(variance[3]), LEAST_WALK * LEAST_ACCELEROMETER) * _EYE,
         )
-        self._clock, self._memory, self._turn = np.zeros(15), np.zeros(6), np.zeros(3)
-        self._clock[0], self._clock[1] = time, -1e9
+        self._clock, self._memory, self._turn = filled(CLOCK, time=time, used=-1e9), np.zeros(6), np.zeros(3)
         self.held = 0.0
         self.load(None)
 
     @property
     def time(self) -> float:
         """Of the end [s]."""
-        return float(self._clock[0])
+        return float(self._clock.view(CLOCK)[0].time)
 
     @property
     def rate(self) -> Array:
         """Body rate at the end, extrapolated, as measured [rad/s]."""
-        return self._clock[12:15].copy()
+        return np.array(self._clock.view(CLOCK)[0].rate)
 
     def load(self, imu: ImuSamples | None) -> None:
         """Take the IMU samples of the step that follows."""
@@ -198,10 +206,10 @@ class Preintegration:
         noise, turn = self._noise, self._turn**2
         self.state, self.bias, self.elapsed = state, bias, 0.0
         self._hat = np.array([*bias.gyroscope(), *bias.accelerometer()])
-        turning = noise[6] * turn + noise[7] * (turn.sum() - turn)
+        turning = noise.scale * turn + noise.misalignment * (turn.sum() - turn)
         self._white = (
-            np.diag(np.maximum(noise[0] + turning, LEAST_GYROSCOPE)),
-            max(float(noise[1]), LEAST_ACCELEROMETER) * _EYE,
+            np.diag(np.maximum(noise.gyroscope + turning, LEAST_GYROSCOPE)),
+            max(float(noise.accelerometer), LEAST_ACCELEROMETER) * _EYE,
         )
         self._params = p = gtsam.PreintegrationCombinedParams(self._frame.gravity(state.position()))
         p.setOmegaCoriolis(self._frame.rotation)
@@ -223,9 +231,9 @@ class Preintegration:
         elapsed = until - self.time
         if elapsed <= 0.0:
             return
-        pieces = np.empty((2 * len(self._samples[0]) + 4, 8))
+        pieces = np.empty((2 * len(self._samples[0]) + 4, length(PIECE)))
         self._first, count = imu_pieces(
-            self._clock, self._memory, self._hat, self._samples, self._first, until, float(self._noise[8]), pieces
+            self._clock, self._memory, self._hat, self._samples, self._first, until, float(self._noise.interval), pieces
         )
         pieces = pieces[:count]
         rates, forces = pieces[:, 1:4], pieces[:, 4:7]

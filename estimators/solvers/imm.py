@@ -11,7 +11,6 @@ import numpy as np
 from simnav.compiled import kernel
 from simnav.estimators.adaptations.choice import Choice, choose_noise, keep_nominal
 from simnav.estimators.adaptations.prediction import PredictionTest
-from simnav.estimators.adaptations.rules import OWN
 from simnav.estimators.algebra.mixture import mixture_update
 from simnav.estimators.models.channels import summary
 from simnav.estimators.models.coupling import by_source
@@ -122,7 +121,7 @@ class ImmEstimator(KalmanEstimator):
             last=np.zeros((i, 9)),
             settings=np.tile([*self._variances, *self.transition.ravel()], (len(instruments), 1)),
             memories=probability.ravel(), first=np.arange(0, probability.size + 1, len(self._variances)),
-            shared=np.full(OWN + 1, np.nan), **PredictionTest(instruments).arrays(self.model.size),
+            before=np.full(1, np.nan), tested=PredictionTest(instruments).tested(self.model.size),
         )  # fmt: skip
 
     def correct(self, dynamics: Dynamics, choice: Choice, readings: Readings, k: int, prediction: Prediction) -> float:

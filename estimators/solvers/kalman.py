@@ -32,7 +32,7 @@ from simnav.estimators.composition import Solver
 from simnav.estimators.models.base import ErrorModel, Linearised
 from simnav.estimators.models.channels import owners, summary
 from simnav.estimators.models.coupling import by_source
-from simnav.estimators.models.filtering import Dynamics, Prediction, Readings, ReadingsOfSteps
+from simnav.estimators.models.filtering import Dynamics, ModelFunctions, Prediction, Readings, ReadingsOfSteps
 from simnav.estimators.models.propagation import Samples
 from simnav.estimators.models.stated_sigmas import with_stated_sigmas
 from simnav.estimators.models.suitable import ModelChoice
@@ -193,7 +193,7 @@ class KalmanEstimator(Solver):
         They are kernels where the model has its equations as kernels and nothing has to be known of a measurement in
         Python: a smoother and an iteration have to know.
         """
-        kernels, own, inflate = self.model.functions(), self.adaptation, self.inflate
+        kernels, own, inflate = self._kernels(), self.adaptation, self.inflate
         choose: Callable[..., None] = self.choose
         if own is None:
             choose = use_nominal
@@ -209,9 +209,17 @@ class KalmanEstimator(Solver):
             inflate = kernels.inflate_motion
         return FilterFunctions(kernels.propagate, kernels.predict, choose, inflate, correct, kernels.retract)
 
+    def _kernels(self) -> ModelFunctions | None:
+        """The equations of the model as kernels; subclasses may override it."""
+        return self.model.functions()
+
+    def _dynamics(self) -> Dynamics:
+        """What the functions of the model work on; subclasses may override it."""
+        return self.model.dynamics(self.covariance, self._names)
+
     def _assembled(self, instruments: Instruments) -> Filter:
         """The filter of a run, with all that its functions work on."""
-        self.dynamics = self.model.dynamics(self.covariance, self._names)
+        self.dynamics = self._dynamics()
         functions = self.functions()._asdict()
         self._together = functions.pop("together")
         self._reports = functions["choose"] is choose_noise

@@ -56,7 +56,7 @@ from simnav.estimators.algebra.block_tridiagonal import half_squares, keep_weigh
 from simnav.estimators.algebra.factors import NewRows, Rows
 from simnav.estimators.composition import Solver
 from simnav.estimators.models.base import ErrorModel
-from simnav.estimators.models.chains import Chain, InertialChain, chain_of
+from simnav.estimators.models.chains import Chain, chain_of
 from simnav.estimators.models.channels import owners, summary
 from simnav.estimators.models.coupling import by_source
 from simnav.estimators.models.filtering import Readings, ReadingsOfSteps
@@ -249,8 +249,8 @@ class WindowEstimator(LooksBack, Solver):
         """Make the measurements of a step factors; their number."""
         chain, count, spacing = self.chain, len(admitted), 0.0 if self.every_sample else self.spacing
         new: NewRows
-        if isinstance(chain, InertialChain) and self._compiled:
-            step, readings = self._compiled_step(chain, count), self._arrays.fill(admitted)
+        if self._compiled:
+            step, readings = self._compiled_step(count), self._arrays.fill(admitted)
             new = attach_readings.unchecked(step, chain.rows, readings, chain.front.samples, count, until, spacing)
             chain.grow(new)
             self._admission.skipped += count - new.aids
@@ -263,8 +263,9 @@ class WindowEstimator(LooksBack, Solver):
         )  # fmt: skip
         return new.aids
 
-    def _compiled_step(self, chain: InertialChain, count: int) -> WindowStep:
+    def _compiled_step(self, count: int) -> WindowStep:
         """The functions of a step as kernels, with room for so many measurements."""
+        chain = self.chain
         growing, functions = chain.growing(count), chain.functions
         if self._step_record is None or self._step_record.growing is not growing:
             assert functions is not None

@@ -7,10 +7,15 @@ row. A filter cannot distinguish this from two instruments that are wrong at onc
 the motion factors of that time get nearly no weight. Then correct measurements agree with each other, and wrong ones do
 not. Only those that agree get their full weight.
 
+A measurement counts as failed if its residual fails the test, or if the last one of its instrument has ended with
+hardly any weight: a new measurement has its full weight at first, and an uncertain state follows it. While a log is
+failing, fixes fail, too, if their residuals since then do not pass a chi-square test together.
+
 If no fix was heard for a while, a log is the last witness beside the motion. If it fails several times in a row, one of
 the two is wrong, and nothing in the measurements says which. Then the motion is suspected: a log that is rejected for
 good leaves a prediction without bound, and a log that is wrongly believed leaves an error that grows with its own.
-The assumption is that a log is not wrong for long while it is the last witness.
+The assumption is that a log is not wrong for long while it is the last witness. Where there is no log at all, the same
+holds of fixes whose residuals have a common direction; those of a larger noise have none.
 """
 
 from __future__ import annotations
@@ -19,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simnav.compiled import kernel
-from simnav.estimators.algebra.chi_square import chi_square_limits
+from simnav.estimators.algebra.chi_square import chi_square_limits, normal_quantile
 from simnav.estimators.models.roles import fixes_and_logs
 from simnav.kernel_types import IntegerVector, Vector
 from simnav.types import Instruments
@@ -28,8 +33,12 @@ from .base import Factors
 
 __all__ = ["FaultIsolation"]
 
+#: Weight at which a measurement is rejected.
+REJECTED = 0.5
 #: Weight of the motion factors in the iteration that tests the measurements.
 LOOSE = 1e-6
+#: The same where there is no log: fixes alone do not hold velocity and attitude, which must not go too far.
+LOOSE_WITHOUT_LOG = 1e-3
 
 
 @kernel
@@ -55,6 +64,8 @@ class FaultIsolation:
         Fault isolation: probability that a healthy measurement passes its test.
     """
 
+    DIRECTED = 0.9  # probability that failures by white noise are not found to have a common direction
+
     def __init__(self, together: int = 3, recent: float = 5.0, sound: float = 0.999):
         if together < 0:
             raise ValueError(f"together = {together}: it must be 0 or more")
@@ -63,17 +74,17 @@ class FaultIsolation:
         if not 0.5 < sound < 1.0:
             raise ValueError(f"sound = {sound:g}: it must lie between 0.5 and 1")
         self.together, self.recent, self.sound = together, recent, sound
-        self._limits = np.array(chi_square_limits(sound))
+        self._limits, self._quantile = np.array(chi_square_limits(sound)), normal_quantile(self.DIRECTED)
 
     def reset(self, instruments: Instruments) -> None:
         """Begin a run."""
-        self._is_fix = fixes_and_logs(instruments)
-        if False not in self._is_fix.values() or not self.together:
-            self._is_fix = {}  # the test needs a log
+        self._is_fix = fixes_and_logs(instruments) if self.together else {}
+        self._has_logs = False in self._is_fix.values()
         self._fixed = -np.inf  # the time of the latest fix
         self._failures: dict[str, tuple[int, float, float]] = {}  # running; the time of the first and of the latest
         self._blamed: list[tuple[float, float, NDArray[np.bool_]]] = []  # from, to, and which instruments agreed
         self._tested = -np.inf
+        self._rejected: set[int] = set()
         self._asking: tuple[float, float] | None = None
         self._weight = self._motion_weight = np.empty(0)
         self._fresh = True
@@ -90,6 +101,7 @@ class FaultIsolation:
             if self._asking is not None:  # the last epoch ended before the result of the test
                 factors.motion_weight[:] = 1.0
             self._fresh, self._asking = True, None
+            self._rejected = self._rejected_before(factors)
             return False
         if not self._is_fix:
             return True
@@ -118,8 +130,19 @@ class FaultIsolation:
         factors.weight[(factors.time >= start) & (factors.time <= end)] = 1.0
         # The first reading may belong to an older node, so the motion that leads there is loosened, too.
         first = max(int(np.searchsorted(factors.motion_time, start, side="right")) - 1, 0)
-        factors.motion_weight[first:][factors.motion_time[first:] <= end] = LOOSE
+        loose = LOOSE if self._has_logs else LOOSE_WITHOUT_LOG
+        factors.motion_weight[first:][factors.motion_time[first:] <= end] = loose
         return False
+
+    def _rejected_before(self, factors: Factors) -> set[int]:
+        """The instruments whose newest measurement of the last epoch ended with hardly any weight."""
+        if not (factors.weight <= REJECTED).any():
+            return set()
+        last = {}
+        for i, time, weight in zip(factors.instrument.tolist(), factors.time.tolist(), factors.weight.tolist()):
+            if time <= self._tested:
+                last[i] = weight
+        return {i for i, weight in last.items() if weight <= REJECTED}
 
     def _suspect(self, factors: Factors) -> tuple[float, float] | None:
         """Test the new measurements at full weight; return the interval of a suspect motion, or None."""
@@ -133,9 +156,11 @@ class FaultIsolation:
         for i, time in zip(factors.instrument[new].tolist(), factors.time[new].tolist()):
             if self._is_fix.get(factors.names[i]):
                 self._fixed = time
-        if not (self._failures or self._blamed or failing_now):
+        if not (self._failures or self._blamed or failing_now or self._rejected):
             return None
+        # A new measurement has its full weight, so that an uncertain state may follow it; the weighting decides later.
         failed = factors.norm[new] ** 2 > self._limits[factors.components[new]]
+        failed |= np.isin(factors.instrument[new], list(self._rejected))
         for i, time, fails in zip(factors.instrument[new].tolist(), factors.time[new].tolist(), failed.tolist()):
             name = factors.names[i]
             if not fails:
@@ -148,10 +173,36 @@ class FaultIsolation:
         if self._blamed and now - self._blamed[-1][1] <= self.recent and failing:
             return self._blamed[-1][0], now
         failing = {n: f for n, f in failing.items() if f[0] >= self.together}
+        if not self._has_logs:
+            failing = {n: f for n, f in failing.items() if self._directed(factors, n, f[1])}
         kinds = {self._is_fix[name] for name in failing}
-        if len(kinds) < 2 and not (kinds == {False} and self._alone(now)):
+        if kinds == {False} and self._fixes_contradict(factors, min(since for _, since, _ in failing.values())):
+            kinds = {False, True}
+        if len(kinds) < 2 and not (failing and (self._alone(now) if False in kinds else not self._has_logs)):
             return None
         return min(since for _, since, _ in failing.values()), now
+
+    def _directed(self, factors: Factors, name: str, since: float) -> bool:
+        """Whether the residuals of an instrument have had a common direction since a time, as noise has not."""
+        its = (factors.instrument == factors.names.index(name)) & (factors.time >= since)
+        residual, norm, m = factors.whitened[its], factors.norm[its], float(factors.components[its].max())
+        cosine = np.einsum("ij,ij->i", residual[1:], residual[:-1]) / (norm[1:] * norm[:-1])
+        return len(cosine) > 0 and float(cosine.sum()) * (m / len(cosine)) ** 0.5 > self._quantile
+
+    def _fixes_contradict(self, factors: Factors, since: float) -> bool:
+        """Whether the fixes of one instrument do not agree with the motion since a log has been failing."""
+        fixes = [name for name in factors.names if self._is_fix.get(name)]
+        return any(self._agrees(factors, name, since) is False for name in fixes)
+
+    def _agrees(self, factors: Factors, name: str, start: float, end: float = np.inf) -> bool | None:
+        """Whether the residuals of an instrument pass their chi-square test together; None if there are none."""
+        from scipy.special import chdtri
+
+        asked = (factors.time >= start) & (factors.time <= end) & (factors.instrument == factors.names.index(name))
+        freedom = int(factors.components[asked].sum())
+        if not freedom:
+            return None
+        return bool(np.sum(factors.norm[asked] ** 2) <= chdtri(freedom, 1.0 - self.sound))
 
     def _alone(self, now: float) -> bool:
         """Whether logs are the last witnesses: no fix was heard for a while."""
@@ -162,14 +213,7 @@ class FaultIsolation:
 
         None unless a log is among them, and a fix as well where one was heard lately.
         """
-        from scipy.special import chdtri
-
-        asked = (factors.time >= start) & (factors.time <= end)
-        agreeing, kinds = np.zeros(len(factors.names), dtype=bool), set()
-        for i, name in enumerate(factors.names):
-            its = asked & (factors.instrument == i)
-            freedom = int(factors.components[its].sum())
-            if freedom and float(np.sum(factors.norm[its] ** 2)) <= chdtri(freedom, 1.0 - self.sound):
-                agreeing[i] = True
-                kinds.add(self._is_fix.get(name))
-        return agreeing if kinds >= ({False} if self._alone(end) else {True, False}) else None
+        agrees = [self._agrees(factors, name, start, end) is True for name in factors.names]
+        kinds = {self._is_fix.get(name) for name, agreed in zip(factors.names, agrees, strict=True) if agreed}
+        needed = {True} if not self._has_logs else {False} if self._alone(end) else {True, False}
+        return np.array(agrees, dtype=bool) if kinds >= needed else None

@@ -157,10 +157,10 @@ class Ranking:
     def to_dict(self) -> dict[str, Any]:
         """Plain dicts and lists for JSON; numbers that are not finite become None.
 
-        Each row has its stored cost, and its worst ratio under a wrong datasheet.
+        Each row of a track has its stored cost, and its worst ratio under a wrong datasheet.
         """
         found: dict[str, Any] = as_json(vars(self))
-        for board in (*found["tracks"], *found["scenarios"]):
+        for board in found["tracks"]:
             for row in board["rows"]:
                 row["cost"] = as_json(cost_of(row["estimator"], board["plain"], board["score"]))
                 worst = worst_of(row["estimator"], row["version"], board["plain"], board["score"])

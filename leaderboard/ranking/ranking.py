@@ -1,8 +1,9 @@
 """The ranking: who has which error beside an oracle on the same runs, which rows may be the best, and how sure that is.
 
 **Score.** The figure of a run is the ratio of its error to that of an oracle on the same run
-(`simnav.leaderboard.ranking.scenario_runs`). The score of a row is the geometric mean over its runs; each scenario
-counts the same (`simnav.leaderboard.ranking.statistics`). It never improves when a run gets worse or fails.
+(`simnav.leaderboard.ranking.scenario_runs`). The score of a row is the geometric mean over its runs; each kind of
+trouble of a track counts the same (`simnav.leaderboard.ranking.troubles`), and recorded voyages by recording. It never
+improves when a run gets worse or fails.
 
 **Failures count.** A failed run (error, timeout, out of memory, diverged, invalid output, no position at all) has the
 ratio `FAILURE`; no run has more. A lost run has its own error. An epoch without a position counts with the last
@@ -148,7 +149,7 @@ def rank(
     boards: list[TrackRanking] = []
     scenarios: dict[str, ScenarioRanking] = {}
     for found in runs_of_tracks(results, score, tracks):
-        boards.append(rank_track(found, requested))
+        boards.append(rank_track(found.by_trouble(), requested))
         if found.track.name != "post-processing":
             scenarios |= {t.name: _scenario(t, found.apart) for t in found.tables}
     return Ranking(tuple(boards), tuple(scenarios[name] for name in sorted(scenarios)))
@@ -156,8 +157,9 @@ def rank(
 
 @dataclass(frozen=True, eq=False)
 class _Figures:
-    """What the statistics of one row are made from: a figure a unit."""
+    """What the statistics of one row are made from: a figure a unit, and the scenario that it comes from."""
 
+    scenarios: list[str]
     strata: list[str]
     clusters: list[Any]
     logs: Array
@@ -289,6 +291,7 @@ def _not_suited(name: str, tables: Sequence[ScenarioRuns]) -> str:
 
 def _figures(tables: Sequence[ScenarioRuns], cells: Mapping[str, Cell]) -> _Figures:
     """A figure a scenario and seed. Where all scenarios are recorded, one a recording, each counting the same."""
+    scenarios: list[str] = []
     strata: list[str] = []
     clusters: list[Any] = []
     logs, failed = [], []
@@ -298,11 +301,12 @@ def _figures(tables: Sequence[ScenarioRuns], cells: Mapping[str, Cell]) -> _Figu
         cell = cells[t.name]
         units, values = cell.by_unit
         completed = {u for u, failed_here in zip(cell.units, cell.failed.tolist(), strict=True) if not failed_here}
+        scenarios += [t.name] * len(units)
         strata += ["recordings" if _all_recorded(tables) else t.stratum] * len(units)
         clusters += [(t.name, u) if t.recorded else u for u in units]
         logs.append(values)
         failed += [u not in completed for u in units]
-    return _Figures(strata, clusters, np.concatenate(logs), np.array(failed, dtype=bool))
+    return _Figures(scenarios, strata, clusters, np.concatenate(logs), np.array(failed, dtype=bool))
 
 
 def _rows(
@@ -329,7 +333,9 @@ def _rows(
         every = np.concatenate([c.capped for c in mine])
         lost = share(failed, runs)
         units = _count(tables, cells[n])
-        over = scenario_interval(f.logs, f.strata) if standing[n][0] != "incomplete" else Interval(math.nan)
+        over = (
+            scenario_interval(f.logs, f.scenarios, f.strata) if standing[n][0] != "incomplete" else Interval(math.nan)
+        )
         rows.append({
             "estimator": n,
             "standing": standing[n][0],
@@ -364,15 +370,16 @@ def _gain(name: str, tables: Sequence[ScenarioRuns], cells: Mapping[str, Cell], 
     """A row beside the plain row of each scenario, over the seeds that both have; None where there is no plain row."""
     if any(t.plain not in t.cells for t in tables) or any(t.name not in cells for t in tables):
         return None
-    mine, theirs, strata, clusters = [], [], list[str](), list[Any]()
+    mine, theirs, names, strata, clusters = [], [], list[str](), list[str](), list[Any]()
     for t in tables:
         plain = dict(zip(*_by_seed(t.cells[t.plain]), strict=True))
         for seed, log in zip(*_by_seed(cells[t.name]), strict=True):
             mine.append(log)
             theirs.append(plain[seed])
+            names.append(t.name)
             strata.append(t.stratum)
             clusters.append((t.name, t.unit(seed)) if t.recorded else seed)
-    return gain(mine, theirs, strata, clusters, excess)
+    return gain(mine, theirs, strata, clusters, excess, names)
 
 
 def _by_seed(cell: Cell) -> tuple[list[int], list[float]]:

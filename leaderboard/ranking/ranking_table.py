@@ -31,7 +31,7 @@ __all__ = [
 ]
 
 _CAPTION = (
-    "{score}: geometric mean over the runs, each scenario counting the same; a failed run counts {cap:g}. "
+    "{score}: geometric mean over the runs, each kind of trouble counting the same; a failed run counts {cap:g}. "
     "Rank: rows that share a rank cannot be told apart."
 )
 

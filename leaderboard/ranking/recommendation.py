@@ -33,7 +33,7 @@ from .troubles import trouble_of, troubles, within
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
-__all__ = ["Recommendation", "recommendation"]
+__all__ = ["Recommendation", "recommendation", "recommendations"]
 
 _SHOWN = 10  # rows of the table
 _WITH_INTERVALS = 2  # kinds of trouble whose intervals are in the table
@@ -84,29 +84,54 @@ def recommendation(
     limit : float, optional
         Milliseconds that an epoch may take.
     """
+    return recommendations(every, instruments, speaks, asked, (limit,))[0]
+
+
+def recommendations(
+    every: Sequence[TrackRuns],
+    instruments: Sequence[str],
+    speaks: Callable[[str], bool],
+    asked: Sequence[str],
+    limits: Sequence[float | None],
+) -> list[Recommendation]:
+    """Choose a row for each of several times of an epoch; the evidence is the same. As `recommendation`."""
     fitting = [runs for runs in (r.only(lambda s: bool(trouble_of(s)) and speaks(s)) for r in every) if runs.tables]
     chosen = _evidence(fitting, asked)
     known = {trouble_of(t.name) for runs in fitting for t in runs.tables}
     without = tuple(t for t in asked or troubles() if t not in known)
     groups = tuple(filter(None, (group_of(runs, t) for t, runs in chosen.items())))
-
-    def none(why: str) -> Recommendation:
-        return Recommendation(
-            tuple(instruments), tuple(chosen), without, limit, "none", why, None, None, (), 0, groups, (), ()
+    over = None if not groups else groups[0] if len(groups) == 1 else _together(chosen)
+    beside: dict[str, tuple[tuple[Elsewhere, ...], tuple[Elsewhere, ...]]] = {}
+    answers = []
+    for limit in limits:
+        made = Recommendation(
+            tuple(instruments), tuple(chosen), without, limit, "none", "", None, None, (), 0, groups, (), ()
         )
+        if over is None:
+            made = replace(made, why="no scenario of the results has these troubles and instruments")
+        else:
+            made = _chosen(made, over, next(iter(chosen.values())).track.score)
+        if made.row is not None:
+            name = made.row.estimator
+            if name not in beside:
+                wanted = [t for t in troubles() if not asked or t in chosen]
+                beside[name] = _elsewhere(fitting, chosen, name, wanted), _worse(fitting, chosen, name)
+            made = replace(made, elsewhere=beside[name][0], worse=beside[name][1])
+        answers.append(made)
+    return answers
 
-    if not groups:
-        return none("no scenario of the results has these troubles and instruments")
-    over = groups[0] if len(groups) == 1 else _together(chosen)
+
+def _chosen(asked: Recommendation, over: TroubleGroup, score: str) -> Recommendation:
+    """The answer from all of the evidence together."""
     if not over.plain or " or " in over.plain or (found := over.row(over.plain)) is None:
-        return none("the scenarios with these troubles have no plain row in common")
-    epoch = 1000.0 * found.update_median
-    score = next(iter(chosen.values())).track.score
+        return replace(asked, why="the scenarios with these troubles have no plain row in common")
+    epoch, limit = 1000.0 * found.update_median, asked.limit
     candidates = {r.estimator: _candidate(r, over.plain, score, epoch) for r in over.ranked}
     plain = candidates.get(over.plain) or _candidate(found, over.plain, score, epoch)
     allowed = {n: c for n, c in candidates.items() if limit is None or c.milliseconds <= limit}
     if not allowed:
-        return none("no row is ranked" if limit is None else f"no row with a stored cost takes {limit:g} ms or less")
+        why = "no row is ranked" if limit is None else f"no row with a stored cost takes {limit:g} ms or less"
+        return replace(asked, why=why)
     best = [c for c in allowed.values() if not allowed.keys() & set(c.result.worse_than)]
     better = [c for c in best if over.plain in c.result.better_than and not over.insufficient]
     decided = bool(better) or over.plain not in allowed
@@ -116,11 +141,9 @@ def recommendation(
         confidence = "beyond these scenarios"
     rest = [c for c in better or best if c is not row]
     rest.sort(key=lambda c: (math.isnan(c.cost), c.cost) if better else (False, c.result.to_reference))
-    return Recommendation(
-        tuple(instruments), tuple(chosen), without, limit, confidence, over.insufficient, row, plain, tuple(rest),
-        len(candidates), groups,
-        _elsewhere(fitting, chosen, row.estimator, [t for t in troubles() if not asked or t in chosen]),
-        _worse(fitting, chosen, row.estimator),
+    return replace(
+        asked, confidence=confidence, why=over.insufficient, row=row, plain=plain, as_good=tuple(rest),
+        compared=len(candidates),
     )  # fmt: skip
 
 

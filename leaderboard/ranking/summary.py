@@ -136,16 +136,6 @@ def sentence(track: TrackTable) -> str:
     gained = [r for r in best if r.gain is not None and r.estimator != track.plain]
     if track.plain and gained:
         said += f" {'has' if one else 'have'} {gain_text(gained)} horizontal error than `{track.plain}`"
-        over = [
-            f"{text} over {what}"
-            for part, what in (("seeds", f"{track.unit}s"), ("scenarios", "scenarios"))
-            if (text := gain_text(gained, part))
-        ]
-        said += f" (95 %: {'; '.join(over)})" if over else ""
-        said += ", and" if track.reference == "oracle" else ""
-    if track.reference == "oracle":
-        said += f" {'has' if one else 'have'} {spread((r.score for r in best), '{:.2f}')} times the error of an oracle "
-        said += "on the same runs"
     return f"{said}."
 
 

@@ -15,6 +15,7 @@ from simnav.leaderboard.campaign.request import comes_with_simnav
 from .runs import Runs, group
 from .scenario_runs import ScenarioRuns
 from .tracks import Track, catalogued, tracks_of
+from .troubles import trouble_of
 from .variants import families, surplus
 
 if TYPE_CHECKING:
@@ -44,6 +45,10 @@ class TrackRuns:
     def only(self, wanted: Callable[[str], bool]) -> TrackRuns:
         """Those of the scenarios whose versioned ids are wanted."""
         return replace(self, tables=[t for t in self.tables if wanted(t.name)])
+
+    def by_trouble(self) -> TrackRuns:
+        """The same, where each kind of trouble counts the same; a scenario without one is a kind of its own."""
+        return replace(self, tables=[t.in_stratum(trouble_of(t.name) or t.name) for t in self.tables])
 
     def of_rows(self, names: Container[str]) -> TrackRuns:
         """Those of some rows; what their errors are divided by stays."""

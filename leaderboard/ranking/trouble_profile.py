@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -19,7 +19,7 @@ from simnav.leaderboard.results.plain import as_json
 from . import tables
 from .board import TrackRanking
 from .ranking import rank_track
-from .statistics import Interval, scenario_interval, share
+from .statistics import Gain, share
 from .track_runs import TrackRuns, runs_of_tracks
 from .troubles import trouble_of, troubles, within
 
@@ -202,41 +202,28 @@ def ranked_group(runs: TrackRuns, trouble: str, title: str) -> TroubleGroup:
 
 
 def _row(row: Row, board: TrackRanking, every: Sequence[ScenarioRuns]) -> GroupRow:
-    gain = row.gain
+    gain = row.gain or Gain(math.nan)
     cells = [t.cells[row.estimator] for t in every if row.estimator in t.cells]
     inside = np.concatenate([c.runs.numbers("coverage_95") for c in cells])
-    beside = _beside_plain(row.estimator, every) if board.plain else []
-    over = scenario_interval([b.log for b in beside], [b.scenario for b in beside]) if beside else Interval(math.nan)
-    bad = share(sum(b.bad for b in beside), len(beside))
+    found = _bad(row.estimator, every) if board.plain else []
+    bad = share(sum(found), len(found))
     return GroupRow(
-        row.estimator, row.ranked,
-        math.nan if gain is None else gain.value,
-        math.nan if gain is None else gain.low,
-        math.nan if gain is None else gain.high,
-        over.low, over.high, row.score, row.low, row.high,
-        float(inside.mean()) if len(inside) else math.nan,
+        row.estimator, row.ranked, gain.value, gain.low, gain.high, gain.scenarios_low, gain.scenarios_high,
+        row.score, row.low, row.high, float(inside.mean()) if len(inside) else math.nan,
         bad.value, bad.low, bad.high, row.runs, row.may_be_best, row.better_than, row.worse_than, row.update_median,
     )  # fmt: skip
 
 
-class _Beside(NamedTuple):
-    """A run beside the plain row's: the logarithm of the ratio of the errors as it counts, and whether it is bad."""
-
-    scenario: str
-    log: float
-    bad: bool
-
-
-def _beside_plain(name: str, every: Iterable[ScenarioRuns]) -> list[_Beside]:
+def _bad(name: str, every: Iterable[ScenarioRuns]) -> list[bool]:
+    """Whether each run of a row is bad beside the plain row's."""
     found = []
     for t in every:
         if name not in t.cells or t.plain not in t.cells:
             continue
         plain = {r.seed: t.log(t.plain, r.seed) for r in t.cells[t.plain].runs.tried}
         mine = t.cells[name]
-        for run, log, capped in zip(mine.runs.tried, mine.logs.tolist(), mine.capped.tolist(), strict=True):
-            bad = run.outcome != "ok" or math.isinf(log) or log - plain[run.seed] > math.log(BAD)
-            found.append(_Beside(t.name, capped - plain[run.seed], bad))
+        for run, log in zip(mine.runs.tried, mine.logs.tolist(), strict=True):
+            found.append(run.outcome != "ok" or math.isinf(log) or log - plain[run.seed] > math.log(BAD))
     return found
 
 

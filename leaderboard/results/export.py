@@ -1,20 +1,17 @@
-"""Results for machines: ``results.json`` (see ``templates/results.schema.json``), ``results.csv``, ``results.parquet``.
+"""Results for machines: ``results.json`` (see ``templates/results.schema.json``) and ``results.parquet``.
 
-JSON and Parquet are in SI units and radians under the names of `simnav.scoring.SCORES`; CSV has a unit at the end of
-every column and angles in degrees. A score that does not apply is null, or an empty cell.
+Both are in SI units and radians under the names of `simnav.scoring.SCORES`. A score that does not apply is null.
 
 Each row has the digests of its scenario and estimator, its limits and its provenance: in JSON an id that names an entry
-of ``provenance``, in CSV and Parquet columns of its own.
+of ``provenance``, in Parquet columns of its own.
 """
 
 from __future__ import annotations
 
-import itertools
 import json
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -22,7 +19,7 @@ import numpy as np
 
 from simnav.scoring import SCORES
 
-from .files import FORMULA, complete_file
+from .files import complete_file
 from .formats import writes
 from .plain import as_json
 from .provenance import Provenance, benchmark_of, distinct
@@ -33,7 +30,7 @@ if TYPE_CHECKING:
 
     from .result import Result
 
-__all__ = ["MOST_IN_JSON", "SCHEMA_VERSION", "Document", "table", "write_csv", "write_json", "write_parquet"]
+__all__ = ["MOST_IN_JSON", "SCHEMA_VERSION", "Document", "table", "write_json", "write_parquet"]
 
 #: Raised whenever a reader of ``results.json`` would have to change.
 SCHEMA_VERSION = 2
@@ -42,8 +39,7 @@ SCHEMA_VERSION = 2
 MOST_IN_JSON = 20_000
 
 _CHUNK = 8192  # runs that are converted at a time
-_UNIT_SUFFIX = {"-": "", "%": "_percent", "rad": "_deg", "m/s": "_m_s"}
-_DEGREES = math.degrees(1.0)
+_DIGITS = 4  # of figures of the ranking
 _FACTS = ("scenario", "seed", "draws", "estimator", "parameters", "learned", "reference", "status", "reason", "note")
 _COSTS = ("seconds", "peak_memory")
 #: Column -> attribute: how a run ended as tables count it, and why.
@@ -127,62 +123,45 @@ def _run(result: Result) -> dict[str, Any]:
 def write_json(document: Document, path: Path) -> list[Path]:
     """Write ``results.json``: a line a run. NaN is not JSON and has become null.
 
-    Of more than `MOST_IN_JSON` runs the list of the runs stays empty: they are in the CSV and Parquet files.
+    Of more than `MOST_IN_JSON` runs it has neither the list of the runs nor the ratios of each: they are in the Parquet
+    file. Figures of the ranking have `_DIGITS` digits.
     """
-    head = json.dumps(document._head(), indent=1, allow_nan=False, ensure_ascii=False)
-    results = document.results if len(document.results) <= MOST_IN_JSON else ()
+    found, many = _short(document._head()), len(document.results) > MOST_IN_JSON
+    for scenario in found["ranking"].get("scenarios", ()) if many else ():
+        for row in scenario["rows"]:
+            row["ratios"] = {}
+    head = json.dumps(found, allow_nan=False, ensure_ascii=False, separators=(",", ":"))
+    results = () if many else document.results
     lines = (json.dumps(_run(r), allow_nan=False, ensure_ascii=False, separators=(",", ":")) for r in results)
     with complete_file(path) as part, open(part, "w", encoding="utf-8") as file:
-        file.write(head[: head.rindex("}")].rstrip() + ',\n "results": [')
+        file.write(head[:-1] + ',\n "results": [')
         for k, line in enumerate(lines):
             file.write((",\n  " if k else "\n  ") + line)
         file.write("\n ]\n}\n" if results else "]\n}\n")
     return [path]
 
 
-@writes("results", "csv")
-def write_csv(document: Document, path: Path) -> list[Path]:
-    """A row a run; a score that does not apply is an empty cell."""
-    from pyarrow import csv
-
-    return _write_tables(path, map(_with_units, document.tables()), csv.CSVWriter)
-
-
-def _with_units(rows: pa.Table) -> pa.Table:
-    """The same rows with units in the names of the columns, angles in degrees, and flags as Python writes them."""
-    import pyarrow as pa
-    import pyarrow.compute as pc
-
-    names = {"seconds": "wall_time_s", "peak_memory": "peak_memory_bytes"}
-    columns = {}
-    for name in rows.column_names:
-        values = rows.column(name)
-        if name in SCORES:
-            unit = SCORES[name].unit
-            values = pc.multiply(values, _DEGREES) if unit == "rad" else values
-            name += _UNIT_SUFFIX.get(unit, "_" + unit)
-        elif values.type == pa.bool_():
-            values = pc.if_else(values, "True", "False")
-        elif values.type == pa.string():  # a spreadsheet would compute it
-            values = pc.replace_substring_regex(values, f"({FORMULA})", r"'\1")
-        columns[names.get(name, name)] = values
-    return pa.table(columns)
+def _short(value: Any) -> Any:
+    """The same document with fewer digits."""
+    if isinstance(value, dict):
+        return {key: _short(item) for key, item in value.items()}
+    if isinstance(value, list):
+        return [_short(item) for item in value]
+    return float(f"{value:.{_DIGITS}g}") if isinstance(value, float) else value
 
 
 @writes("results", "parquet")
 def write_parquet(document: Document, path: Path) -> list[Path]:
-    """The same rows as Parquet, a column a score, in SI units and radians."""
+    """A row a run, a column a score."""
+    import pyarrow as pa
     import pyarrow.parquet as pq
 
-    return _write_tables(path, document.tables(), partial(pq.ParquetWriter, compression="zstd"))
-
-
-def _write_tables(path: Path, tables: Iterator[pa.Table], writer: Callable[[Path, pa.Schema], Any]) -> list[Path]:
-    """Write one table after the other, at least one, with a writer of pyarrow."""
-    first = next(tables)
-    with complete_file(path) as part, writer(part, first.schema) as file:
-        for table in itertools.chain([first], tables):
-            file.write_table(table)
+    every = pa.concat_tables(document.tables()).combine_chunks()
+    real = [f.name for f in every.schema if f.type == pa.float64()]  # their bytes side by side take a third less
+    rest = [name for name in every.column_names if name not in real]
+    with complete_file(path) as part:
+        pq.write_table(every, part, compression="zstd", compression_level=9, use_dictionary=rest,
+                       use_byte_stream_split=real)  # fmt: skip
     return [path]
 
 

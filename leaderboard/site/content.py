@@ -12,6 +12,7 @@ from simnav.leaderboard.results.provenance import Provenance
 from simnav.leaderboard.results.web_addresses import NOWHERE, Home
 
 from .facts import EstimatorFacts
+from .headings import Heading
 
 __all__ = ["PLAIN", "EstimatorEntry", "ExtraPage", "Fact", "ScenarioEntry", "SiteFacts"]
 
@@ -35,8 +36,6 @@ class EstimatorEntry:
     ----------
     label, page : str
         Label of the estimator, and file of its page.
-    data, runs : str
-        Names of the files of its errors and of the scores of its runs (``data/NAME.js``).
     reference : bool
         Whether it is a reference, which is not ranked.
     facts : EstimatorFacts
@@ -45,10 +44,13 @@ class EstimatorEntry:
 
     label: str
     page: str
-    data: str
-    runs: str
     reference: bool
     facts: EstimatorFacts
+
+    @property
+    def data(self) -> str:
+        """Name of the file of its data (``data/NAME.js``)."""
+        return Path(self.page).stem
 
 
 @dataclass(frozen=True)
@@ -89,7 +91,7 @@ class ScenarioEntry:
 
     @property
     def data(self) -> str:
-        """Beginning of the names of its files of data."""
+        """Name of the file of its data."""
         return Path(self.page).stem
 
 
@@ -126,6 +128,8 @@ class SiteFacts:
         Version of simnav that wrote the site; date and time.
     total, runs : int
         Results, also of estimators that a scenario does not suit; 0 for a page that stands alone. Runs among them.
+    headings : sequence of Heading
+        Pages of the tracks.
     scenarios, estimators : sequence
         What has a page of its own, in the order of the menus.
     papers : sequence of ExtraPage
@@ -148,6 +152,7 @@ class SiteFacts:
     generated: str
     total: int = 0
     runs: int = 0
+    headings: Sequence[Heading] = ()
     scenarios: Sequence[ScenarioEntry] = ()
     estimators: Sequence[EstimatorEntry] = ()
     papers: Sequence[ExtraPage] = ()

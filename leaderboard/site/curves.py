@@ -24,7 +24,18 @@ from .rounding import shorts, spaced
 if TYPE_CHECKING:
     from simnav.leaderboard.results.result import Result, Series
 
-__all__ = ["BAND_RUNS", "QUANTITIES", "Curves", "Gathered", "band", "gather", "integrity", "one_run", "quantiles"]
+__all__ = [
+    "BAND_RUNS",
+    "QUANTITIES",
+    "Curves",
+    "Gathered",
+    "band",
+    "gather",
+    "integrity",
+    "one_run",
+    "over_shares",
+    "quantiles",
+]
 
 Array = NDArray[np.float64]
 Thin = NDArray[np.float32]
@@ -40,9 +51,11 @@ QUANTITIES = (
 #: Runs of a band: its percentiles are known well enough.
 BAND_RUNS = 40
 
-_POINTS = 120  # of a curve: more cannot be seen
-_RUN_POINTS = 150
-_TRACK_POINTS = 300
+_POINTS = 90  # of a curve: more cannot be seen
+_RUN_POINTS = 100
+_TRACK_POINTS = 200
+_DIGITS = 3  # of what is drawn against time
+_SHARES = np.linspace(0.0, 100.0, 51)  # of the epochs, of a distribution [%]
 _TRUTH = {"east": "truth_east", "north": "truth_north", "time": "time"}
 _FULL = 0.999  # a weight above this is as good as 1
 #: From three standard deviations to the protection level that follows from a covariance.
@@ -183,18 +196,22 @@ def band(curves: Sequence[Curves], name: str, factor: float, time: Array) -> dic
     gaps = np.flatnonzero(np.isnan(middle) & np.isfinite(rows).any(axis=0))  # some runs have a value, others none
     if len(gaps):
         low[gaps], middle[gaps], high[gaps] = factor * np.nanpercentile(rows[:, gaps], (5.0, 50.0, 95.0), axis=0)
-    return {"low": shorts(low), "middle": shorts(middle), "high": shorts(high)}
+    return {"low": shorts(low, _DIGITS), "middle": shorts(middle, _DIGITS), "high": shorts(high, _DIGITS)}
 
 
 def quantiles(curves: Sequence[Curves]) -> dict[str, list[float | None]] | None:
-    """Error at each percent of the epochs of all runs."""
+    """Error that so many of the epochs of all runs do not exceed: at `_SHARES`."""
     rows = [c.quantiles for c in curves if c.quantiles is not None]
     if not rows:
         return None
     values = np.concatenate(rows).astype(np.float64)
     values = values[np.isfinite(values)]
-    share = np.linspace(0.0, 100.0, 101)
-    return {"error": shorts(np.percentile(values, share)), "share": share.tolist()}
+    return {"error": shorts(np.percentile(values, _SHARES), _DIGITS)}
+
+
+def over_shares(rows: Mapping[str, Any]) -> dict[str, Any]:
+    """Distributions by row over the common shares."""
+    return {"axis": _SHARES.tolist(), "name": "share", "rows": rows}
 
 
 def integrity(curves: Sequence[Curves], limit: float) -> dict[str, list[Any]] | None:
@@ -226,9 +243,9 @@ def one_run(thinned: Mapping[str, Thin]) -> dict[str, Any]:
     found: dict[str, Any] = {}
     for name, _, _, factor in QUANTITIES:
         if name in s and np.isfinite(s[name]).any():
-            found[name] = {"time": time, "middle": shorts(factor * np.abs(s[name]))}
+            found[name] = {"time": time, "middle": shorts(factor * np.abs(s[name]), _DIGITS)}
             if name == "horizontal" and np.isfinite(s.get("three_sigma", np.zeros(0))).any():
-                found[name]["bound"] = shorts(s["three_sigma"])
+                found[name]["bound"] = shorts(s["three_sigma"], _DIGITS)
     if "estimate_north" in s:
         found["track"] = {"time": time, "east": shorts(s["estimate_east"]), "north": shorts(s["estimate_north"])}
     if "truth_time" in s:
@@ -237,5 +254,5 @@ def one_run(thinned: Mapping[str, Thin]) -> dict[str, Any]:
         known = np.isfinite(values)
         plain = name.startswith("weight.") and not (values[known] < _FULL).any()  # nothing was ever weighted
         if name.partition(".")[0] in DIAGNOSTICS and known.any() and not plain:
-            found[name] = {"time": shorts(s["diagnostics_time"][known]), "middle": shorts(values[known])}
+            found[name] = {"time": shorts(s["diagnostics_time"][known]), "middle": shorts(values[known], _DIGITS)}
     return found

@@ -11,6 +11,7 @@ from simnav.leaderboard.ranking import tables
 
 from .content import EstimatorEntry, Fact, ScenarioEntry
 from .facts import catalogued, estimator_facts, toml_of
+from .headings import PAGES
 
 if TYPE_CHECKING:
     from simnav.leaderboard.ranking.board import Ranking, ScenarioRanking
@@ -35,13 +36,11 @@ def entries(
     """
     references = {label for by in runs.values() for label, found in by.items() if found.results[0].reference}
     ranked = [row.estimator for track in ranking.tracks for row in track.rows]
-    taken = {"index", "compare", "about"}
+    taken = {"index", "compare", "about", *PAGES}
     estimators = {}
     for label in dict.fromkeys([*ranked, *sorted({label for by in runs.values() for label in by})]):
         stem = _slug(label, taken)
-        estimators[label] = EstimatorEntry(
-            label, f"estimator-{stem}.html", f"row-{stem}", f"runs-{stem}", label in references, estimator_facts(label)
-        )
+        estimators[label] = EstimatorEntry(label, f"estimator-{stem}.html", label in references, estimator_facts(label))
     return estimators, {s: _scenario(s, by, f"{_slug(s, taken)}.html") for s, by in runs.items()}
 
 

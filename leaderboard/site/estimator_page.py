@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
     from .content import EstimatorEntry, ScenarioEntry
 
-__all__ = ["errors_data", "estimator_data", "facts_of", "runs_data", "worst_runs"]
+__all__ = ["estimator_data", "facts_of", "worst_runs"]
 
 _COLUMNS = (
     Column("name", "Scenario", "The name leads to the page of the scenario.", "name", fixed=True),
@@ -72,8 +72,8 @@ def facts_of(label: str, ranking: Ranking) -> list[Fact]:
     return found
 
 
-def errors_data(label: str, ranking: Ranking, scenarios: Mapping[str, ScenarioEntry]) -> dict[str, Any]:
-    """The ranked figure of every run of an estimator: ``data/row-NAME.js``, of which two are compared.
+def _errors_data(label: str, ranking: Ranking, scenarios: Mapping[str, ScenarioEntry]) -> dict[str, Any]:
+    """The ranked figure of every run of an estimator, of which two are compared.
 
     It is the ratio to the reference figure as the ranking counts it, by seed or recording.
     """
@@ -97,8 +97,8 @@ def _tables(label: str, ranking: Ranking) -> Iterator[tuple[ScenarioRanking, Sce
             yield table, row
 
 
-def runs_data(label: str, ranking: Ranking, runs: Mapping[str, Mapping[str, Runs]]) -> dict[str, Any]:
-    """Every run of an estimator with its scores: ``data/runs-NAME.js``; None stands for a column that says nothing."""
+def _runs_data(label: str, ranking: Ranking, runs: Mapping[str, Mapping[str, Runs]]) -> dict[str, Any]:
+    """Every run of an estimator with its scores; None stands for a column that says nothing."""
     found = {}
     for table, _ in _tables(label, ranking):
         results = runs[table.scenario][label].results
@@ -117,7 +117,7 @@ def _scores(results: Sequence[Result]) -> dict[str, list[float | None]]:
     """Columns of the scores that any of the runs has."""
     matrix = score_matrix([r.scores for r in results], [c.key for c in SCORES_SHOWN])
     found = {c.key: c.factor * matrix[:, k] for k, c in enumerate(SCORES_SHOWN)}
-    return {key: shorts(values) for key, values in found.items() if np.isfinite(values).any()}
+    return {key: shorts(values, 3) for key, values in found.items() if np.isfinite(values).any()}
 
 
 def estimator_data(
@@ -161,6 +161,8 @@ def estimator_data(
         "kind": "estimator",
         "label": label,
         "data": entry.data,
+        "errors": _errors_data(label, ranking, scenarios),
+        "runs": _runs_data(label, ranking, runs),
         "plain": None if other is None else {"label": PLAIN, "data": other.data, "page": other.page},
         "losses": None if label == PLAIN else losses(label, PLAIN, ranking, scenarios),
         "table": {

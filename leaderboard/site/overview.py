@@ -1,4 +1,4 @@
-"""The first page: one table a track, its charts, and the weights of its scenarios."""
+"""A track on the page of its heading: its table, its charts, and the weights of its kinds of trouble."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from simnav.leaderboard.ranking.confinement import confined
 from simnav.leaderboard.ranking.ranking_table import ratio, score_caption, score_title
 from simnav.leaderboard.ranking.stored_costs import NOT_MEASURED, CostMultiple, cost_of, not_measured
-from simnav.leaderboard.ranking.summary import limits
+from simnav.leaderboard.ranking.troubles import trouble_of, troubles
 
 from .charts import COST_HEIGHT, DETECTION_HEIGHT, accuracy_and_cost, columns, detection, spread, spread_data
 from .columns import Column, column_dicts
@@ -20,13 +20,13 @@ from .labels import shifts
 from .rounding import short
 
 if TYPE_CHECKING:
-    from simnav.leaderboard.ranking.board import Ranking, Row, TrackRanking, TrackRow
+    from simnav.leaderboard.ranking.board import Row, TrackRanking, TrackRow
     from simnav.leaderboard.ranking.runs import Runs
     from simnav.scoring.verdict import Verdict
 
     from .content import EstimatorEntry, ScenarioEntry
 
-__all__ = ["BOARD_COLUMNS", "OVER_SCENARIOS", "bar_scale", "board_columns", "board_row", "overview"]
+__all__ = ["BOARD_COLUMNS", "OVER_SCENARIOS", "bar_scale", "board_columns", "board_row", "track_data"]
 
 _WIDEST = 100.0  # largest ratio on the scale of the bars
 _INSIDE = 0.9  # share of the rows whose scores the scale must hold
@@ -77,15 +77,15 @@ _AFTER = (
         "text",
     ),
     Column("gain", "× plain row", "Error over that of the plain row on the same runs; below 1 is better.", "ratio"),
-    Column("gain_interval", "× plain row, 95 %", "Interval over the seeds.", "interval", wide=True),
+    Column("gain_interval", "× plain row, 95 %", "Interval over the seeds.", "interval", hidden=True),
     Column(
         "gain_scenarios",
         "× plain row, 95 % over scenarios",
         "Interval over seeds and scenarios: what the gain may be on other scenarios of the same kind.",
         "interval",
-        wide=True,
+        hidden=True,
     ),
-    Column("won", "Scenarios won", "Scenarios with a smaller error than the plain row's.", "text", wide=True),
+    Column("won", "Scenarios won", "Scenarios with a smaller error than the plain row's.", "text", hidden=True),
     Column(
         "worse",
         "Above 1.5 ×",
@@ -255,32 +255,23 @@ def _gain(row: Row) -> dict[str, Any]:
     }
 
 
-def overview(
-    ranking: Ranking,
-    estimators: Mapping[str, EstimatorEntry],
-    scenarios: Mapping[str, ScenarioEntry],
-    runs: Mapping[str, Mapping[str, Runs]],
-) -> list[dict[str, Any]]:
-    """The tracks of the first page, in order.
-
-    Parameters
-    ----------
-    ranking : Ranking
-        The ranking to be shown.
-    estimators, scenarios : mapping
-        Estimators by label, and scenarios by versioned id.
-    runs : mapping
-        Runs by scenario and label.
-    """
-    return [_track(t, estimators, scenarios, runs) for t in ranking.tracks]
-
-
-def _track(
+def track_data(
     track: TrackRanking,
     estimators: Mapping[str, EstimatorEntry],
     scenarios: Mapping[str, ScenarioEntry],
     runs: Mapping[str, Mapping[str, Runs]],
 ) -> dict[str, Any]:
+    """A track on the page of its heading.
+
+    Parameters
+    ----------
+    track : TrackRanking
+        Its ranking.
+    estimators, scenarios : mapping
+        Estimators by label, and scenarios by versioned id.
+    runs : mapping
+        Runs by scenario and label.
+    """
     title = score_title(track).replace("error", "Error")
     explanation = score_caption(track)
     more = [
@@ -301,11 +292,14 @@ def _track(
         for row, others in _once(track.rows)
     ]
     scored = [r for r in track.rows if r.ranked and math.isfinite(r.score)]
+    kinds: dict[str, list[str]] = {}
+    for s in track.scenarios:
+        kinds.setdefault(trouble_of(s) or s, []).append(s)
     return {
         "key": track.track,
         "title": track.title,
         "best": any(r.may_be_best for r in track.rows),
-        "sentence": f"{track.sentence} {limits(track)}".strip().replace("`", ""),
+        "sentence": track.sentence.replace("`", ""),
         "remarks": list(track.remarks),
         "provisional": track.provisional,
         "facts": f"{_count(len(track.scenarios), 'scenario')}, {_count(len(scored), 'ranked estimator')}, "
@@ -323,8 +317,24 @@ def _track(
             {"id": s, "name": scenarios[s].name, "title": scenarios[s].title, "page": scenarios[s].page}
             for s in track.scenarios
         ],
-        "ratios": {r.estimator: {s: short(v, 6) for s, v in r.ratios.items()} for r in scored},
+        "kinds": [
+            {"id": kind, "name": _kind(kind, scenarios), "title": ", ".join(scenarios[s].name for s in those)}
+            for kind, those in kinds.items()
+        ],
+        "ratios": {r.estimator: _by_kind(r, kinds) for r in scored},
     }
+
+
+def _kind(kind: str, scenarios: Mapping[str, ScenarioEntry]) -> str:
+    """The title of a kind of trouble; the name of a scenario that has none."""
+    return troubles()[kind].title if kind in troubles() else scenarios[kind].name
+
+
+def _by_kind(row: TrackRow, kinds: Mapping[str, Sequence[str]]) -> dict[str, float | None]:
+    """The geometric mean of the ratios in each kind of trouble that the row has run."""
+    logs = {kind: [math.log(row.ratios[s]) for s in those if row.ratios.get(s, 0.0) > 0.0]
+            for kind, those in kinds.items()}  # fmt: skip
+    return {kind: short(math.exp(sum(x) / len(x)), 6) for kind, x in logs.items() if x}
 
 
 def _count(number: int, what: str) -> str:

@@ -33,8 +33,14 @@ def environment() -> Environment:
         lstrip_blocks=True,
     )
     found.filters["prose"] = _prose
+    found.filters["ticked"] = _ticked
     found.filters["track_title"] = title
     return found
+
+
+def _ticked(text: str) -> Markup:
+    """A sentence with code in single backticks, as in Markdown."""
+    return Markup(re.sub(r"`([^`]+)`", r"<code>\1</code>", str(escape(text))))
 
 
 def _prose(text: str) -> Markup:

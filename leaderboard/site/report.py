@@ -52,8 +52,10 @@ class SiteReport(Shown):
     profiles: tuple[TrackProfile, ...] = ()
 
     def headline(self) -> str:
-        """Where the site is, and how many runs it shows."""
-        return f"{self.index}, {sum(r.tried for r in self.results)} runs"
+        """Where the site is, how many runs it shows, and how large it is."""
+        sizes = [path.stat().st_size for path in self.index.parent.rglob("*") if path.is_file()]
+        runs = sum(r.tried for r in self.results)
+        return f"{self.index}, {runs} runs; {sum(sizes) / 1e6:.1f} MB in {len(sizes)} files"
 
     def shown(self) -> Sequence[tables.Fitted]:
         """A table for each track, and one for its kinds of trouble where there are several."""

@@ -35,11 +35,11 @@ if TYPE_CHECKING:
 __all__ = ["RUNS_SHOWN", "ScenarioData", "inside_chart", "scenario_data", "seeds_to_show", "shown_first", "track_from"]
 
 #: Runs of a scenario of which track and errors are kept, by default.
-RUNS_SHOWN = 2
+RUNS_SHOWN = 1
 
 _FIRST = 6  # rows that a chart shows at first
 _BAND = 5  # runs from which on a band is drawn
-_TICKS = 40  # runs of a row that a chart marks
+_TICKS = 20  # runs of a row that a chart marks
 
 
 @dataclass(frozen=True)
@@ -49,9 +49,7 @@ class ScenarioData:
     Attributes
     ----------
     page : dict
-        Data that is embedded in the page.
-    files : dict
-        Content of each file ``data/NAME.js``, by name.
+        Data of the page.
     charts : tuple of Chart
         Charts with their data, for print.
     first : tuple of str
@@ -59,7 +57,6 @@ class ScenarioData:
     """
 
     page: dict[str, Any]
-    files: dict[str, Any]
     charts: tuple[Chart, ...]
     first: tuple[str, ...]
 
@@ -125,8 +122,9 @@ def scenario_data(
     drawn = [n for n in rows if by[n]]
     over_time = [n for n in drawn if any(len(c.time) for c in by[n])]
     first = shown_first(ranking, over_time or drawn or rows)
-    made, inside, files = _over_all_runs(entry, ranking, runs, by, around)
+    made, inside = _over_all_runs(entry, ranking, runs, by, around)
     kinds: dict[str, None] = {}
+    alone = {}
     for seed in seeds:
         single = {
             n: curves.one_run(gathered.single[r])
@@ -136,14 +134,12 @@ def scenario_data(
         }
         for one in single.values():
             kinds |= dict.fromkeys(k for k in one if k.partition(".")[0] in DIAGNOSTICS)
-        name = f"{entry.data}-run-{seed}"
-        files[name] = _one_run(seed, runs, rows, single, around)
-        files[f"{name}-inside"] = _inside(single, around, str(seed))
+        alone[seed] = _one_run(seed, runs, rows, single, around) | {"inside": _inside(single, around, str(seed))}
     page = {
         "kind": "scenario",
-        "scenario": {"id": entry.id, "argument": entry.argument, "data": entry.data},
+        "scenario": {"id": entry.id, "argument": entry.argument},
         "rows": {
-            n: {"reference": estimators[n].reference, "page": estimators[n].page, "data": estimators[n].runs}
+            n: {"reference": estimators[n].reference, "page": estimators[n].page, "data": estimators[n].data}
             for n in rows
         },
         "drawn": drawn,
@@ -151,13 +147,14 @@ def scenario_data(
         "first": first,
         "table": _table(ranking, runs, estimators),
         "failures": _failures(ranking, runs),
-        "charts": [_chart(c, entry) for c in made],
-        "inside": [_chart(c, entry) for c in inside],
+        "charts": [c.to_dict() for c in made],
+        "inside": [c.to_dict() for c in inside],
         "runs": {
             "seeds": list(seeds),
             "all": list(entry.seeds),
             "charts": [c.to_dict() for c in _run_charts(around)],
             "inside": [inside_chart(k, around).to_dict() for k in sorted(kinds, key=_by_instrument)],
+            "data": alone,
         },
         "sweeps": [sweep.section(k) for k, sweep in enumerate(sweeps)],
         "instruments": around.instruments,
@@ -166,12 +163,7 @@ def scenario_data(
         "reference": ranking.reference.text,
         "provisional": ranking.provisional,
     }
-    return ScenarioData(page, files, (*made, *inside), tuple(first))
-
-
-def _chart(chart: Chart, entry: ScenarioEntry) -> dict[str, Any]:
-    """A chart of the page. Its data stand in a file, which is read when the chart comes into view."""
-    return chart.to_dict() | {"data": None, "file": f"{entry.data}-{chart.name}"}
+    return ScenarioData(page, (*made, *inside), tuple(first))
 
 
 def _same(names: Sequence[str]) -> str:
@@ -268,8 +260,8 @@ def _over_all_runs(
     runs: Mapping[str, Runs],
     by: Mapping[str, Sequence[Curves]],
     around: Background,
-) -> tuple[list[Chart], list[Chart], dict[str, Any]]:
-    """Charts of errors, charts of weights, and the files of their data."""
+) -> tuple[list[Chart], list[Chart]]:
+    """Charts of errors, and charts of weights."""
     time = curves.axis(c for found in by.values() for c in found)
     first = next(iter(around.runs), "0")
     faults = around.runs[first]["faults"] if around.runs else NO_FAULTS
@@ -310,7 +302,7 @@ def _over_all_runs(
     if cdf:
         counted = _counted([len(c) for c in by.values() if c], len(entry.seeds))
         caption = f"Over all epochs of {counted}."
-        made.append(charts.distribution("cdf", "Horizontal error", "m", {"curves": {"rows": cdf}}, caption))
+        made.append(charts.distribution("cdf", "Horizontal error", "m", {"curves": curves.over_shares(cdf)}, caption))
     limit = ALERT_LIMITS[0]
     cells = {n: q for n, c in by.items() if (q := curves.integrity(c, limit)) is not None}
     if cells:
@@ -326,8 +318,7 @@ def _over_all_runs(
                 f"{_MEANING['weight']} {words}", log=False, spread=wide,
             )
         )  # fmt: skip
-    files = {f"{entry.data}-{c.name}": dict(c.data) for c in (*made, *inside)}
-    return made, inside, files
+    return made, inside
 
 
 def _counted(runs: Sequence[int], seeds: int) -> str:
@@ -392,7 +383,7 @@ def _spread(
             continue
         values = zip(cell.scores(score).tolist(), cell.good, strict=True)
         marked = _marked([(v, r) for v, r in values if v > 0.0])
-        ticks += [(row.estimator, short(value), _run_name(result)) for value, result in marked]
+        ticks += [(row.estimator, short(value, 3), _run_name(result)) for value, result in marked]
         low, high = (found.low, found.high) if math.isfinite(found.low) else (found.value, found.value)
         middles.append((row.estimator, short(found.value), short(max(low, 1e-9)), short(high)))
     if not middles:

@@ -1,12 +1,14 @@
 """The site: one static folder, opened from disk or served, that needs nothing from elsewhere.
 
-``index.html`` holds a table a track; there is a page for each scenario and each estimator, one to compare two rows, and
-one on where the results come from. Charts are drawn by one copy of Vega (``vega.js``) from the files in ``data/``. The
+``index.html`` is the first view; the tables of the tracks stand under five headings, each a page. There is a page for
+each scenario and each estimator, one to compare two rows, and one on where the results come from. Each page has a file
+of data, ``data/NAME.js``, of which its tables are made and its charts are drawn, by one copy of Vega (``vega.js``). The
 folder is built beside its place and swapped in at the end: a run that is killed leaves the old site.
 """
 
 from __future__ import annotations
 
+import base64
 import gc
 import json
 import multiprocessing
@@ -14,6 +16,7 @@ import os
 import shutil
 import tempfile
 import time
+import zlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
@@ -27,6 +30,7 @@ from simnav.estimator import names
 from simnav.leaderboard.figures import appearance
 from simnav.leaderboard.figures.style import save
 from simnav.leaderboard.ranking import tables
+from simnav.leaderboard.ranking.first_view import first_view
 from simnav.leaderboard.ranking.lost_runs import LOSS
 from simnav.leaderboard.ranking.ranking_figure import ranking_figure
 from simnav.leaderboard.ranking.runs import group
@@ -40,15 +44,19 @@ from simnav.leaderboard.results.formats import formats, write
 from simnav.leaderboard.results.provenance import benchmark_of, distinct
 from simnav.leaderboard.results.web_addresses import NOWHERE, Home
 
+from .advisor import advisor
 from .background import background_of, prepare
 from .columns import glossary
 from .content import ExtraPage, Fact, ScenarioEntry, SiteFacts
 from .curves import BAND_RUNS, Gathered, gather, one_run
 from .entries import argument_of, entries
-from .estimator_page import errors_data, estimator_data, facts_of, runs_data, worst_runs
+from .estimator_page import estimator_data, facts_of, worst_runs
 from .facts import catalogued, name_of
+from .first_page import picture
+from .headings import headings
 from .library import bundle
-from .overview import BOARD_COLUMNS, overview
+from .light_pictures import in_few_colours
+from .overview import BOARD_COLUMNS, track_data
 from .pages import STATIC, TEMPLATES, environment
 from .print_figures import filled, write_figure
 from .scenario_page import RUNS_SHOWN, ScenarioData, scenario_data, seeds_to_show
@@ -57,6 +65,7 @@ from .win_matrix import win_matrix
 
 if TYPE_CHECKING:
     from simnav.leaderboard.ranking.board import Ranking
+    from simnav.leaderboard.ranking.trouble_profile import TrackProfile
     from simnav.leaderboard.results.result import Result
 
 __all__ = ["build"]
@@ -82,6 +91,7 @@ def build(
     sweeps: Sequence[SweepFile] = (),
     seeds: Mapping[str, Sequence[int]] | None = None,
     home: Home = NOWHERE,
+    profiles: Sequence[TrackProfile] = (),
 ) -> Path:
     """Write the site.
 
@@ -113,6 +123,8 @@ def build(
         By scenario, the runs that have series, where not all have.
     home : Home
         Where the repository and the documentation are (`simnav.leaderboard.results.web_addresses.linked_from`).
+    profiles : sequence of TrackProfile, optional
+        The same results by kind of trouble; without them there is no picture on the first page.
 
     Returns
     -------
@@ -131,7 +143,8 @@ def build(
     with _in_place_of(output) as draft:
         catalogued.cache_clear()
         report = progress or (lambda *_, **__: None)
-        site = _Site(results, ranking, draft, command or reproduce(results), report, workers, papers, editions, home)
+        site = _Site(results, ranking, draft, command or reproduce(results), report, workers, papers, editions, home,
+                     profiles)  # fmt: skip
         site.write(runs_shown, figures, sweeps, seeds or {})
     return output / "index.html"
 
@@ -254,9 +267,12 @@ class _Site:
         papers: Sequence[ExtraPage],
         editions: Sequence[ExtraPage],
         home: Home,
+        profiles: Sequence[TrackProfile],
     ):
         self.results = sorted(results, key=lambda r: (r.scenario, r.estimator, r.seed))
         self.ranking, self.folder, self.progress, self.workers = ranking, folder, progress, workers
+        self.view = first_view(ranking, profiles)
+        self.silence = {p.track: p.silence for p in profiles}
         self.runs = group(self.results)
         self.pages = environment()
         self.estimators, self.scenarios = entries(self.runs, ranking)
@@ -266,6 +282,7 @@ class _Site:
             generated=datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
             total=len(self.results),
             runs=len(tried),
+            headings=headings(ranking.tracks),
             scenarios=list(self.scenarios.values()),
             estimators=list(self.estimators.values()),
             papers=papers,
@@ -308,8 +325,6 @@ class _Site:
     ) -> None:
         """The pages of estimators, with the worst runs that have series and the worst of all; those of the board."""
         for label, entry in self.estimators.items():
-            self._data(entry.data, errors_data(label, self.ranking, self.scenarios))
-            self._data(entry.runs, runs_data(label, self.ranking, self.runs))
             last = worst[label]
             shown = None if last is None else one_run(self.plan.gathered.single[last[0]])
             data = estimator_data(entry, self.ranking, self.runs, self.scenarios, self.estimators, last, shown)
@@ -318,44 +333,46 @@ class _Site:
             parameters = [runs[label].results[0].parameters for runs in self.runs.values() if label in runs]
             self._page("estimator.html", entry.page, data, estimator=entry, facts=facts_of(label, self.ranking),
                        data=data, parameters=tables.parameters(parameters[0]) if parameters else "")  # fmt: skip
-        tracks = overview(self.ranking, self.estimators, self.scenarios, self.runs)
         if self.plan.figures:
             for track in self.ranking.tracks:
                 save(ranking_figure(track), self.folder / "figures" / f"board-{track.track}", formats=("svg", "png"))
-        headers = [t if k == 0 else {"key": t["key"], "file": f"track-{t['key']}"} for k, t in enumerate(tracks)]
-        for later in tracks[1:]:  # read when its tab is opened
-            self._data(f"track-{later['key']}", later)
-        index = {"kind": "index", "tracks": headers}
-        self._page(
-            "index.html",
-            "index.html",
-            index,
-            tracks=tracks,
-            facts=self._counts(),
-            voyages=side_by_side(self.ranking),
-            loss=LOSS,
-        )
+        index = {"kind": "index", "advisor": advisor(self.results)}
+        self._page("index.html", "index.html", index, facts=self._counts(),
+                   view=None if self.view is None else picture(self.view, self.estimators))  # fmt: skip
+        voyages = side_by_side(self.ranking)
+        for heading in self.facts.headings:
+            shown_tracks = [
+                track_data(t, self.estimators, self.scenarios, self.runs) | {"silence": self.silence.get(t.track, "")}
+                for t in heading.tracks
+            ]
+            own = {t.track for t in heading.tracks}
+            self._page("tracks.html", heading.page, {"kind": "tracks", "tracks": shown_tracks}, heading=heading,
+                       tracks=shown_tracks, voyages=[v for v in voyages if v.recorded in own], loss=LOSS)  # fmt: skip
         rows = {label: {"data": e.data, "page": e.page} for label, e in self.estimators.items()}
-        compared: dict[str, Any] = {"kind": "compare", "rows": rows, "wins": self._wins()}
-        self._page("compare.html", "compare.html", compared)
+        self._page("compare.html", "compare.html", {"kind": "compare", "rows": rows, "wins": self._wins()})
         self._page("about.html", "about.html", {"kind": "about"}, glossary=glossary(BOARD_COLUMNS))
         for extra in (*self.facts.papers, *self.facts.editions):
             extra.install(self.folder, self.facts)
+        for path in (self.folder / "figures").glob("paper-*/*.png"):
+            in_few_colours(path)
         for name in _STATIC:
             shutil.copyfile(TEMPLATES / name, self.folder / name)
-        charts = (TEMPLATES / "charts.js").read_text(encoding="utf-8")
-        charts = charts.replace("$APPEARANCE", json.dumps(appearance.for_browser()))
-        (self.folder / "charts.js").write_text(charts, encoding="utf-8")
+        menus = {
+            "scenarios": [(s.name, s.page) for s in self.facts.scenarios],
+            "estimators": sorted((e.label, e.page) for e in self.facts.estimators),
+        }
+        for name, key, value in (("charts.js", "$APPEARANCE", appearance.for_browser()), ("menu.js", "$MENUS", menus)):
+            text = (TEMPLATES / name).read_text(encoding="utf-8").replace(key, json.dumps(value))
+            (self.folder / name).write_text(text, encoding="utf-8")
         (self.folder / "vega.js").write_text(bundle(), encoding="utf-8")
 
-    def _wins(self) -> list[dict[str, str]]:
-        """The matrix of wins of each track that has one, in files of their own; what a choice of them shows."""
+    def _wins(self) -> list[dict[str, Any]]:
+        """The matrix of wins of each track that has one."""
         found = []
         for track in self.ranking.tracks:
             chart = win_matrix(track, [self.ranking.scenario(s) for s in track.scenarios])
             if chart is not None:
-                self._data(f"wins-{track.track}", chart.to_dict())
-                found.append({"key": track.track, "title": track.title, "file": f"wins-{track.track}"})
+                found.append({"key": track.track, "title": track.title, "chart": chart.to_dict()})
         return found
 
     def _gathered(self, seeds: Mapping[str, Sequence[int]], worst: Sequence[Result]) -> Gathered:
@@ -375,8 +392,6 @@ class _Site:
             background_of(identity, plan.seeds[identity]), plan.gathered,
             [s for s in plan.sweeps if s.scenario == identity],
         )  # fmt: skip
-        for name, content in found.files.items():
-            self._data(name, content)
         if plan.figures:
             self._print(entry, found)
         self._page("scenario.html", entry.page, found.page, scenario=entry)
@@ -403,24 +418,19 @@ class _Site:
         )
         write("results", name, document, self.folder / f"results.{name}")
 
-    def _data(self, name: str, content: Mapping[str, Any]) -> None:
-        text = f"simnav.data[{json.dumps(name)}] = {_json(content)};\n"
-        (self.folder / "data" / f"{name}.js").write_text(text, encoding="utf-8")
-
     def _print(self, scenario: ScenarioEntry, found: ScenarioData) -> None:
         for chart in found.charts:
             write_figure(filled(chart, found.first), self.folder / "figures" / f"{scenario.data}-{chart.name}")
 
     def _page(self, template: str, name: str, content: Mapping[str, Any], **values: Any) -> None:
+        """Write a page, and its data as a compressed script: a page from disk can read no other file."""
         cited = self.facts.citation.text if self.facts.citation is not None else ""
-        values.setdefault("data", content)
+        data = Path(name).stem
         text = self.pages.get_template(template).render(
-            page=name, site=self.facts, page_data=_json({**content, "citation": cited, "failure": FAILURE}), **values
+            page=name, site=self.facts, data_file=data, **{"data": content, **values}
         )
         (self.folder / name).write_text(text, encoding="utf-8")
-
-
-def _json(content: Mapping[str, Any]) -> str:
-    """JSON that can stand in a page: nothing in it closes an element."""
-    text = json.dumps(content, allow_nan=False, ensure_ascii=False, separators=(",", ":"))
-    return text.replace("<", "\\u003c").replace("\u2028", "\\u2028").replace("\u2029", "\\u2029")
+        plain = json.dumps({**content, "citation": cited, "failure": FAILURE}, allow_nan=False, separators=(",", ":"))
+        packed = base64.b64encode(zlib.compress(plain.encode(), 9)).decode()
+        script = f'simnav.packed["{data}"] = "{packed}";\n'
+        (self.folder / "data" / f"{data}.js").write_text(script, encoding="ascii")

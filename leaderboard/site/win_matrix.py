@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
-from urllib.parse import quote
 
 from simnav.leaderboard.ranking.wins import wins
 
@@ -22,6 +21,8 @@ __all__ = ["win_matrix"]
 def win_matrix(track: TrackRanking, scenarios: Sequence[ScenarioRanking]) -> Chart | None:
     """The chart of the ranked rows of a track, the best score first; None with fewer than two rows.
 
+    The page gives each cell its link.
+
     Parameters
     ----------
     track : TrackRanking
@@ -33,9 +34,8 @@ def win_matrix(track: TrackRanking, scenarios: Sequence[ScenarioRanking]) -> Cha
     if len(ordered) < 2:
         return None
     share = wins(ordered, scenarios)
-    page = f"compare.html#track={quote(track.track)}"
     cells = [
-        (row, other, short(100.0 * share[i, k], 3), f"{page}&a={quote(row)}&b={quote(other)}")
+        (row, other, short(100.0 * share[i, k], 3))
         for i, row in enumerate(ordered)
         for k, other in enumerate(ordered)
         if math.isfinite(share[i, k])
@@ -67,5 +67,5 @@ def win_matrix(track: TrackRanking, scenarios: Sequence[ScenarioRanking]) -> Cha
         "the two. To win more often is not to have the smaller mean error, because a few bad runs can outweigh many "
         "good ones."
     )
-    data = {"cells": columns(("row", "other", "share", "page"), cells)}
+    data = {"cells": columns(("row", "other", "share"), cells)}
     return Chart("wins", "Runs won", caption, spec, data, wide=True)

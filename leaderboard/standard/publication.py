@@ -16,7 +16,9 @@ from simnav.leaderboard.campaign.campaign import Progress, Summary, combined, re
 from simnav.leaderboard.campaign.request import comes_with_simnav, requests
 from simnav.leaderboard.profiles import Profile
 from simnav.leaderboard.ranking.board import Ranking
+from simnav.leaderboard.ranking.first_view import first_view
 from simnav.leaderboard.ranking.ranking import rank
+from simnav.leaderboard.ranking.trouble_profile import profiles
 from simnav.leaderboard.results import requested, store
 from simnav.leaderboard.results.errors import RequestError
 from simnav.leaderboard.results.files import write_whole
@@ -192,7 +194,8 @@ def publish(
         )
     ranking = rank(results, requested=requested.read(working))
     of = len(results) + sum(lacking.values())
-    texts = {} if readme is None else {readme: replaced(readme, first_answer(ranking, results, of))}
+    view = first_view(ranking, profiles(results))
+    texts = {} if readme is None else {readme: replaced(readme, first_answer(view, results, of))}
     if readme is not None and (page := readme.parent / PAGE).is_file():
         texts[page] = replaced(page, tables(ranking, results, of))  # fails before all is written
     same = working.resolve() == folder.resolve() and all(is_declared(r.recording) for r in found)
@@ -203,7 +206,7 @@ def publish(
     for file, text in texts.items():
         write_whole(file, text)
     if readme is not None:
-        draw(ranking, readme.parent)
+        draw(ranking, view, readme.parent)
     size = sum(p.stat().st_size for p in folder.rglob("*") if p.is_file())
     return Published(folder, edition, results, ranking, size, readme, _remarks(results, without))
 

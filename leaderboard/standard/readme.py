@@ -12,6 +12,7 @@ from simnav.estimator import EstimatorError, describe
 from simnav.estimator.registry import registered
 from simnav.leaderboard.ranking.beside_plain import beside_plain, map_figure
 from simnav.leaderboard.ranking.board import Ranking, TrackRanking, TrackRow
+from simnav.leaderboard.ranking.first_view import FirstView, view_figure
 from simnav.leaderboard.ranking.ranking_figure import ranking_figure
 from simnav.leaderboard.ranking.ranking_table import gain_cell, ratio
 from simnav.leaderboard.ranking.summary import best_rows, gain_text, limits, sentence, spread
@@ -21,47 +22,46 @@ from simnav.leaderboard.results.errors import RequestError
 from simnav.leaderboard.results.provenance import distinct
 from simnav.leaderboard.results.result import Result
 
-__all__ = ["BEGIN", "END", "MAP", "PAGE", "PICTURE", "draw", "findings", "first_answer", "marked", "replaced", "tables"]
+__all__ = ["BEGIN", "END", "FIRST", "MAP", "PAGE", "PICTURE", "draw", "first_answer", "marked", "replaced", "tables"]
 
 #: Page of the board, from the folder of the README.
 PAGE = "docs/board.md"
 #: Picture of the board, likewise.
 PICTURE = "docs/figures/board.png"
+#: Picture of the first view, likewise.
+FIRST = "docs/figures/first-view.png"
 #: Map of the main track, likewise.
 MAP = "docs/figures/map.png"
 
 BEGIN, END = "<!-- standard result: begin -->", "<!-- standard result: end -->"
 _MAIN = "aided-ins"
-_FIRST = 5  # rows of the table of the README
 _ROWS = 12  # of the table of the main track
 _DRAWN = 24  # of the picture
 _FINDINGS = ("no-imu", "underwater")  # tracks whose sentences stand beside that of the main track
 _BEST = 4  # rows that a cell names
 
 
-def first_answer(ranking: Ranking, results: Sequence[Result], of: int | None = None) -> str:
-    """What is found on the main track in three sentences, and its first rows, as Markdown for the README.
+def first_answer(view: FirstView | None, results: Sequence[Result], of: int | None = None) -> str:
+    """The first view of the board as Markdown for the README: one sentence, one picture, and what to take.
 
     Parameters
     ----------
-    ranking : Ranking
-        The board.
+    view : FirstView or None
+        The first view; None where the results have none.
     results : sequence of Result
-        Results from which the ranking is made.
+        Results from which it is made.
     of : int, optional
         How many results there should be: with fewer, the answer is called preliminary.
     """
     parts = [*_preliminary(results, of)]
-    main = _main(ranking)
-    if main is not None:
-        if said := findings(main):
-            parts.append("\n".join(f"- {text}" for text in said))
+    if view is not None:
+        parts.append(f"**{view.sentence}**")
+        parts.append(f"![Error of eight filters beside that of {view.plain}, by kind of trouble]({FIRST})")
         parts.append("\n".join([
-            f"| rank | estimator | what it is | × `{main.plain}`, 95 % interval | × oracle |",
-            "|---|---|---|---|---|",
-            *(f"| {r.ranks or MISSING} | `{r.estimator}` | {_description(r)} | {gain_cell(r)} | {ratio(r.score)} |"
-              for r in [r for r in main.rows if r.ranked][:_FIRST]),
+            "| take | filter | because |", "|---|---|---|",
+            *(f"| {a.what} | `{a.estimator}` | {a.reason} |" for a in view.advice),
         ]))  # fmt: skip
+        parts += [view.silence] if view.silence else []
     parts += _older(results)
     parts.append(_origin(results))
     return "\n\n".join(parts)
@@ -139,43 +139,6 @@ def _from_page(picture: str) -> str:
     return os.path.relpath(picture, Path(PAGE).parent)
 
 
-def findings(track: TrackRanking) -> list[str]:
-    """What a reader should know first of a track, in plain sentences that are made from its rows.
-
-    Parameters
-    ----------
-    track : TrackRanking
-        Ranking of the track.
-
-    Returns
-    -------
-    list of str
-        Empty where the rows cannot be ordered.
-    """
-    best, ranked = best_rows(track), [r for r in track.rows if r.ranked]
-    gained = [r for r in best if r.gain is not None and r.estimator != track.plain]
-    if track.insufficient or not gained:
-        return []
-    one = len(best) == 1
-    who = f"`{best[0].estimator}` is the best" if one else f"{len(best)} of {len(ranked)} estimators may be the best"
-    chance = "" if one else "; the difference between them may be chance"
-    where = f"on {len(track.scenarios)} scenarios of the track {track.title}"
-    said = [f"**Who is best?** {who[0].upper()}{who[1:]} {where}{chance}."]
-    text = f"**What is gained?** Their errors are {gain_text(gained)} than those of the plain filter `{track.plain}`"
-    if track.reference == "oracle":
-        text += (
-            f", and still {spread((r.score for r in best), '{:.1f}')} times those of an oracle that knows all faults"
-        )
-    said.append(f"{text}.")
-    covered = [100.0 * r.faulty.coverage for r in best if math.isfinite(r.faulty.coverage)]
-    if covered:
-        said.append(
-            "**Do they know it?** Once something is wrong, the truth lies inside the 95 % region that they state "
-            f"{spread(covered)} % of the time."
-        )
-    return said
-
-
 def _origin(results: Sequence[Result]) -> str:
     """Benchmark and days of results, as a sentence; commits are where results are cited."""
     known = distinct(r.provenance for r in results)
@@ -195,13 +158,15 @@ def _main(ranking: Ranking) -> TrackRanking | None:
     return next((t for t in tracks if t.track == _MAIN), tracks[0] if tracks else None)
 
 
-def draw(ranking: Ranking, home: Path) -> list[Path]:
-    """Draw the pictures of the README: the best rows of the main track with the oracles, and the map of the track.
+def draw(ranking: Ranking, view: FirstView | None, home: Path) -> list[Path]:
+    """Draw the pictures of README and board: the first view, the best rows of the main track, and the map of the track.
 
     Parameters
     ----------
     ranking : Ranking
         The board.
+    view : FirstView or None
+        Its first view.
     home : Path
         Folder of the README.
     """
@@ -210,7 +175,11 @@ def draw(ranking: Ranking, home: Path) -> list[Path]:
     main = _main(ranking)
     if main is None:
         return []
-    drawn = {PICTURE: ranking_figure(main, most=_DRAWN), MAP: map_figure(main, most=_DRAWN)}
+    drawn = {
+        PICTURE: ranking_figure(main, most=_DRAWN),
+        MAP: map_figure(main, most=_DRAWN),
+        FIRST: None if view is None else view_figure(view),
+    }
     made = []
     for name, figure in drawn.items():
         if figure is not None:

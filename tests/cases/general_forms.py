@@ -14,7 +14,8 @@ from simnav.estimators.models.general import GeneralModel
 from simnav.estimators.models.inertial import InertialModel, roll_pitch_yaw
 from simnav.estimators.models.propagation import (
     BLOCK,
-    BLOCK_COLUMNS,
+    BLOCK_NUMBERS,
+    CLOCK,
     Motion,
     Samples,
     accumulate_error,
@@ -47,7 +48,7 @@ class GeneralInertial(GeneralModel):
         state = x[:3].copy(), x[3:6].copy(), x[6:15].reshape(3, 3).copy(), x[15:].copy()
         position, velocity, dcm, bias = state
         memory, turn, clock = (kept.copy() for kept in self._kept)
-        until, blocks = self.time + elapsed, np.empty((int(elapsed / BLOCK) + 2, BLOCK_COLUMNS))
+        until, blocks = self.time + elapsed, np.empty((int(elapsed / BLOCK) + 2, BLOCK_NUMBERS))
         moving = Motion(position, velocity, dcm, bias, memory, turn, clock)
         first, count = advance_inertial(moving, self._samples, self._first, until, self._noise, blocks)
         moved = np.concatenate([position, velocity, dcm.ravel(), bias])
@@ -68,7 +69,7 @@ class GeneralInertial(GeneralModel):
 
     def navigation(self, x, time):
         dcm = x[6:15].reshape(3, 3)
-        rate = self._kept[2][12:15] - x[15:18] - dcm.T @ earth_rate(x[0])
+        rate = self._kept[2].view(CLOCK)[0].rate - x[15:18] - dcm.T @ earth_rate(x[0])
         return NavigationPoint(time, x[:3], x[3:6], dcm, rate)
 
     def retract(self, x, error):

@@ -191,6 +191,6 @@ def test_a_step_of_rounding_is_a_step():
         model.propagate(P, 1e-12)
         assert model.time == 1e-12
         assert np.isfinite(P).all()
-    states = model.states(np.zeros((2, model.size)))
+    states = model.x + np.zeros((2, model.size))
     model.move(states, 1e-12)
     assert np.isfinite(states).all()

@@ -102,6 +102,12 @@ CASES = {
         _fault("imu_dropout", "imu", 14.0, 14.2, output="zero"),
         _fault("imu_dropout", "imu", 17.0, 17.25),
     )),
+    "imu warms up, is shaken, sticks, and gives no samples": Case("mems-only", 24.0, (
+        _fault("imu_warm_up", "imu", 4.0, 24.0, time_s=5.0, angular_rate_deg_h=300.0, specific_force_ug=2000.0),
+        _fault("imu_vibration", "imu", 6.0, 11.0, vibration_g=0.5, gyroscope_deg_h_g2=40.0, accelerometer_ug_g2=4000.0),
+        _fault("imu_stuck_axis", "imu", 12.0, 13.0, axes=["gyroscope_z", "accelerometer_x"]),
+        _fault("imu_dropout", "imu", 16.0, 16.3, output="missing"),
+    )),
     "satellites jammed and spoofed": Case("open-sea", 24.0, (
         _fault("jamming", "gnss", 5.0, 15.0, loss=18.0, rise_s=8.0),
         _fault("spoofing", "gnss", 12.0, 22.0, drift_m_s=[2.0, -1.0, 0.0], clock_drift_m_s=0.5),

@@ -75,6 +75,8 @@ def test_every_scenario_tells_its_reader_what_it_is(header: Header):
         "acoustic",
         "terrain",
         "cooperative",
+        "imu-faults",
+        "imu-faults-underwater",
     }
     assert scenario.track in tracks | {"training"}
     assert scenario.training == header.training == (scenario.track == "training")

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .intervals import Interval, codes, mean, score
+from .intervals import LEVEL, Interval, codes, score
 
 __all__ = ["FEWEST_SCENARIOS", "WORSE", "Gain", "gain", "scenario_interval"]
 
@@ -26,7 +26,7 @@ class Gain:
     Attributes
     ----------
     value : float
-        Geometric mean of the ratio of the errors, each scenario counting the same; below 1 the row is better.
+        Geometric mean of the ratio of the errors, each stratum counting the same; below 1 the row is better.
     low, high : float
         Its 95 % interval over seeds: for other runs of the same scenarios. NaN where there is none.
     scenarios_low, scenarios_high : float
@@ -53,6 +53,7 @@ def gain(
     strata: Sequence[Hashable],
     clusters: Sequence[Hashable],
     excess: float = 0.0,
+    scenarios: Sequence[Hashable] | None = None,
 ) -> Gain:
     """The gain of a row over the plain row.
 
@@ -61,9 +62,11 @@ def gain(
     mine, plain : (n,) array_like
         Logarithms of the errors of the two rows in the same runs.
     strata, clusters : sequence of n
-        The scenario of each run, and its independent unit (seed or recording).
+        What counts the same, and the independent unit (seed or recording) of each run.
     excess : float
         As for `simnav.leaderboard.ranking.statistics.intervals.score`.
+    scenarios : sequence of n, optional
+        The scenario of each run. Default: its stratum.
 
     Examples
     --------
@@ -73,26 +76,34 @@ def gain(
     """
     difference: NDArray[np.float64] = np.asarray(mine, dtype=np.float64) - np.asarray(plain, dtype=np.float64)
     seeds = score(difference, strata, clusters, excess=excess)
-    every = scenario_interval(difference, strata)
-    means = _means(difference, strata)
+    named = strata if scenarios is None else scenarios
+    every = scenario_interval(difference, named, strata)
+    scenario = codes(named)
+    means = np.bincount(scenario, difference) / np.bincount(scenario)
     return Gain(
         seeds.value, seeds.low, seeds.high, every.low, every.high, int(np.count_nonzero(means < 0.0)), len(means),
         float(np.mean(difference > math.log(WORSE))),
     )  # fmt: skip
 
 
-def scenario_interval(values: ArrayLike, strata: Sequence[Hashable]) -> Interval:
+def scenario_interval(
+    values: ArrayLike, scenarios: Sequence[Hashable], strata: Sequence[Hashable] | None = None
+) -> Interval:
     """The geometric mean over scenarios, with its interval for other scenarios of the same kind.
 
     The scenarios are taken for a sample. The means of the scenarios hold the scatter of the seeds, so Student's
-    interval of these means covers both.
+    interval of these means covers both. Where the scenarios have weights, because each stratum of them counts the
+    same, the standard error is that of a weighted mean: the root of n / (n - 1) sum(w^2 (x - mean)^2) (Cochran, 1977,
+    Sampling Techniques, as a ratio estimate).
 
     Parameters
     ----------
     values : (n,) array_like
         Logarithms.
-    strata : sequence of n
+    scenarios : sequence of n
         The scenario of each run.
+    strata : sequence of n, optional
+        The stratum of each run; each counts the same. Default: each scenario is one.
 
     Examples
     --------
@@ -101,14 +112,21 @@ def scenario_interval(values: ArrayLike, strata: Sequence[Hashable]) -> Interval
     >>> found = scenario_interval([0.0, 0.1, 0.2], ["one", "two", "three"])
     >>> found.low < math.exp(0.1) < found.high
     True
+    >>> round(math.log(scenario_interval([0.0, 0.0, 0.3], ["one", "two", "three"], ["calm", "calm", "rough"]).value), 3)
+    0.15
     """
-    means = _means(np.asarray(values, dtype=np.float64), strata)
-    found = mean(means.tolist())
-    if len(means) < FEWEST_SCENARIOS:
-        return Interval(math.exp(found.value), runs=len(means))
-    return Interval(math.exp(found.value), math.exp(found.low), math.exp(min(found.high, 700.0)), len(means))
+    x: NDArray[np.float64] = np.asarray(values, dtype=np.float64)
+    stratum = codes(scenarios if strata is None else strata)
+    scenario = codes(scenarios)
+    weight = 1.0 / (np.count_nonzero(np.bincount(stratum)) * np.bincount(stratum)[stratum])  # of a run
+    weights = np.bincount(scenario, weight)
+    means = np.bincount(scenario, weight * x) / weights
+    middle = float(weights @ means)
+    count = len(means)
+    if count < FEWEST_SCENARIOS:
+        return Interval(math.exp(middle), runs=count)
+    from scipy.special import stdtrit
 
-
-def _means(values: NDArray[np.float64], strata: Sequence[Hashable]) -> NDArray[np.float64]:
-    stratum = codes(strata)
-    return np.bincount(stratum, values) / np.bincount(stratum)
+    error = math.sqrt(count / (count - 1) * float(weights**2 @ (means - middle) ** 2))
+    half = float(stdtrit(count - 1.0, 0.5 + 0.5 * LEVEL)) * error
+    return Interval(math.exp(middle), math.exp(middle - half), math.exp(min(middle + half, 700.0)), count)

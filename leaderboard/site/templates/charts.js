@@ -108,9 +108,7 @@
     async draw() {
       this.drawn = true;
       await simnav.load("vega.js");
-      const { given } = this;
-      const data = given.file ? await simnav.read(given.file) : given.data;
-      if (!data) return;
+      const { given } = this, { data } = given;
       const rows = given.always ?? shown.rows ?? [];
       const spec = fill(given.spec, rows, Boolean(given.always));
       const width = Math.max(180, this.place.clientWidth - 75);

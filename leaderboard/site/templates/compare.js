@@ -94,7 +94,7 @@
     return { rows, overall };
   };
 
-  /** Scores of the rows with weights of the scenarios; a row without one of those that count has none. */
+  /** Scores of the rows with weights of the kinds of trouble; a row without one of those that count has none. */
   simnav.weighted = (ratios, weights) => {
     const counted = Object.keys(weights).filter((s) => weights[s] > 0), total = counted.reduce((t, s) => t + weights[s], 0);
     const found = {};

@@ -1,6 +1,6 @@
 // What all pages share: their data, how values are written, the state in the address, help on hover and focus.
 "use strict";
-const simnav = (window.simnav = { data: {}, page: {} });
+const simnav = (window.simnav = { packed: {}, page: {} });
 
 // -- elements -------------------------------------------------------------------------------------
 
@@ -31,10 +31,16 @@ simnav.load = (file) => {
   return scripts.get(file);
 };
 
-/** The content of data/NAME.js. */
-simnav.read = async (name) => {
-  if (!(name in simnav.data)) await simnav.load(`data/${name}.js`);
-  return simnav.data[name];
+/** What stands in data/NAME.js: JSON, compressed and written as text, one file a page. */
+const contents = new Map();
+const unpacked = async (name) => {
+  if (!(name in simnav.packed)) await simnav.load(`data/${name}.js`);
+  const bytes = Uint8Array.from(atob(simnav.packed[name]), (letter) => letter.charCodeAt(0));
+  return new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"))).json();
+};
+simnav.read = (name) => {
+  if (!contents.has(name)) contents.set(name, unpacked(name));
+  return contents.get(name);
 };
 
 // -- values -----------------------------------------------------------------------------------------
@@ -115,9 +121,3 @@ simnav.state = {
   document.addEventListener("scroll", hide, true);
   document.addEventListener("keydown", (event) => { if (event.key === "Escape") hide(); });
 }
-
-simnav.reader = () => {
-  const element = document.getElementById("page-data");
-  if (element) simnav.page = JSON.parse(element.textContent);
-};
-simnav.reader();

@@ -1,7 +1,7 @@
 // What each kind of page does with its data.
 "use strict";
-{
-  const { make, page, state, write } = simnav;
+(async () => {
+  const { make, state, write } = simnav, page = (simnav.page = await simnav.read(document.body.dataset.page));
   const at = (name, within = document) => within.querySelector(`[data-${name}]`);
   const say = (host, text) => host.replaceChildren(make("p", { class: "note" }, text));
 
@@ -9,10 +9,10 @@
 
   const drawn = new Set();
 
-  const drawTrack = async ({ key, file, ...rest }) => {
-    if (drawn.has(key)) return;
-    drawn.add(key);
-    const panel = document.getElementById(`track-${key}`), track = file ? await simnav.read(file) : { key, ...rest };
+  const drawTrack = (track) => {
+    if (drawn.has(track.key)) return;
+    drawn.add(track.key);
+    const panel = document.getElementById(`track-${track.key}`);
     simnav.table(at("table", panel), track.table);
     if (track.map) simnav.chart(at("map", panel), track.map);
     const charts = at("charts", panel);
@@ -24,13 +24,13 @@
 
   const drawWeights = (host, track) => {
     const kept = (state.get(`${track.key}.weights`) ?? "").split(",");
-    const weights = Object.fromEntries(track.scenarios.map((s, i) => [s.id, kept[i] === undefined || kept[i] === "" ? 1 : Math.max(0, Number(kept[i]) || 0)]));
-    const even = Object.fromEntries(track.scenarios.map((s) => [s.id, 1]));
+    const weights = Object.fromEntries(track.kinds.map((s, i) => [s.id, kept[i] === undefined || kept[i] === "" ? 1 : Math.max(0, Number(kept[i]) || 0)]));
+    const even = Object.fromEntries(track.kinds.map((s) => [s.id, 1]));
     const before = simnav.places(simnav.weighted(track.ratios, even));
     const fields = make("div", { class: "weights" }), table = make("div");
     const draw = () => {
       const scores = simnav.weighted(track.ratios, weights), places = simnav.places(scores);
-      const without = track.scenarios.map((s) => simnav.places(simnav.weighted(track.ratios, { ...even, [s.id]: 0 })));
+      const without = track.kinds.map((s) => simnav.places(simnav.weighted(track.ratios, { ...even, [s.id]: 0 })));
       const rows = Object.keys(track.ratios).map((row) => {
         const range = without.map((w) => w[row]).filter((x) => x !== null), moved = before[row] - places[row];
         return {
@@ -43,19 +43,19 @@
         name: `${track.key}.weighted`, title: `${track.title}: places with these weights`, sort: "place", rows,
         columns: [
           { key: "place", title: "Place", help: "With these weights.", kind: "integer" },
-          { key: "name", title: "Estimator", help: "Only estimators with a result on every scenario that counts have a place.", kind: "name", fixed: true },
-          { key: "score", title: "Score", help: "Weighted geometric mean of the scores by scenario.", kind: "ratio" },
+          { key: "name", title: "Estimator", help: "Only estimators with a result in every kind that counts have a place.", kind: "name", fixed: true },
+          { key: "score", title: "Score", help: "Weighted geometric mean of the scores by kind of trouble.", kind: "ratio" },
           { key: "moved", title: "Moved", help: "Places gained or lost against equal weights.", kind: "text" },
-          { key: "without", title: "Without one scenario", help: "Places when any one scenario is left out, all others counting the same.", kind: "text" },
+          { key: "without", title: "Without one kind", help: "Places when any one kind of trouble is left out, all others counting the same.", kind: "text" },
         ],
       });
     };
-    for (const s of track.scenarios) {
-      const field = make("input", { type: "number", min: "0", max: "10", step: "0.5", value: weights[s.id], "data-scenario": s.id });
+    for (const s of track.kinds) {
+      const field = make("input", { type: "number", min: "0", max: "10", step: "0.5", value: weights[s.id], "data-kind": s.id });
       field.addEventListener("input", () => {
         weights[s.id] = Math.max(0, Number(field.value) || 0);
-        const changed = track.scenarios.some((t) => weights[t.id] !== 1);
-        state.set(`${track.key}.weights`, changed ? track.scenarios.map((t) => weights[t.id]).join(",") : "");
+        const changed = track.kinds.some((t) => weights[t.id] !== 1);
+        state.set(`${track.key}.weights`, changed ? track.kinds.map((t) => weights[t.id]).join(",") : "");
         draw();
       });
       fields.append(make("label", { "data-help": s.title }, field, ` ${s.name}`));
@@ -64,8 +64,10 @@
     draw();
   };
 
-  const index = () => {
+  const tracks = () => {
+    simnav.shown.rows = [];
     const tabs = [...document.querySelectorAll("[role=tab]")], select = at("tracks"); // the second on a phone
+    if (!tabs.length) return page.tracks.forEach(drawTrack);
     const show = (tab, focus) => {
       select.value = tab.dataset.track;
       for (const other of tabs) {
@@ -75,7 +77,7 @@
         document.getElementById(other.getAttribute("aria-controls")).hidden = !chosen;
       }
       if (focus) tab.focus();
-      return drawTrack(page.tracks.find((t) => t.key === tab.dataset.track));
+      drawTrack(page.tracks.find((t) => t.key === tab.dataset.track));
     };
     tabs.forEach((tab, k) => {
       tab.addEventListener("click", () => { state.set("track", tab.dataset.track); show(tab); });
@@ -91,8 +93,32 @@
       state.set("track", select.value);
       show(tabs.find((t) => t.dataset.track === select.value));
     });
-    simnav.shown.rows = [];
-    return tabs.length ? show(tabs.find((t) => t.dataset.track === state.get("track")) ?? tabs[0]) : null;
+    show(tabs.find((t) => t.dataset.track === state.get("track")) ?? tabs[0]);
+  };
+
+  // -- the first page --------------------------------------------------------------------------------
+
+  /** Three boxes, and what the stored results say for them. */
+  const index = () => {
+    const host = at("advisor");
+    if (!host) return;
+    const { answers, troubles, limits, milliseconds, commands } = page.advisor;
+    const box = (key, label, options) => {
+      const kept = state.get(key), select = make("select", {}, options.map(([value, text]) => make("option", { value, selected: value === kept }, text)));
+      select.addEventListener("change", () => { state.set(key, select.value); show(); });
+      host.append(make("label", {}, `${label} `, select));
+      return select;
+    };
+    const kit = box("instruments", "Instruments", Object.keys(answers).map((title) => [title, title]));
+    const trouble = box("trouble", "What may go wrong", Object.entries(troubles));
+    const limit = box("time", "Time of an epoch", limits.map((text, k) => [String(k), text]));
+    const show = () => {
+      const [first, ...rest] = answers[kit.value][trouble.value][Number(limit.value)], time = milliseconds[Number(limit.value)];
+      const code = (text) => text.split("`").map((part, k) => (k % 2 ? make("code", {}, part) : part));
+      const command = `simnav recommend ${commands[kit.value].replaceAll(",", " ")}${trouble.value ? ` --trouble ${trouble.value}` : ""}${time === null ? "" : ` --milliseconds ${time}`}`;
+      at("answer").replaceChildren(make("p", { class: "verdict" }, code(first)), make("ul", { class: "plain" }, rest.map((text) => make("li", {}, code(text)))), make("pre", { tabindex: "0" }, make("code", {}, command)));
+    };
+    show();
   };
 
   // -- a scenario -------------------------------------------------------------------------------------
@@ -133,7 +159,7 @@
   };
 
   const oneRun = (host) => {
-    const { data, argument } = page.scenario, rows = Object.keys(page.rows);
+    const { argument } = page.scenario, rows = Object.keys(page.rows);
     if (!rows.length) return say(host, "No estimator ran here.");
     let row = state.get("row"), seed = Number(state.get("seed") ?? page.runs.seeds[0]);
     if (!rows.includes(row)) row = page.first[0];
@@ -144,9 +170,9 @@
     const inside = make("details", { class: "inside" }, make("summary", {}, "Innovations, residuals and weights of this run"), inner);
     host.append(make("div", { class: "tools" }, make("label", {}, "Estimator ", choice), make("label", {}, "Run ", runs)), facts, make("pre", { tabindex: "0" }, command), drawn, charts, inside, make("details", {}, make("summary", {}, "All runs of this estimator"), list));
     let made = null, within = null;
-    const showInside = async () => {
+    const showInside = () => {
       if (!inside.open || !page.runs.seeds.includes(seed)) return;
-      const read = await simnav.read(`${data}-run-${seed}-inside`);
+      const read = page.runs.data[seed].inside;
       if (!within) within = page.runs.inside.map((chart) => simnav.chart(inner, { ...chart, data: read[chart.name] ?? {} }));
       else for (const chart of within) chart.show({ data: read[chart.given.name] ?? {} });
     };
@@ -156,14 +182,14 @@
       state.set("seed", String(seed));
       runs.value = String(seed);
       command.textContent = `simnav run ${argument} --seed ${seed} -e ${row} --plot run.svg`;
-      const all = (await simnav.read(page.rows[row].data)).scenarios[page.scenario.id];
+      const all = (await simnav.read(page.rows[row].data)).runs.scenarios[page.scenario.id];
       drawRuns(list, all);
       const k = all.seed.indexOf(seed);
       facts.textContent = k < 0 ? `${row} did not run with seed ${seed}.` : `${row}, seed ${seed}${all.note?.[k] ? `, ${all.note[k]}` : ""}: ${all.status?.[k] ?? "ok"}${all.reason?.[k] ? ` (${all.reason[k]})` : ""}, horizontal RMSE ${write.number(all.scores.horizontal_rmse?.[k])} m, ${write.duration(all.seconds[k])}.`;
       charts.hidden = drawn.hidden = !page.runs.seeds.includes(seed);
       inside.hidden = charts.hidden || !page.runs.inside.length;
       if (charts.hidden) return;
-      const name = `${data}-run-${seed}`, read = await simnav.read(name);
+      const read = page.runs.data[seed];
       drawn.hidden = !read.draws.length;
       const values = read.draws.map(([key, value]) => make("tr", {}, make("th", { scope: "row" }, key), make("td", { class: "wrap" }, value)));
       drawn.replaceChildren(make("summary", {}, `Drawn for this run: ${read.draws.length} values`), make("div", { class: "scroll", tabindex: "0", role: "region", "aria-label": "Drawn for this run" }, make("table", {}, make("tbody", {}, values))));
@@ -173,7 +199,7 @@
       };
       if (!made) made = page.runs.charts.map((chart) => simnav.chart(charts, { ...chart, data: shown(chart.name) }));
       else for (const chart of made) chart.show({ data: shown(chart.given.name) });
-      await showInside();
+      showInside();
     };
     const drawRuns = (target, all) => {
       const columns = page.table.columns.filter((c) => all.scores[c.key]).map((c) => ({ ...c, hidden: false }));
@@ -219,7 +245,7 @@
   });
 
   const compared = async (a, b) => {
-    const [mine, other] = await Promise.all([simnav.read(a), simnav.read(b)]);
+    const [mine, other] = (await Promise.all([simnav.read(a), simnav.read(b)])).map((row) => row.errors);
     const found = simnav.comparison(mine, other);
     for (const row of found.rows) row.entry = mine.scenarios[row.scenario];
     return found;
@@ -326,8 +352,9 @@
     const keys = page.wins.map((t) => t.key);
     let key = keys.includes(state.get("track")) ? state.get("track") : keys[0], chart = null;
     const select = make("select", { "aria-label": "Track" }, page.wins.map((t) => make("option", { value: t.key, selected: t.key === key }, t.title)));
-    const draw = async () => {
-      const given = await simnav.read(page.wins.find((t) => t.key === key).file);
+    const draw = () => {
+      const given = page.wins.find((t) => t.key === key).chart, { row, other } = given.data.cells;
+      given.data.cells.page = row.map((a, k) => `compare.html#${new URLSearchParams({ track: key, a, b: other[k] })}`);
       if (chart) chart.show(given);
       else chart = simnav.chart(place, { ...given });
     };
@@ -340,7 +367,8 @@
     draw();
   };
 
-  const kinds = { index, scenario, estimator, compare, about: () => {} };
+  const kinds = { index, tracks, scenario, estimator, compare, about: () => {} };
   at("print")?.addEventListener("click", () => simnav.print());
-  Promise.resolve(kinds[page.kind]?.()).then(() => { document.body.dataset.ready = "true"; });
-}
+  await kinds[page.kind]?.();
+  document.body.dataset.ready = "true";
+})();

@@ -14,7 +14,11 @@ from simnav.sensors.faults.additive import AdditiveLayer, BiasStep, GrossError, 
 from simnav.sensors.faults.clock_step import ClockStep
 from simnav.sensors.faults.fault import FAULTS, Effect, FaultError, FaultSpec, Names, effect_of, register_fault
 from simnav.sensors.faults.imu_disturbance import ImuDisturbance
-from simnav.sensors.faults.imu_faults import ImuBiasStep, ImuClipping, ImuDropout
+from simnav.sensors.faults.imu_dropout import ImuDropout
+from simnav.sensors.faults.imu_faults import ImuBiasStep, ImuClipping
+from simnav.sensors.faults.imu_stuck_axis import ImuStuckAxis
+from simnav.sensors.faults.imu_vibration import ImuVibration
+from simnav.sensors.faults.imu_warm_up import ImuWarmUp
 from simnav.sensors.faults.layer import Activity, FaultLayer
 from simnav.sensors.faults.replacing import FalseZero, Frozen, Outage, ReplacingLayer
 from simnav.sensors.faults.satellite_signals import Jamming, Spoofing
@@ -39,6 +43,9 @@ __all__ = [
     "ImuClipping",
     "ImuDisturbance",
     "ImuDropout",
+    "ImuStuckAxis",
+    "ImuVibration",
+    "ImuWarmUp",
     "Jamming",
     "Multipath",
     "Names",

@@ -1,4 +1,4 @@
-"""Faults inside an IMU: a step of its biases, a range that is too small (clipping), and lost samples (dropouts)."""
+"""Faults inside an IMU: what they have in common, a step of the biases, and a range that is too small (clipping)."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from simnav.sensors.instrument import ZERO, Triple
 from simnav.spec import Positive, SpecError, quantity
 from simnav.types import Array, ImuSamples
 
-__all__ = ["ImuBiasStep", "ImuClipping", "ImuDropout", "ImuFaultSpec"]
+__all__ = ["AddedErrors", "ImuBiasStep", "ImuClipping", "ImuFaultSpec", "ReplacedSamples"]
 
 
 class ImuFaultSpec(FaultSpec):
@@ -96,27 +96,7 @@ class ImuClipping(ImuFaultSpec):
         return _Clipping(self, index, seed, self.key_of_streams(index, occurrence), limits)
 
 
-@register_fault
-class ImuDropout(ImuFaultSpec):
-    """Samples of the IMU are lost, and in their place it repeats the last one before, or reads zero.
-
-    With ``mean_active_s`` and ``mean_gap_s`` they are lost in random bursts.
-
-    Attributes
-    ----------
-    output : str
-        What it gives in place of lost samples: ``last`` or ``zero``.
-    """
-
-    kind: Literal["imu_dropout"] = "imu_dropout"
-    output: Literal["last", "zero"] = "last"
-
-    def build(self, index: int, seed: int, occurrence: int | None = None) -> FaultLayer:
-        """See `FaultSpec.build`."""
-        return _Dropout(self, index, seed, self.key_of_streams(index, occurrence), self.output == "last")
-
-
-class _Replaced(FaultLayer):
+class ReplacedSamples(FaultLayer):
     """A layer that replaces samples of the IMU. Only samples that change are labelled."""
 
     def apply_imu(self, samples: ImuSamples, labels: ImuLabels | None) -> tuple[ImuSamples, ImuLabels | None]:
@@ -130,7 +110,7 @@ class _Replaced(FaultLayer):
             self.seen(value)
             return samples, labels
         rows, interval = found
-        changed = self.replaced(value, rows, interval)
+        changed = self.replaced(samples, value, rows, interval)
         self.seen(value)
         error = changed - value[rows]
         touched = np.any(error != 0.0, axis=1)
@@ -142,13 +122,15 @@ class _Replaced(FaultLayer):
         return ImuSamples(samples.time, samples.interval, angular_rate, specific_force), ImuLabels(faults, fault_error)
 
     @abstractmethod
-    def replaced(self, value: Array, rows: NDArray[np.intp], interval: NDArray[np.intp]) -> Array:
+    def replaced(self, samples: ImuSamples, value: Array, rows: NDArray[np.intp], interval: NDArray[np.intp]) -> Array:
         """The (m, 6) values in place of those of some rows.
 
         Parameters
         ----------
+        samples : ImuSamples
+            All samples of the block, before this fault.
         value : (n, 6) array
-            Angular rate and specific force of all samples of the block, before this fault.
+            Their angular rate and specific force.
         rows, interval : (m,) int arrays
             The rows within an interval, and the number of the interval of each.
         """
@@ -158,35 +140,31 @@ class _Replaced(FaultLayer):
         del value
 
 
-class _Clipping(_Replaced):
+class AddedErrors(ReplacedSamples):
+    """A layer that adds an error to each sample, which depends on the time since the start of the interval."""
+
+    def replaced(self, samples: ImuSamples, value: Array, rows: NDArray[np.intp], interval: NDArray[np.intp]) -> Array:
+        """See `ReplacedSamples.replaced`."""
+        changed: Array = value[rows] + self.errors(
+            samples.time[rows] - self.activity.starts[interval], samples.interval[rows]
+        )
+        return changed
+
+    @abstractmethod
+    def errors(self, since: Array, length: Array) -> Array:
+        """The (m, 6) errors of samples.
+
+        Parameters
+        ----------
+        since, length : (m,) array
+            From the start of the interval of the fault to the end of each sample, and the length of the sample [s].
+        """
+
+
+class _Clipping(ReplacedSamples):
     def __init__(self, spec: FaultSpec, index: int, seed: int, key: str, limits: Array):
         super().__init__(spec, index, seed, key)
         self._limits = limits
 
-    def replaced(self, value: Array, rows: NDArray[np.intp], interval: NDArray[np.intp]) -> Array:
+    def replaced(self, samples: ImuSamples, value: Array, rows: NDArray[np.intp], interval: NDArray[np.intp]) -> Array:
         return np.clip(value[rows], -self._limits, self._limits)
-
-
-class _Dropout(_Replaced):
-    def __init__(self, spec: FaultSpec, index: int, seed: int, key: str, last: bool):
-        super().__init__(spec, index, seed, key)
-        self._repeats = last
-        self._before: Array | None = None
-        self._held: tuple[int, Array] | None = None
-
-    def replaced(self, value: Array, rows: NDArray[np.intp], interval: NDArray[np.intp]) -> Array:
-        changed = np.zeros((len(rows), 6))
-        if not self._repeats:
-            return changed
-        for number in np.unique(interval):
-            here = interval == number
-            if self._held is None or self._held[0] != number:
-                first = int(rows[here][0])
-                before = value[first - 1] if first > 0 else self._before
-                self._held = int(number), (value[first] if before is None else before).copy()
-            changed[here] = self._held[1]
-        return changed
-
-    def seen(self, value: Array) -> None:
-        if len(value):
-            self._before = value[-1].copy()

@@ -13,7 +13,7 @@ from simnav.estimators.adaptations.sage_husa import SageHusa
 from simnav.estimators.adaptations.variational_bayes import VariationalBayes
 from simnav.estimators.algebra.chi_square import normal_quantile
 from simnav.estimators.models.roles import witnesses
-from simnav.estimators.persistence import Course
+from simnav.estimators.persistence import add_innovation, is_correlated, is_directed, is_large, no_innovations
 from simnav.scenario import load
 from simnav.scoring import score
 from simnav.source import record
@@ -38,10 +38,10 @@ def given(residual, time: float, name: str = "gnss", predicted: float = 0.5) -> 
 
 def course_of(innovations: np.ndarray) -> list[bool]:
     """Whether innovations of three components, already standardised, are found correlated, one after the other."""
-    course, found = Course(), []
+    course, found = no_innovations(1), []
     for k, u in enumerate(innovations):
-        course.add(tuple(u), 3, float(k))
-        found.append(course.correlated(S99))
+        add_innovation(course, 0, *u, 3, float(k), False)
+        found.append(is_correlated(course, 0, S99))
     return found
 
 
@@ -74,10 +74,10 @@ def test_a_white_noise_of_any_size_and_tails_is_not_found_correlated():
 def test_large_is_chi_square():
     """Unit normals are found too large at the level of the test at most; the fading lowers the share."""
     rng = np.random.default_rng(2)
-    course, found = Course(), []
+    course, found = no_innovations(1), []
     for k in range(20_000):
-        course.add(tuple(rng.standard_normal(3)), 3, float(k))
-        found.append(course.large(normal_quantile(0.95)))
+        add_innovation(course, 0, *rng.standard_normal(3), 3, float(k), False)
+        found.append(is_large(course, 0, normal_quantile(0.95)))
     assert 0.003 < np.mean(found) < 0.05
 
 
@@ -164,13 +164,13 @@ def test_a_gross_error_or_a_larger_noise_of_a_lone_log_has_no_direction():
 @pytest.mark.parametrize("count", [2, 3])
 def test_the_cosine_of_isotropic_innovations_has_unit_variance_over_their_number(count: int):
     """The statistic of runs is exceeded as often as a standard normal, for any law of the sizes."""
-    rng, course, found = np.random.default_rng(11), Course(), []
+    rng, course, found = np.random.default_rng(11), no_innovations(1), []
     for k in range(20_000):
         u = np.zeros(3)
         u[:count] = rng.standard_normal(count) * np.exp(2.0 * rng.standard_normal())
-        course.add(tuple(u), count, float(k), failed=k % 6 != 0)
+        add_innovation(course, 0, *u, count, float(k), k % 6 != 0)
         if k % 6 == 5:
-            found.append(course.directed(normal_quantile(0.9)))
+            found.append(is_directed(course, 0, normal_quantile(0.9)))
     assert 0.08 < np.mean(found) < 0.12
 
 

@@ -69,6 +69,15 @@ def test_what_was_made_of_whole_columns_goes_when_an_array_is_replaced():
     assert len(columns.record(Table).time) >= 1007
 
 
+def test_a_record_is_made_once_until_an_array_is_replaced():
+    made = Made()
+    columns = filled(10, made)
+    table = made.once(Table, lambda: columns.record(Table))
+    assert made.once(Table, lambda: columns.record(Table)) is table
+    columns.reserve(1000)
+    assert made.once(Table, lambda: columns.record(Table)).time is columns.record(Table).time is not table.time
+
+
 @pytest.mark.parametrize("copied", [copy.deepcopy, lambda columns: pickle.loads(pickle.dumps(columns))])
 def test_a_copy_has_rows_of_its_own(copied):
     columns = filled(5)

@@ -16,9 +16,11 @@ from simnav.estimators.adaptations.sage_husa import SageHusa
 from simnav.estimators.algebra.joseph import project
 from simnav.estimators.models.channels import by_channel, instrument_of
 from simnav.estimators.models.inertial import InertialModel
+from simnav.estimators.models.inertial_points import InertialPoints
 from simnav.estimators.rows.kalman import Ekf
 from simnav.estimators.solvers.filter_step import filter_step
 from simnav.estimators.solvers.kalman import FilterFunctions, KalmanEstimator
+from simnav.estimators.solvers.sigma_point import SigmaPointEstimator
 from simnav.scenario import load
 from simnav.source import record
 from simnav.types import Measurement
@@ -83,9 +85,9 @@ def test_compiled_and_plain_have_the_same_bits(recording_of, row: str):
     assert (len(used) > 5) == (name in ADAPTIVE)
     assert (flagged > 5) == (row == "gated-ekf")
     if isinstance(whole.solver.adaptation, AdaptiveFactor) and name == "adkf":
-        kept = [e.solver.adaptation.prediction.arrays(whole.model.size)["kept"] for e in (whole, single)]
-        np.testing.assert_array_equal(*kept)
-        assert kept[0][1:].all()  # the motion was inflated
+        first = [e.solver.adaptation.prediction.tested(whole.model.size).first for e in (whole, single)]
+        np.testing.assert_array_equal(*first)
+        assert first[0].all()  # the motion was inflated
 
 
 @pytest.mark.parametrize("adaptation", [None, SageHusa, HuberWeights, AdaptiveFactor])
@@ -104,10 +106,11 @@ def test_kernels_and_methods_are_the_same_filter(recording_of, adaptation):
         np.testing.assert_allclose(a.covariance, b.covariance, rtol=1e-8, atol=1e-14)
 
 
-def test_the_whole_step_runs_without_a_compiler(recording_of):
+@pytest.mark.parametrize(("solver", "model"), [(KalmanEstimator, InertialModel), (SigmaPointEstimator, InertialPoints)])
+def test_the_whole_step_runs_without_a_compiler(recording_of, solver, model):
     """The plain sources of the loop, the adaptation and the model: what a kernel is made of."""
     recording = recording_of(2, 3.0)
-    compiled, plain = (KalmanEstimator(InertialModel(), HuberWeights()) for _ in range(2))
+    compiled, plain = (solver(model(), HuberWeights()) for _ in range(2))
     for estimator in (compiled, plain):
         estimator.reset(recording.start, recording.instruments)
     made = plain._filter
@@ -202,7 +205,7 @@ def test_singular_or_meaningless_measurements_change_nothing(recording_of):
     model.noise[name][:] = 0.0
     P[:3], P[:, :3] = 0.0, 0.0
     P[6:9], P[:, 6:9] = 0.0, 0.0
-    estimator.solver.dynamics.aids.figures[:] = 0.0
+    estimator.solver.dynamics.aids.noise[:] = 0.0
     compass = next(s for s in recording.instruments.of_kind("gyrocompass", "magnetic_compass"))
     upward = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
     model.dcm[:] = upward

@@ -7,7 +7,7 @@ import pytest
 
 import simnav
 from simnav.estimator import make
-from simnav.estimators.solvers.innovation_consistency import EPOCHS, InnovationTest
+from simnav.estimators.solvers.innovation_consistency import EPOCHS, LONG, InnovationTest
 from simnav.leaderboard.ranking.runs import Runs
 from simnav.leaderboard.results.result import Result
 from tests.agreement.voyages import turned
@@ -45,6 +45,23 @@ def test_an_epoch_without_measurements_says_nothing():
     assert test.variance_factor == 20.0
     test.end_epoch()
     assert test.inconsistent
+
+
+def after(square: float, epochs: int, seed: int = 0) -> list[bool]:
+    """What the test says after some epochs with a square of 4 components, and right ones from then on."""
+    rng, test, found = np.random.default_rng(seed), InnovationTest(), []
+    for k in range(400):
+        test.add(rng.chisquare(4) if not 100 <= k < 100 + epochs else square, 4)
+        test.end_epoch()
+        found.append(test.inconsistent)
+    return found[100:]
+
+
+def test_a_contradiction_that_lasted_is_remembered_and_a_short_one_is_not():
+    lasted, short = after(1000.0, 60), after(1000.0, 15)
+    assert all(lasted[5 : 60 + EPOCHS + 30])
+    assert not any(lasted[60 + LONG :])
+    assert not any(short[15 + EPOCHS :])
 
 
 @pytest.fixture(scope="module")

@@ -9,14 +9,16 @@ import pytest
 from scipy import stats
 
 from simnav.estimator import EstimatorError, make
+from simnav.estimators.adaptations.adkf import AdaptiveFactor
 from simnav.estimators.adaptations.base import Adaptation, Innovation
+from simnav.estimators.adaptations.sage_husa import SageHusa
 from simnav.estimators.models.base import Linearised
 from simnav.estimators.models.inertial import InertialModel
 from simnav.estimators.models.inertial_points import InertialPoints
-from simnav.estimators.models.points import PointModel
+from simnav.estimators.models.points import PointModel, draw_points
 from simnav.estimators.models.ship_points import ShipPoints
 from simnav.estimators.solvers.kalman import KalmanEstimator
-from simnav.estimators.solvers.sigma_point import SigmaPointEstimator, draw_points
+from simnav.estimators.solvers.sigma_point import SigmaPointEstimator
 from simnav.geometry import earth, rotation
 from simnav.types import (
     Datasheet,
@@ -32,6 +34,8 @@ DEG = np.pi / 180.0
 #: alpha, beta, kappa: unscented of three kinds, and cubature.
 SETS = {"default": (0.5, 2.0, 0.0), "narrow": (1e-2, 2.0, 0.0), "julier": (1.0, 0.0, 1.0), "cubature": (1.0, 0.0, 0.0)}
 START = InitialState(0.0, np.zeros(3), np.zeros(3), np.zeros(3), np.eye(9))
+GNSS = Datasheet("gnss", "gnss_position", 1.0, np.full(3, 1.0))
+COMPASS = Datasheet("compass", "magnetic_compass", 2.0, np.array([0.5 * DEG]), bias=np.array([0.5 * DEG]))
 METER = Datasheet("meter", "gnss_velocity", 1.0, np.full(3, 0.5))
 
 
@@ -334,6 +338,37 @@ def test_ship_points_move_and_read_as_the_model_does():
         np.testing.assert_allclose(e[2:], (point.x - center.x)[2:], atol=1e-12)
 
 
+class ByMethods(SigmaPointEstimator):
+    """The filter whose functions are methods in Python."""
+
+    def _kernels(self):
+        return None
+
+
+@pytest.mark.parametrize("adaptation", [None, SageHusa, AdaptiveFactor])
+@pytest.mark.parametrize("model", [InertialPoints, ShipPoints])
+def test_kernels_and_methods_are_the_same_filter(recording_of, model, adaptation):
+    recording = recording_of(2, 40.0, aids=(GNSS, COMPASS))
+    filters = [kind(model(), adaptation and adaptation()) for kind in (SigmaPointEstimator, ByMethods)]
+    for estimator in filters:
+        estimator.reset(recording.start, recording.instruments)
+    assert [f._compiled for f in filters] == [True, False]
+    for k, packet in enumerate(recording.steps()):
+        if 20 <= k < 28:  # all at once: the motion is taken as wrong, and inflated
+            wrong = [m._replace(value=m.value + (1e-4 if m.kind == "gnss_position" else 0.2)) for m in packet.aids]
+            packet = replace(packet, aids=wrong)
+        a, b = (estimator.update(packet) for estimator in filters)
+        assert a.diagnostics == pytest.approx(b.diagnostics, rel=1e-5, abs=1e-6, nan_ok=True)
+        for state in filters[0].model.state:
+            np.testing.assert_allclose(*(getattr(f.model, state) for f in filters), rtol=1e-7, atol=1e-8)
+        np.testing.assert_allclose(a.covariance, b.covariance, rtol=1e-6, atol=1e-10)
+
+
+def test_points_of_another_kind_are_not_passed_over():
+    with pytest.raises(TypeError, match="observe_points of its own; it has to say: fused = False"):
+        type("Own", (InertialPoints,), {"observe_points": lambda self, measurement, errors: errors[:, :3]})
+
+
 @pytest.fixture(scope="module")
 def clean(recording_of):
     return [recording_of(seed, 60.0) for seed in range(20, 32)]
@@ -362,13 +397,23 @@ def test_points_drawn_ten_times_as_often_gain_nothing(clean, run_over):
     """Once between measurements is enough: the estimates differ by less than a hundredth of their sigma."""
 
     class Often(SigmaPointEstimator):
-        def _propagate(self, until):
-            while until - self.model.time > 0.1:
-                super()._propagate(self.model.time + 0.05)
-            super()._propagate(until)
+        pieces = 0
+
+        def functions(self):
+            functions = super().functions()
+
+            def propagate(dynamics, samples, until):
+                while until - self.model.time > 0.1:
+                    functions.propagate(dynamics, samples, self.model.time + 0.05)
+                    self.pieces += 1
+                functions.propagate(dynamics, samples, until)
+
+            return functions.replaced(propagate=propagate)
 
     once, covariances = run_over(make("ukf"), clean[0])
-    often, _ = run_over(Often(InertialPoints()), clean[0])
+    estimator = Often(InertialPoints())
+    often, _ = run_over(estimator, clean[0])
+    assert estimator.pieces > 500
     sigma = np.sqrt(np.diagonal(covariances, axis1=1, axis2=2))
     assert np.abs((often - once) / sigma).max() < 0.01
 

@@ -636,14 +636,18 @@ def test_the_measurements_are_blamed_where_they_do_not():
     assert denied.weight.max() == 1e-3
 
 
-def test_nobody_is_asked_where_there_is_no_log():
-    weighting = Isolated(Instruments([SHEETS["gnss"]]))
+@pytest.mark.parametrize("directed", [True, False])
+def test_without_a_log_the_motion_is_asked_where_fixes_fail_in_one_direction(directed: bool):
+    """A larger noise has no direction. The window then keeps its weights."""
+    weighting, asked = Isolated(Instruments([SHEETS["gnss"]])), []
     for epoch in range(1, 8):
-        f = factors(along(np.full(epoch, 40.0)), iteration=0)
+        sign = 1.0 if directed else (-1.0) ** np.arange(epoch)
+        f = factors(along(40.0 * sign * np.ones(epoch)), iteration=0)
         weighting.weigh(f)
         f.iteration = 1
-        assert weighting.weigh(f) is True
-        assert f.weight.max() == 1e-3
+        asked.append(weighting.weigh(f) is False)
+        assert asked[-1] or f.weight.max() == 1e-3
+    assert any(asked) == directed
 
 
 def lone(

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from simnav.leaderboard.ranking.ranking import rank
+from simnav.leaderboard.ranking.trouble_profile import profiles
 from simnav.leaderboard.results.provenance import BENCHMARK, Provenance
 from simnav.leaderboard.results.result import Result
 from simnav.leaderboard.site import background, site
@@ -130,6 +131,8 @@ def folder(results: list[Result], catalogued: str, tmp_path_factory: pytest.Temp
     output = tmp_path_factory.mktemp("board") / "site"
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(background, "BOUND_RUNS", 1)
-        index = site.build(results, rank(results), output, sweeps=[made_up_sweep(catalogued)])
+        tracks = {catalogued: "fjords"}  # two tracks under one heading
+        index = site.build(results, rank(results, tracks=tracks), output, sweeps=[made_up_sweep(catalogued)],
+                           profiles=profiles(results, tracks=tracks))  # fmt: skip
     assert index == output / "index.html"
     return output

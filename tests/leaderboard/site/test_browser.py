@@ -27,6 +27,8 @@ pytestmark = pytest.mark.skipif(
 
 FLAGS = ["--no-sandbox", "--disable-gpu", "--disable-background-networking"]
 SCREEN, PHONE = 1400, 390
+#: What a chart draws of its data.
+MARKS = ", ".join(f"g.mark-{kind}.role-mark path[d]:not([d=''])" for kind in ("symbol", "line", "rect", "area", "arc"))
 
 
 @pytest.fixture(scope="module")
@@ -57,7 +59,7 @@ class Visit:
         self.page.wait_for_selector("body[data-ready]")
         return self.page
 
-    def names(self, within: str = "[role=tabpanel]:not([hidden]) [data-table]") -> list[str]:
+    def names(self, within: str = ".track:not([hidden]) [data-table]") -> list[str]:
         """What stands in the first column of names, row by row."""
         cells = self.page.query_selector_all(f"{within} tbody th")
         return [c.evaluate("c => (c.querySelector('a') ?? c).textContent.trim()") for c in cells]
@@ -80,7 +82,16 @@ def chart(page: Any, name: str) -> Any:
     return page.wait_for_selector(f"#chart-{name} .vega[data-drawn] svg")
 
 
-PAGES = ("index.html", "{scenario}.html", "made-up-two-v3.html", "estimator-sw-fgo.html", "compare.html", "about.html")
+BOARD = "board-other-scenarios.html"
+PAGES = (
+    "index.html",
+    BOARD,
+    "{scenario}.html",
+    "made-up-two-v3.html",
+    "estimator-sw-fgo.html",
+    "compare.html",
+    "about.html",
+)
 
 
 @pytest.mark.parametrize(("width", "scheme"), [(SCREEN, "light"), (PHONE, "dark")])
@@ -89,13 +100,12 @@ def test_every_kind_of_page_fits_and_draws_all_charts(browser, folder, catalogue
     for name in PAGES:
         page = visit.open(name.format(scenario=catalogued))
         assert page.evaluate("document.documentElement.scrollWidth") == width, name
-        for place in page.query_selector_all(
-            "[role=tabpanel]:not([hidden]) figure.chart, section > .charts > figure.chart"
-        ):
+        for place in page.query_selector_all(".track:not([hidden]) figure.chart, section > .charts > figure.chart"):
             drawn = chart(page, place.get_attribute("id").removeprefix("chart-"))
             box = drawn.bounding_box()
             assert box["width"] <= width
             assert box["height"] > 40
+            assert drawn.query_selector(MARKS), f"{name}: {place.get_attribute('id')} is empty"
         text = page.evaluate("getComputedStyle(document.body).color")
         assert (sum(map(int, text[4:-1].split(","))) > 384) == (scheme == "dark")
     visit.close()
@@ -106,15 +116,34 @@ def test_the_overview_opens_quickly_without_the_chart_library(browser, folder):
     visit = Visit(browser, folder, PHONE)
     visit.context.route("**/vega.js", lambda route: route.abort())
     page = visit.open("index.html")
-    assert len(visit.names()) > 2
+    assert page.locator(".picture tbody tr").count() == 4  # one kind of trouble, all, time, honesty
+    assert page.locator(".headings a").count() == 1
     loaded = page.evaluate("performance.getEntriesByType('navigation')[0].domContentLoadedEventEnd")
     assert loaded < 1000.0 * 3  # a second on an idle machine; tests share theirs
+    page = visit.open(BOARD)
+    assert len(visit.names()) > 2
     assert not page.is_visible("[role=tablist]")  # tracks are chosen in a list
-    page.select_option("select[data-tracks]", "other")
-    page.wait_for_selector("#track-other tbody tr")
-    assert "track=other" in page.url
-    assert page.is_hidden("[role=tabpanel]:not(#track-other)")
+    page.select_option("select[data-tracks]", "fjords")
+    page.wait_for_selector("#track-fjords tbody tr")
+    assert "track=fjords" in page.url
+    assert page.is_hidden(".track:not(#track-fjords)")
     visit.context.close()
+
+
+def test_three_boxes_choose_a_row_and_say_where_there_is_no_evidence(visit):
+    page = visit.open("index.html")
+    boxes = page.locator("[data-advisor] select")
+    assert boxes.count() == 3
+    assert "take `" not in page.inner_text("[data-answer]")
+    assert "With fixes noisy or jumping, take " in page.inner_text("[data-answer]")
+    boxes.nth(1).select_option("imu")
+    assert page.inner_text("[data-answer] .verdict").startswith("No evidence: ")
+    boxes.nth(1).select_option("noisy-fixes")
+    boxes.nth(2).select_option("4")
+    assert page.inner_text("[data-answer] pre").endswith("--trouble noisy-fixes --milliseconds 0.1")
+    address = page.url.partition("#")[2]
+    page = visit.open(f"index.html#{address}")
+    assert page.input_value("[data-advisor] select >> nth=1") == "noisy-fixes"
 
 
 def test_runs_that_are_lost_against_the_plain_ekf_are_listed_and_lead_to_the_run(visit, hostile):
@@ -130,26 +159,22 @@ def test_runs_that_are_lost_against_the_plain_ekf_are_listed_and_lead_to_the_run
 
 
 def test_tables_sort_filter_and_search_and_the_address_keeps_it(visit, hostile):
-    page = visit.open("index.html#track=other")
+    page = visit.open(f"{BOARD}#track=other")
     assert visit.names() == ["sw-fgo", "ekf", hostile, "inertial", "oracle"]
-    page.click("[role=tabpanel]:not([hidden]) [data-table] th[data-key=cost] button")
+    page.click(".track:not([hidden]) [data-table] th[data-key=cost] button")
     assert visit.names()[-1] == hostile  # its cost was not measured
-    assert (
-        page.get_attribute("[role=tabpanel]:not([hidden]) [data-table] th[data-key=cost]", "aria-sort") == "ascending"
-    )
-    page.click("[role=tabpanel]:not([hidden]) [data-table] th[data-key=cost] button")
-    assert (
-        page.get_attribute("[role=tabpanel]:not([hidden]) [data-table] th[data-key=cost]", "aria-sort") == "descending"
-    )
+    assert page.get_attribute(".track:not([hidden]) [data-table] th[data-key=cost]", "aria-sort") == "ascending"
+    page.click(".track:not([hidden]) [data-table] th[data-key=cost] button")
+    assert page.get_attribute(".track:not([hidden]) [data-table] th[data-key=cost]", "aria-sort") == "descending"
     descending = visit.names()
-    panel = page.locator("[role=tabpanel]:not([hidden]) [data-table]")
+    panel = page.locator(".track:not([hidden]) [data-table]")
     panel.locator("select[aria-label='Only Family']").select_option("Factor graph")
     assert visit.names() == ["sw-fgo"]
     panel.locator("summary").click()
     panel.get_by_label("Worst run").check()
     address = page.url.partition("#")[2]
     assert {"track=other", "other.sort=-cost", "other.family=Factor+graph"} <= set(address.split("&"))
-    page = visit.open(f"index.html#{address}")
+    page = visit.open(f"{BOARD}#{address}")
     assert visit.names() == ["sw-fgo"]
     assert page.query_selector("#track-other th[data-key=worst]") is not None
     page.locator("#track-other [data-table] select").select_option("")
@@ -160,19 +185,19 @@ def test_tables_sort_filter_and_search_and_the_address_keeps_it(visit, hostile):
 
 
 def test_tabs_are_chosen_by_keyboard_and_link(visit):
-    page = visit.open("index.html")
+    page = visit.open(BOARD)
     tabs = page.get_by_role("tab")
     first = tabs.nth(0)
     first.focus()
     page.keyboard.press("ArrowRight")
     assert tabs.nth(1).get_attribute("aria-selected") == "true"
     assert page.evaluate("document.activeElement.getAttribute('role')") == "tab"
-    assert page.locator("[role=tabpanel]:not([hidden])").count() == 1
-    assert "track=other" in page.url
+    assert page.locator(".track:not([hidden])").count() == 1
+    assert "track=fjords" in page.url
 
 
 def test_headings_and_charts_explain_themselves_on_hover(visit, catalogued):
-    page = visit.open("index.html#track=other")
+    page = visit.open(f"{BOARD}#track=other")
     page.hover("#track-other [data-table] th[data-key=ranks] button")
     assert "cannot be told apart" in page.inner_text("#tip")
     page.mouse.move(0, 0)
@@ -309,10 +334,10 @@ def test_p_values_in_the_browser_are_those_of_the_board(visit):
 
 
 def test_weights_of_scenarios_move_the_places(visit):
-    page = visit.open("index.html#track=other")
+    page = visit.open(f"{BOARD}#track=other")
     table = "#track-other [data-weights]"
     page.locator(f"{table} input[type=number]").nth(0).scroll_into_view_if_needed()
-    scores = page.evaluate("simnav.read('track-other').then((t) => t.ratios)")
+    scores = page.evaluate("simnav.page.tracks.find((t) => t.key === 'other').ratios")
     page.locator(f"{table} input[type=number]").nth(0).fill("0")
     expected = sorted(scores, key=lambda row: scores[row]["made-up-two-v3"])
     assert visit.names(table) == expected
@@ -320,7 +345,7 @@ def test_weights_of_scenarios_move_the_places(visit):
 
 
 def test_every_table_is_written_as_csv_and_latex(visit, hostile):
-    page = visit.open("index.html#track=other")
+    page = visit.open(f"{BOARD}#track=other")
     panel = page.locator("#track-other [data-table]")
     with page.expect_download() as waiting:
         panel.get_by_role("button", name="CSV").click()
@@ -339,7 +364,7 @@ def test_every_table_is_written_as_csv_and_latex(visit, hostile):
 
 def test_header_and_names_stay_in_view_on_a_phone(browser, folder):
     visit = Visit(browser, folder, PHONE)
-    page = visit.open("index.html#track=other")
+    page = visit.open(f"{BOARD}#track=other")
     scroll = page.locator("#track-other [data-table] .scroll")
     scroll.evaluate("s => { s.scrollLeft = 300; }")
     page.locator("#track-other [data-table] tbody th").first.scroll_into_view_if_needed()
@@ -354,7 +379,7 @@ def test_header_and_names_stay_in_view_on_a_phone(browser, folder):
 
 
 def test_links_lead_somewhere(visit):
-    page = visit.open("index.html#track=other")
+    page = visit.open(f"{BOARD}#track=other")
     page.locator("#track-other [data-table]").get_by_role("link", name="sw-fgo").click()
     page.wait_for_selector("body[data-ready]")
     assert page.inner_text("h1") == "sw-fgo"
@@ -374,10 +399,17 @@ def test_axe_has_no_serious_finding(browser, folder, catalogued, scheme):
     if scheme == "dark":
         options["runOnly"] = ["color-contrast"]
     visit = Visit(browser, folder, scheme=scheme)
-    every = ("index.html", "{scenario}.html", "estimator-sw-fgo.html", "compare.html", "about.html")
+    every = (
+        "index.html",
+        "board-other-scenarios.html",
+        "{scenario}.html",
+        "estimator-sw-fgo.html",
+        "compare.html",
+        "about.html",
+    )
     for name in every if scheme == "light" else every[:2]:
         page = visit.open(name.format(scenario=catalogued))
-        for drawn in page.query_selector_all("[role=tabpanel]:not([hidden]) figure.chart")[:2]:
+        for drawn in page.query_selector_all(".track:not([hidden]) figure.chart")[:2]:
             chart(page, drawn.get_attribute("id").removeprefix("chart-"))
         # One page with the inside of its charts, which are many elements of few kinds, and take long.
         context = None if name == "compare.html" else {"exclude": [[".vega svg"]]}

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-import csv
+import base64
 import json
 import re
+import zlib
 from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
@@ -27,7 +28,7 @@ from simnav.leaderboard.results.web_addresses import Home
 from simnav.leaderboard.site import charts, site, sweeps
 from simnav.leaderboard.site.entries import entries
 from simnav.leaderboard.site.facts import datasheets, estimator_facts
-from simnav.leaderboard.site.overview import bar_scale, overview
+from simnav.leaderboard.site.overview import bar_scale, track_data
 from simnav.leaderboard.site.scenario_page import ScenarioData
 from simnav.scenario import load
 from simnav.scoring import SCORES
@@ -45,21 +46,15 @@ def no_charts(monkeypatch):
     def nothing(entry, ranking, *_):
         page = {"kind": "scenario", "reference": "", "remarks": [], "unsuitable": [], "failures": [], "instruments": [],
                 "provisional": False, "sweeps": [], "rows": {}, "drawn": [], "timed": 0}  # fmt: skip
-        return ScenarioData(page, {}, (), ())
+        return ScenarioData(page, (), ())
 
     monkeypatch.setattr(site, "scenario_data", nothing)
     monkeypatch.setattr(site, "bundle", lambda: "")
 
 
 def tracks_of(folder: Path) -> list[dict[str, Any]]:
-    """The tracks of the board: the first is in its page, each other in a file."""
-    first, *others = data_of(folder / "index.html")["tracks"]
-    return [first, *(file_data(folder, track["file"]) for track in others)]
-
-
-def file_data(folder: Path, name: str) -> dict[str, Any]:
-    """What a page reads from a file."""
-    return json.loads((folder / "data" / f"{name}.js").read_text().partition(" = ")[2].rstrip(";\n"))
+    """The tracks of the board."""
+    return [t for page in sorted(folder.glob("board-*.html")) for t in data_of(page)["tracks"]]
 
 
 class Page(HTMLParser):
@@ -103,15 +98,17 @@ def pages(folder: Path) -> dict[str, Page]:
 
 
 def data_of(path: Path) -> dict[str, Any]:
-    """The data that are embedded in a page."""
-    found = re.search(r'<script type="application/json" id="page-data">(.*?)</script>', path.read_text(), re.DOTALL)
+    """The data of a page."""
+    text = (path.parent / "data" / f"{path.stem}.js").read_text()
+    found = re.fullmatch(r'simnav\.packed\["(.*)"\] = "(.*)";\n', text)
     assert found is not None
-    return json.loads(found[1])
+    assert f'data-page="{found[1]}"' in path.read_text()
+    return json.loads(zlib.decompress(base64.b64decode(found[2])))
 
 
 def test_there_is_a_page_for_the_board_each_scenario_and_each_estimator(folder, results):
     scenarios, estimators = {r.scenario for r in results}, {r.estimator for r in results}
-    assert len(pages(folder)) == 3 + len(scenarios) + len(estimators)
+    assert len(pages(folder)) == 4 + len(scenarios) + len(estimators)
     assert {f"{s}.html" for s in scenarios} <= set(pages(folder))
 
 
@@ -141,9 +138,9 @@ def test_pages_and_data_are_small_and_need_nothing_from_elsewhere(folder):
 
 def test_hostile_names_are_shown_and_do_nothing(folder, hostile):
     for name, page in pages(folder).items():
-        assert page.tags.count("script") == 6, name  # our own, and the data
+        assert page.tags.count("script") == 7, name  # our own, and the data
         assert "i" not in page.tags
-    assert hostile in {row["name"]["text"] for row in data_of(folder / "index.html")["tracks"][0]["table"]["rows"]}
+    assert hostile in {row["name"]["text"] for row in tracks_of(folder)[0]["table"]["rows"]}
     scenario = (folder / f"{SCENARIOS[0]}.html").read_text()
     assert "<script>alert" not in scenario
     assert "&lt;b&gt;timeout&lt;/b&gt;" in scenario
@@ -166,13 +163,13 @@ def test_the_board_has_a_table_a_track_and_shows_identical_oracles_once(folder, 
     assert rows[hostile]["failed"] == {"text": "2 of 24", "value": 2}
     assert rows["inertial"]["mark"] == "unsuitable"
     assert rows["ekf"]["ranks"]["text"] is None  # fewer than five rows are not ordered
-    shown = Page(folder / "index.html").text
+    shown = Page(folder / "about.html").text
     assert f"--scenario PATH/TO/made-up-one.toml,PATH/TO/made-up-two.toml,{catalogued}" in shown
     assert "ekf:gate=3.5" in shown
 
 
 def test_costs_are_multiples_of_the_plain_row_and_what_is_not_measured_is_named(folder, hostile):
-    track = tracks_of(folder)[0]
+    track = tracks_of(folder)[1]
     rows = {r["name"]["text"]: r for r in track["table"]["rows"]}
     measured = cost_of("sw-fgo", "ekf", "horizontal_rmse")
     assert rows["sw-fgo"]["cost"]["value"] == pytest.approx(measured.value, rel=1e-2)
@@ -189,7 +186,7 @@ def test_costs_are_multiples_of_the_plain_row_and_what_is_not_measured_is_named(
 
 
 def test_the_map_has_the_error_of_each_row_beside_the_plain_row_s_on_each_scenario(folder):
-    one, track = tracks_of(folder)
+    track, one = tracks_of(folder)
     assert one["map"] is None  # of a single scenario
     cells = track["map"]["data"]["cells"]
     found = {(r, s): x for r, s, x in zip(cells["row"], cells["scenario"], cells["ratio"], strict=True)}
@@ -213,7 +210,7 @@ def test_a_row_far_behind_is_named_below_the_chart_of_costs_and_flattens_none():
         for k in range(6)
     ]
     ranking = rank(results)
-    (track,) = overview(ranking, *entries(group(results), ranking), group(results))
+    track = track_data(ranking.tracks[0], *entries(group(results), ranking), group(results))
     chart = next(c for c in track["charts"] if c["name"].endswith("-cost"))
     assert "inertial" not in chart["data"]["rows"]["row"]
     assert len(chart["data"]["rows"]["row"]) == len(labels) - 1
@@ -248,10 +245,9 @@ def test_a_scenario_of_the_catalogue_says_what_happens_with_which_instruments(fo
     assert {"cdf", "rmse", "nees", "stanford"} <= set(names)
     assert [c["name"] for c in data["inside"]] == ["weight-gnss"]
     assert "oracle and oracle-mixture gave the same errors in every run." in data["remarks"]
-    horizontal = (folder / "data" / f"{catalogued}-horizontal.js").read_text()
-    assert '"bound":[' in horizontal
+    assert data["charts"][1]["data"]["bound"]["bound"]
     assert data["runs"]["seeds"][0] == 0
-    assert (folder / "data" / f"{catalogued}-run-0.js").is_file()
+    assert data["runs"]["data"]["0"]["charts"]["track"]["curves"]["rows"]["ekf"]
 
 
 def test_a_scenario_shows_its_sweeps_with_breaking_points(folder, catalogued):
@@ -291,11 +287,11 @@ def test_a_scenario_from_elsewhere_has_failures_and_who_does_not_suit(folder):
 def test_commands_name_the_file_of_a_scenario_that_does_not_come_with_simnav(results, folder, catalogued, tmp_path,
                                                                              no_charts):  # fmt: skip
     own = [r for r in results if r.scenario in SCENARIOS]
-    text = Page(site.build(own, rank(own), tmp_path / "own")).text
+    site.build(own, rank(own), tmp_path / "own")
+    text = Page(tmp_path / "own" / "about.html").text
     assert "--scenario PATH/TO/made-up-one.toml,PATH/TO/made-up-two.toml --estimator" in text
     assert "simnav evaluate my_filter.py --scenario PATH/TO/made-up-one.toml --runs 20" in text
     assert "The scenarios made-up-one, made-up-two are not part of simnav" in text
-    assert "The scenarios made-up-one, made-up-two are not part of simnav" in Page(tmp_path / "own" / "about.html").text
     assert "The scenario made-up-one is not part of simnav" in Page(folder / f"{SCENARIOS[0]}.html").text
     assert "not part of simnav" not in Page(folder / f"{catalogued}.html").text
 
@@ -339,8 +335,6 @@ def test_every_chart_is_drawn_for_print(folder, results, tmp_path, catalogued):
 
     some = ("timeline", "horizontal", "rmse", "stanford")
     for chart in (c for c in data_of(folder / f"{catalogued}.html")["charts"] if c["name"] in some):
-        if chart["data"] is None:
-            chart["data"] = file_data(folder, chart.pop("file"))
         made = charts.Chart(**chart)
         svg, png = write_figure(filled(made, ["ekf", "sw-fgo"]), tmp_path / made.name)
         drawn = svg.read_text()
@@ -359,7 +353,7 @@ def test_json_keeps_to_its_schema(folder, results):
     mine = next(r for r in results if r.estimator == "ekf" and r.seed == 3 and r.scenario == first["scenario"])
     assert first["scores"]["horizontal_rmse"] == mine.scores["horizontal_rmse"]
     assert first["scores"]["vertical_rmse"] is None
-    assert [t["track"] for t in document["ranking"]["tracks"]] == ["papers", "other"]
+    assert [t["track"] for t in document["ranking"]["tracks"]] == ["other", "fjords"]
 
 
 def conforms(value, schema, where):
@@ -381,26 +375,11 @@ def conforms(value, schema, where):
         conforms(item, schema.get("items", {}), f"{where}[{i}]")
 
 
-def test_csv_has_a_row_a_run_and_units_in_its_names(folder, results):
-    with (folder / "results.csv").open(newline="", encoding="utf-8") as file:
-        rows = list(csv.DictReader(file))
-    assert len(rows) == len(results)
-    key = {(r["scenario"], int(r["seed"]), r["estimator"]): r for r in rows}
-    for r in results:
-        row = key[r.scenario, r.seed, r.estimator]
-        assert row["status"] == r.status
-        if r.status == "ok":
-            assert float(row["horizontal_rmse_m"]) == pytest.approx(r.scores["horizontal_rmse"], rel=1e-8)
-            assert float(row["heading_rmse_deg"]) == pytest.approx(2.0)
-        else:
-            assert row["horizontal_rmse_m"] == ""
-    assert json.loads(key[SCENARIOS[0], 0, "ekf"]["parameters"]) == {"gate": 3.5}
-
-
 def test_parquet_holds_the_same_rows(folder, results):
     table = pq.read_table(folder / "results.parquet")
     assert len(table) == len(results)
     assert set(SCORES) <= set(table.column_names)
+    assert not list(folder.glob("*.csv"))
     assert table.column("horizontal_rmse").null_count == sum(r.status != "ok" for r in results)
 
 
@@ -465,7 +444,7 @@ def test_where_everything_failed_there_is_still_a_site(results, tmp_path):
     lost = {"status": "timeout", "reason": "too slow", "scores": {}, "series": {}}
     few = [replace(r, **lost) for r in results if r.scenario == SCENARIOS[0] and r.estimator == "ekf"]
     index = site.build(few, rank(few), tmp_path / "site")
-    (row,) = data_of(index)["tracks"][0]["table"]["rows"]
+    (row,) = tracks_of(index.parent)[0]["table"]["rows"]
     assert row["failed"]["text"] == "12 of 12"
     assert "too slow" in Page(tmp_path / "site" / f"{SCENARIOS[0]}.html").text
 
@@ -490,7 +469,7 @@ def test_two_processes_write_the_same_site_as_one(results, tmp_path, monkeypatch
     written = []
     for workers in (1, 2):
         site.build(results, ranking, tmp_path / str(workers), workers=workers)
-        files = sorted(p for p in (tmp_path / str(workers)).rglob("*") if p.suffix in (".html", ".js", ".csv"))
+        files = sorted(p for p in (tmp_path / str(workers)).rglob("*") if p.suffix in (".html", ".js"))
         texts = {str(p.relative_to(tmp_path / str(workers))): p.read_text() for p in files}
         written.append({n: re.sub(r"\d{4}-\d\d-\d\d \d\d:\d\d UTC", "", text) for n, text in texts.items()})
     assert written[0] == written[1]

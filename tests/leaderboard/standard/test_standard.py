@@ -92,12 +92,13 @@ def test_what_is_published_is_small_complete_and_current(home: Path) -> None:
 
 def test_the_readme_and_the_page_have_their_tables_and_the_rest_of_them_stays(home: Path) -> None:
     results = store.load(home / "shipped", series=False)
-    for name, made in (("README.md", readme.first_answer), (readme.PAGE, readme.tables)):
+    made = {"README.md": readme.first_answer(None, results), readme.PAGE: readme.tables(rank(results), results)}
+    for name, wanted in made.items():
         text = (home / name).read_text()
         assert text.startswith("# A board\n")
         assert text.endswith("The end.\n")
-        assert readme.marked(home / name) == made(rank(results), results)
-        assert "| `dead-reckoning` |" in text
+        assert readme.marked(home / name) == wanted
+    assert "| `dead-reckoning` |" in text
     assert "(figures/board.png)" in text
     assert (home / readme.PICTURE).stat().st_size > 5000
     assert "| Generalisation | 1 | 2 | 2 | not enough data | " in text

@@ -187,13 +187,75 @@ def test_samples_drop_out(output):
     np.testing.assert_array_equal(joined, found)
 
 
+def test_samples_are_missing():
+    """The others are as they were, also those that a fault of the list behind it disturbs."""
+    noise = '\n[[fault]]\nkind = "imu_disturbance"\nangular_rate_noise_deg_s = 1.0'
+    missing = 'kind = "imu_dropout"\noutput = "missing"\nstart_s = 3.0\nend_s = 4.5'
+    whole, run = record(faulty(noise[10:]), 1).data, record(faulty(missing + noise), 1).data
+    kept = (whole.imu.time < 3.0 - 1e-9) | (whole.imu.time >= 4.5 - 1e-9)
+    assert np.sum(~kept) == 75
+    for name in ("time", "interval", "angular_rate", "specific_force"):
+        np.testing.assert_array_equal(getattr(run.imu, name), getattr(whole.imu, name)[kept])
+    np.testing.assert_array_equal(run.imu_labels.fault_error, whole.imu_labels.fault_error[kept])
+    parts = Simulator(faulty(missing + noise), 1)
+    joined = np.concatenate([parts.advance(float(t)).imu.angular_rate for t in range(1, 21)])
+    np.testing.assert_array_equal(joined, run.imu.angular_rate)
+    runs = SteppedRuns(1)
+    runs.begin(0, Simulator(faulty(missing + noise), 1))
+    for _ in range(5):
+        runs.advance(np.ones(1, np.bool_))
+    assert runs.packet(0).imu.time[0] == 4.5  # the packet of the last second begins in mid-second
+
+
+def test_an_axis_is_stuck():
+    scenario = faulty('kind = "imu_stuck_axis"\naxes = ["gyroscope_z", "accelerometer_x"]\nstart_s = 8.0\nend_s = 12.0')
+    clean, run = record(parse(SCENARIO), 1).data.imu, record(scenario, 1).data
+    stuck = (clean.time >= 8.0 - 1e-9) & (clean.time < 12.0 - 1e-9)
+    for name, axis in (("angular_rate", 2), ("specific_force", 0)):
+        found, true = getattr(run.imu, name), getattr(clean, name)
+        np.testing.assert_array_equal(found[stuck, axis], np.full(200, true[np.argmax(stuck) - 1, axis]))
+        np.testing.assert_array_equal(np.delete(found, axis, 1), np.delete(true, axis, 1))
+        np.testing.assert_array_equal(found[~stuck], true[~stuck])
+    assert np.mean(run.imu_labels.faults[stuck] == 1) > 0.98
+    assert not run.imu_labels.faults[~stuck].any()
+
+
+def test_it_warms_up():
+    scenario = faulty('kind = "imu_warm_up"\ntime_s = 4.0\nstart_s = 5.0\nangular_rate_deg_h = [0, 60, 0]')
+    clean, run = record(parse(SCENARIO), 1).data.imu, record(scenario, 1).data
+    risen = 60.0 * DEG_H * (1.0 - np.exp(-np.maximum(0.0, clean.time - 5.0) / 4.0))
+    np.testing.assert_allclose(run.imu.angular_rate[:, 1] - clean.angular_rate[:, 1], risen, atol=1e-12)
+    np.testing.assert_allclose(run.imu_labels.fault_error[:, 1], risen, atol=1e-12)
+    np.testing.assert_array_equal(run.imu.specific_force, clean.specific_force)
+
+
+def test_a_vibration_begins_and_is_rectified():
+    """Each sample shows the mean of the sinusoid over its interval, so its size falls with the sinc of f T."""
+    vibration = "vibration_g = 0.5\nfrequency_hz = 10.0\naccelerometer_ug_g2 = 4000.0\ngyroscope_deg_h_g2 = [40, 0, 0]"
+    scenario = faulty('kind = "imu_vibration"\nstart_s = 4.0\n' + vibration)
+    clean, run = record(parse(SCENARIO), 1).data.imu, record(scenario, 1).data
+    after = clean.time >= 4.0 + 1e-9  # 16 s, or 160 periods
+    force = (run.imu.specific_force - clean.specific_force)[after]
+    np.testing.assert_allclose(force.mean(axis=0), 4000e-6 * 0.5**2 * G, rtol=1e-9)
+    np.testing.assert_allclose(force.std(axis=0), 0.5 * G * np.sinc(10.0 / 50.0), rtol=1e-9)
+    rate = (run.imu.angular_rate - clean.angular_rate)[after]
+    np.testing.assert_allclose(rate, np.tile([40.0 * 0.25 * DEG_H, 0.0, 0.0], (len(rate), 1)), atol=1e-12)
+    parts = Simulator(scenario, 1)
+    joined = np.concatenate([parts.advance(float(t)).imu.specific_force for t in range(1, 21)])
+    np.testing.assert_array_equal(joined, run.imu.specific_force)
+
+
 @pytest.mark.parametrize(
     ("fault", "message"),
     [
+        ('kind = "imu_stuck_axis"\naxes = "gyroscope"', "an IMU has no axis 'gyroscope'.*gyroscope_x"),
+        ('kind = "imu_stuck_axis"\naxes = []', "should name at least one of gyroscope_x"),
+        ('kind = "imu_warm_up"\ntime_s = 4.0', "an imu_warm_up needs angular_rate_deg_h or specific_force_ug"),
+        ('kind = "imu_warm_up"\nangular_rate_deg_h = 4.0', "time_s.*missing"),
         ('kind = "imu_bias_step"', "an imu_bias_step needs angular_rate_deg_h or specific_force_ug"),
         ('kind = "imu_clipping"', "an imu_clipping needs angular_rate_limit_deg_s or specific_force_limit_g"),
         ('kind = "imu_dropout"\ninstruments = "gnss_position"', "an imu_dropout is on 'imu' and nothing else"),
-        ('kind = "imu_dropout"\noutput = "nan"', "output.*'last' or 'zero'"),
+        ('kind = "imu_dropout"\noutput = "nan"', "output.*'last', 'zero' or 'missing'"),
         (
             'kind = "outage"\ninstruments = "imu"',
             "on the IMU there is 'imu_disturbance', 'imu_bias_step', 'imu_clipping'",

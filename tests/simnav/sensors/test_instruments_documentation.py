@@ -33,9 +33,10 @@ def test_the_files_on_the_page_of_states_are_those_that_are_tested(plugins, name
     assert block[1] == (plugins / name).read_text()
 
 
-def test_the_file_on_the_page_of_models_is_that_which_is_tested(plugins):
+@pytest.mark.parametrize("name", ["steady_turn.py", "drifting_buoy.py"])
+def test_the_files_on_the_page_of_models_are_those_that_are_tested(plugins, name):
     text = (GUIDES / "a-model-of-your-own.md").read_text(encoding="utf-8")
-    assert f"```python\n{(plugins / 'steady_turn.py').read_text()}```" in text
+    assert f"```python\n{(plugins / name).read_text()}```" in text
 
 
 def test_the_page_of_states_has_every_field_and_process():

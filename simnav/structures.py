@@ -1,0 +1,64 @@
+"""Structures: numbers with names in one array of float64, as the settings and the memory of a rule are kept.
+
+A function that is handed over to a loop has one type, whichever it is. So what such functions keep has one type, too: a
+plain array. A structure gives names to its numbers. It is a data type of NumPy, and a kernel reads and writes an array
+through it::
+
+    MEMORY = structure(count=int, level=float, limits=4)
+
+    own = memory.view(MEMORY)[0]
+    own.count += 1
+    own.level = own.limits[2]
+
+The same lines do the same in Python and in compiled code.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from simnav.types import Array
+
+__all__ = ["filled", "length", "structure"]
+
+
+def structure(**fields: type | int) -> np.dtype[Any]:
+    """The data type of a structure.
+
+    Parameters
+    ----------
+    **fields : type or int
+        By name: ``float``, ``int``, or the length of an array of float64.
+
+    Examples
+    --------
+    >>> structure(count=int, limits=4).names
+    ('count', 'limits')
+    """
+    named: list[Any] = [
+        (name, np.float64, (kind,)) if isinstance(kind, int) else (name, np.dtype(kind))
+        for name, kind in fields.items()
+    ]
+    return np.dtype((np.record, named))
+
+
+def length(kind: np.dtype[Any]) -> int:
+    """Number of elements of an array that holds a structure."""
+    return kind.itemsize // 8
+
+
+def filled(kind: np.dtype[Any], **values: Any) -> Array:
+    """An array that holds a structure with these values; what is not named is zero.
+
+    Examples
+    --------
+    >>> array = filled(structure(count=int, limits=2), limits=[1.0, 3.0])
+    >>> array.view(structure(count=int, limits=2))[0].limits.tolist()
+    [1.0, 3.0]
+    """
+    array = np.zeros(1, kind)
+    for name, value in values.items():
+        array[name] = value
+    return np.asarray(array.view(np.float64))
