@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import inspect
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 from mkdocs.config.defaults import MkDocsConfig
@@ -165,6 +165,7 @@ def instruments() -> str:
     """All kinds of instruments and faults with what they measure and do."""
     from simnav.kinds import KINDS
     from simnav.sensors import fault_specs
+    from simnav.sensors.imu_models import ASSUMED
 
     lines = []
     for name, kind in sorted(KINDS.items()):
@@ -177,6 +178,16 @@ def instruments() -> str:
         "## Kinds of instruments",
         "Beside these there is the IMU (`imu`).",
         "\n".join((*_head("kind", "quantity", "components", "role"), *lines)),
+        "## IMUs by name",
+        "With `model` or `grade` in `[instruments.imu]` the figures are those of a datasheet; `simnav list imus` "
+        "says where each was read. A figure in *italics* is assumed: the datasheet does not state it, and the "
+        "datasheet that estimators receive names it in `assumed`. The model in **bold** is meant by its grade.",
+        _imus(),
+        "What is assumed of a grade, and why:",
+        "\n".join(f"- {grade}: {_escaped(assumed.source)}." for grade, assumed in ASSUMED.items()),
+        "The models drift without aids in the order of their grades, and within published classes: "
+        "`python -m tests.audit grades` measures it. An hour without aids tells nothing of MEMS and industrial grade, "
+        "because the attitude is lost before.",
         "## Kinds of faults",
         "\n".join(
             (
@@ -186,6 +197,24 @@ def instruments() -> str:
         ),
     ]
     return "\n\n".join(parts) + "\n"
+
+
+def _imus() -> str:
+    """A table of the IMUs by name."""
+    from simnav.sensors.imu_models import GRADES, IMU_MODELS
+
+    def figures(stated: Mapping[str, float], assumed: Mapping[str, float]) -> str:
+        cells = [f"`{key}` {value:.6g}" for key, value in stated.items()]
+        return ", ".join([*cells, *(f"*`{key}` {value:.6g}*" for key, value in assumed.items())])
+
+    rows = [
+        (
+            f"**{m.name}**" if GRADES[m.grade] == m.name else m.name, m.grade,
+            figures(m.gyroscope, m.assumed["gyroscope"]), figures(m.accelerometer, m.assumed["accelerometer"]),
+        )
+        for m in IMU_MODELS.values()
+    ]  # fmt: skip
+    return "\n".join((*_head("model", "grade", "gyroscope", "accelerometer"), *map(_line, rows)))
 
 
 def _kind(spec: Any) -> str:

@@ -427,6 +427,7 @@ def _kind_of(truth: NavigationStates) -> type[NavigationStates]:
 
 #: Fields of a datasheet that most have not.
 _OPTIONAL = ("details", "blocks", "channels", "processes", "timing", "sources", "stated")
+_TRIADS = ("gyroscope", "accelerometer")
 
 
 def _sheet(sheet: Datasheet | ImuDatasheet) -> dict[str, Any]:
@@ -434,9 +435,17 @@ def _sheet(sheet: Datasheet | ImuDatasheet) -> dict[str, Any]:
     return {k: _plain(v) for k, v in asdict(sheet).items() if k not in _OPTIONAL or v}
 
 
+def _imu_sheet(sheet: ImuDatasheet) -> dict[str, Any]:
+    """The datasheet of an IMU as a dictionary for JSON; a triad names assumed figures only if it has any."""
+    table = _sheet(sheet)
+    for triad in _TRIADS:
+        table[triad] = {k: v for k, v in table[triad].items() if k != "assumed" or v}
+    return table
+
+
 def _sheets(instruments: Instruments) -> dict[str, Any]:
     imu = instruments.imu
-    return {"imu": None if imu is None else _sheet(imu), "aids": [_sheet(a) for a in instruments.values()]}
+    return {"imu": None if imu is None else _imu_sheet(imu), "aids": [_sheet(a) for a in instruments.values()]}
 
 
 def _plain(value: Any) -> Any:
@@ -499,7 +508,7 @@ def _instruments(sheets: Mapping[str, Any], step: float) -> Instruments:
     """The datasheets from their dictionaries: the inverse of `_sheets`."""
     imu = sheets["imu"]
     if imu is not None:
-        triads = {n: TriadDatasheet(**imu[n]) for n in ("gyroscope", "accelerometer")}
+        triads = {n: TriadDatasheet(**{**imu[n], "assumed": tuple(imu[n].get("assumed", ()))}) for n in _TRIADS}
         imu = ImuDatasheet(**{**imu, **triads})
     aids = []
     for aid in sheets["aids"]:

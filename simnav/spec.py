@@ -21,7 +21,7 @@ import math
 import re
 import types
 import typing
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any, Self
 
@@ -288,10 +288,16 @@ class Spec(BaseModel):
     @classmethod
     def replaced(cls, table: Mapping[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:
         """A table of TOML keys, with the given keys in place of those of the same fields, in whatever unit."""
+        said = set(cls.fields_of(given))
+        fields = cls.fields_of(table)
+        return {**{k: v for (k, v), name in zip(table.items(), fields, strict=True) if name not in said}, **given}
+
+    @classmethod
+    def fields_of(cls, keys: Iterable[str]) -> list[str]:
+        """The field of each TOML key, in whatever unit; an unknown key stands for itself."""
         names = {key: name for key, (name, _) in cls.toml_keys().items()}
         names |= {key: name for key, (name, _, _) in cls._keys_in_other_units().items()}
-        said = {names.get(key, key) for key in given}
-        return {**{key: value for key, value in table.items() if names.get(key, key) not in said}, **given}
+        return [names.get(key, key) for key in keys]
 
     def to_toml(self) -> dict[str, Any]:
         """The TOML table from which `from_toml` makes an equal specification: the given fields, and the kind."""

@@ -85,6 +85,8 @@ class TriadDatasheet:
         Step of the output increment [x s]; 0: no quantization.
     range : float
         Largest output [x]; inf: no limit.
+    assumed : tuple of str
+        Names of the figures that no datasheet states: they are assumed of the grade of the instrument.
     """
 
     bias: float = 0.0
@@ -96,6 +98,7 @@ class TriadDatasheet:
     misalignment: float = 0.0
     quantization: float = 0.0
     range: float = np.inf
+    assumed: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

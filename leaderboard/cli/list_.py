@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from simnav.leaderboard.ranking import tables
@@ -89,7 +90,10 @@ class KindItem:
 
 @dataclass(frozen=True)
 class ImuItem:
-    """An IMU by name; ``stands_for_grade`` says whether ``grade`` in a scenario means this one."""
+    """An IMU by name; ``stands_for_grade`` says whether ``grade`` in a scenario means this one.
+
+    ``assumed`` are the figures that its datasheet does not state, by triad, and ``assumed_from`` says their source.
+    """
 
     name: str
     manufacturer: str
@@ -100,6 +104,8 @@ class ImuItem:
     gyroscope: Mapping[str, float]
     accelerometer: Mapping[str, float]
     effects: Mapping[str, float]
+    assumed: Mapping[str, Mapping[str, float]]
+    assumed_from: str
 
 
 def scenarios() -> list[ScenarioItem]:
@@ -139,11 +145,11 @@ def faults() -> list[KindItem]:
 
 def imus() -> list[ImuItem]:
     """Every IMU that a scenario may name, with the figures of its datasheet."""
-    from simnav.sensors.imu_models import GRADES, IMU_MODELS
+    from simnav.sensors.imu_models import ASSUMED, GRADES, IMU_MODELS
 
     return [
         ImuItem(m.name, m.manufacturer, m.grade, GRADES[m.grade] == m.name, m.datasheet, m.read_in, m.gyroscope,
-                m.accelerometer, m.effects)
+                m.accelerometer, m.effects, m.assumed, ASSUMED[m.grade].source if any(m.assumed.values()) else "")
         for m in IMU_MODELS.values()
     ]  # fmt: skip
 
@@ -199,15 +205,18 @@ def _kind_lines(title: str, found: list[KindItem]) -> tables.Lines:
 
 
 def _imu_table(found: list[ImuItem]) -> Table:
-    """A row an IMU, with the figures of its datasheet in their units."""
+    """A row an IMU, with the figures of its datasheet in their units, and those that are assumed."""
 
-    def figures(table: Mapping[str, float]) -> str:
-        return ", ".join(f"{key} = {value:.6g}" for key, value in table.items())
+    def figures(table: Mapping[str, float], assumed: Mapping[str, float] = MappingProxyType({})) -> str:
+        stated = [f"{key} = {value:.6g}" for key, value in table.items()]
+        return ", ".join([*stated, *(f"{key} = {value:.6g} (assumed)" for key, value in assumed.items())])
 
     rows = [
-        [e.name, e.manufacturer, e.grade + (" *" if e.stands_for_grade else ""), figures(e.gyroscope),
-         figures(e.accelerometer), figures(e.effects), e.datasheet]
+        [e.name, e.manufacturer, e.grade + (" *" if e.stands_for_grade else ""),
+         figures(e.gyroscope, e.assumed["gyroscope"]), figures(e.accelerometer, e.assumed["accelerometer"]),
+         figures(e.effects), e.datasheet]
         for e in found
     ]  # fmt: skip
     columns = ["model", "manufacturer", "grade", "gyroscope", "accelerometer", "effects", "datasheet"]
-    return tables.table("IMUs by name", columns, rows, caption="* this one is meant by the name of its grade")
+    caption = "* this one is meant by the name of its grade; (assumed): not in the datasheet, --json has the source"
+    return tables.table("IMUs by name", columns, rows, caption=caption)

@@ -211,9 +211,14 @@ def _listed(draws: Draws) -> str:
 
 def _canonical(table: Mapping[str, Any], words: set[str]) -> dict[str, Any]:
     """What is to be drawn: the tables of a scenario file in which there is a distribution, a reference or a name."""
-    return {
+    found = {
         key: value for key, value in table.items() if key not in words and (key == "draw" or has_draws({key: value}))
     }
+    sea = found.get("sea")
+    if isinstance(sea, Mapping) and isinstance(sea.get("spectrum_end"), float):
+        # A key that came later. As a plain number it counts with the fields of the sea.
+        found["sea"] = {key: value for key, value in sea.items() if key != "spectrum_end"}
+    return found
 
 
 def _restore(plugins: tuple[str, ...], reduced: bytes) -> Any:

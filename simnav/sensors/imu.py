@@ -80,14 +80,24 @@ class TriadSpec(Spec):
     times_datasheet: dict[str, Positive] = Field(
         {}, description="figures that really are so many times what the datasheet says, like `random_walk = 2.5`"
     )
+    assumed: tuple[str, ...] = Field((), description="names of the figures that no datasheet states")
 
     @model_validator(mode="after")
     def _known_figures(self) -> Self:
         valid = figures_of(type(self), self.errors)
-        for name in self.times_datasheet:
-            if name not in valid:
-                raise ValueError(f"times_datasheet.{name}: there is no such figure{closest(name, valid)}")
+        for key, names in (("times_datasheet.", self.times_datasheet), ("assumed: ", self.assumed)):
+            for name in names:
+                if name not in valid:
+                    raise ValueError(f"{key}{name}: there is no such figure{closest(name, valid)}")
         return self
+
+    @model_serializer(mode="wrap")
+    def _with_assumptions(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """The digest of a scenario without assumed figures is what it was before there were any."""
+        table: dict[str, Any] = handler(self)
+        if not self.assumed:
+            del table["assumed"]
+        return table
 
     @model_validator(mode="after")
     def _correlated(self) -> Self:
@@ -107,11 +117,12 @@ class TriadSpec(Spec):
             self.misalignment,
             self.quantization,
             self.range,
+            self.assumed,
         )
 
     def ideal(self) -> Self:
         """The same triad without errors."""
-        changes: dict[str, object] = {"range": inf}
+        changes: dict[str, object] = {"range": inf, "assumed": ()}
         for name in type(self).model_fields:
             if name.removeprefix("fixed_") in _ERRORS:
                 value = getattr(self, name)
@@ -148,8 +159,8 @@ class AccelerometerSpec(TriadSpec):
 class ImuSpec(Spec):
     """An inertial measurement unit.
 
-    With ``model`` or ``grade`` its figures are those of a manufacturer (`simnav.sensors.imu_models`). Figures that are
-    given beside it replace them one by one.
+    With ``model`` or ``grade`` its figures are those of a manufacturer (`simnav.sensors.imu_models`). Where the
+    datasheet is silent, figures of the grade are assumed. Figures that are given beside it replace them one by one.
 
     Attributes
     ----------
@@ -190,7 +201,11 @@ class ImuSpec(Spec):
             for name, spec in parts:
                 given = table.get(name, {})
                 if name in figures and isinstance(given, Mapping):
-                    table = {**table, name: spec.replaced(figures[name], given)}
+                    said = spec.fields_of(given)
+                    whole = spec.replaced(figures[name], given)
+                    if "assumed" in whole and "assumed" not in given:
+                        whole["assumed"] = [figure for figure in whole["assumed"] if figure not in said]
+                    table = {**table, name: whole}
         return super().from_toml(table, source=source, path=path)
 
     @model_validator(mode="before")

@@ -10,9 +10,15 @@ The figures are entered in the units of the datasheets. Three rules lead from a 
   maximum is the level that the datasheet states.
 - No datasheet states a correlation time. It is set to 300 s for MEMS and to 3600 s for optical gyroscopes.
 
-What a datasheet does not state is zero (noise, biases) or without limit (ranges). `ImuModel.read_in` says where the
-figures were read, because not every datasheet is public. The revision of the datasheet is given where the reading says
-it. A unit whose figures only one project quotes, without a revision, is not listed.
+The turn-on bias is what differs from one start to the next. A limit that also covers the life of a unit and all
+temperatures is not a turn-on bias: a user calibrates most of it once. Such limits are named in `ImuModel.read_in`, and
+are not used.
+
+Every model has a turn-on bias and a run-to-run error of the scale factor. Where the datasheet is silent, those of its
+grade are assumed (`ASSUMED`, with sources), and `ImuModel.assumed` names them. Anything else that a datasheet does not
+state is zero (noise) or without limit (ranges). `ImuModel.read_in` says where the figures were read, because not every
+datasheet is public. The revision of the datasheet is given where the reading says it. A unit whose figures only one
+project quotes, without a revision, is not listed.
 """
 
 from __future__ import annotations
@@ -23,7 +29,7 @@ from typing import Any, Literal, get_args
 
 from simnav.spec import SpecError, closest
 
-__all__ = ["GRADES", "IMU_MODELS", "MARKOV_PEAK", "Grade", "ImuModel", "imu_model"]
+__all__ = ["ASSUMED", "GRADES", "IMU_MODELS", "MARKOV_PEAK", "Assumption", "Grade", "ImuModel", "imu_model"]
 
 #: Largest Allan deviation of a first-order Gauss-Markov process over its standard deviation, at 1.89 correlation times:
 #: IEEE Std 952-1997, annex C, eq. C.12 (0.437 q sqrt(T) with q = sigma sqrt(2 / T)).
@@ -31,20 +37,84 @@ MARKOV_PEAK = 0.6173
 #: Lowest Allan deviation of flicker noise over its coefficient: sqrt(2 ln 2 / pi).
 _FLICKER = 0.664
 _MEMS, _OPTICAL = 300.0, 3600.0
+#: Figures that may be assumed; one that begins like another one comes first.
+_FIELDS = ("bias_instability", "bias", "random_walk", "scale")
 
 Grade = Literal["mems", "industrial", "tactical", "intermediate", "navigation"]
 
 
 @dataclass(frozen=True)
+class Assumption:
+    """Figures that are assumed of the IMUs of a grade, where a datasheet is silent.
+
+    Attributes
+    ----------
+    gyroscope, accelerometer : mapping
+        Figures by their keys, as in `ImuModel`.
+    source : str
+        Where they come from.
+    """
+
+    gyroscope: Mapping[str, float]
+    accelerometer: Mapping[str, float]
+    source: str
+
+
+#: What is assumed of each grade. HG9900, the only model of navigation grade, states all of it.
+ASSUMED: Mapping[Grade, Assumption] = {
+    "mems": Assumption(
+        gyroscope={"bias_deg_h": 600.0, "scale_ppm": 3000.0},
+        accelerometer={"bias_mg": 10.0, "scale_ppm": 3000.0},
+        source="Gyroscopes: turn-on to turn-on within 0.5 deg/s (Xsens, 'Bias repeatability of gyroscopes'), taken as "
+        "three sigma; 0.1 deg/s in N. El-Sheimy and A. Youssef, Satellite Navigation 1:2, 2020, table 1. "
+        "Accelerometers: geometric middle of more than 3 mg (Groves 2013, table 4.1, consumer grade) and the 30 mg of "
+        "the Crista IMU (S. Godha, UCGE Report 20239, 2006). Scale: geometric middle of the 1000 ppm of calibrated "
+        "sensors (Groves 2013, section 4.4.2) and the 10 000 ppm of the Crista IMU",
+    ),
+    "industrial": Assumption(
+        gyroscope={"bias_deg_h": 60.0, "scale_ppm": 1000.0},
+        accelerometer={"bias_mg": 3.0, "scale_ppm": 1000.0},
+        source="Bias of gyroscopes: ten times the in-run bias of 6 deg/h, because the bias that changes in a run is a "
+        "tenth of the constant one (Groves 2013, section 4.4.1). Bias of accelerometers: middle of 1 to 10 mg (Groves "
+        "2013, table 4.1). Scale: upper end of 100 to 1000 ppm (Groves 2013, section 4.4.2)",
+    ),
+    "tactical": Assumption(
+        gyroscope={"bias_deg_h": 1.0, "scale_ppm": 300.0},
+        accelerometer={"bias_mg": 1.0, "scale_ppm": 300.0},
+        source="Bias: lower end of 1 to 10 deg/h and 1 to 5 mg (N. El-Sheimy and A. Youssef, Satellite Navigation 1:2, "
+        "2020, table 1), and of 1 to 100 deg/h and 1 to 10 mg (Groves 2013, table 4.1). Scale: middle of 100 to 1000 "
+        "ppm (Groves 2013, section 4.4.2)",
+    ),
+    "intermediate": Assumption(
+        gyroscope={
+            "bias_deg_h": 0.1,
+            "random_walk_deg_sqrt_h": 0.01,
+            "bias_instability_deg_h": 0.01,
+            "scale_ppm": 100.0,
+        },
+        accelerometer={
+            "bias_mg": 0.32,
+            "random_walk_ug_sqrt_hz": 50.0,
+            "bias_instability_ug": 32.0,
+            "scale_ppm": 100.0,
+        },
+        source="Bias: 0.1 deg/h and the middle of 0.1 to 1 mg (Groves 2013, table 4.1); in a run a tenth of it "
+        "(section 4.4.1). Scale: lower end of 100 to 1000 ppm (section 4.4.2). Random walks: between those of "
+        "aviation and of tactical grade (section 4.4.3)",
+    ),
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
 class ImuModel:
-    """An IMU of a manufacturer.
+    """An IMU of a manufacturer, or a class of IMUs.
 
     Attributes
     ----------
     name, manufacturer : str
         As on the datasheet.
     grade : str
-        Class of its gyroscopes, one of `GRADES`.
+        The worse of the classes of its gyroscopes and of its accelerometers, one of `GRADES`.
     datasheet : str
         The document of the manufacturer: title, number, revision or date.
     read_in : str
@@ -68,20 +138,41 @@ class ImuModel:
     effects: Mapping[str, float] = field(default_factory=dict)
     correlation_time: float = _MEMS
 
+    @property
+    def assumed(self) -> Mapping[str, Mapping[str, float]]:
+        """The figures that are assumed of its grade, by triad and key: those that its datasheet does not state."""
+        of_grade = ASSUMED.get(self.grade)
+        if of_grade is None:
+            return {"gyroscope": {}, "accelerometer": {}}
+        return {
+            triad: {key: value for key, value in figures.items() if _field(key) not in map(_field, stated)}
+            for triad, figures, stated in (
+                ("gyroscope", of_grade.gyroscope, self.gyroscope),
+                ("accelerometer", of_grade.accelerometer, self.accelerometer),
+            )
+        }
+
     def to_toml(self) -> dict[str, Any]:
         """The tables ``gyroscope``, ``accelerometer`` and ``effects`` of ``[instruments.imu]``."""
         tables: dict[str, Any] = {}
         for name, figures in (("gyroscope", self.gyroscope), ("accelerometer", self.accelerometer)):
-            table: dict[str, float] = {}
-            for key, value in figures.items():
-                in_run = key.startswith("bias_instability")
+            table: dict[str, Any] = {}
+            for key, value in {**figures, **self.assumed[name]}.items():
+                in_run = _field(key) == "bias_instability"
                 table[key] = value / MARKOV_PEAK if in_run else value
                 if in_run:
                     table["correlation_time_s"] = self.correlation_time
             tables[name] = table
+            if self.assumed[name]:
+                table["assumed"] = [_field(key) for key in self.assumed[name]]
         if self.effects:
             tables["effects"] = dict(self.effects)
         return tables
+
+
+def _field(key: str) -> str:
+    """The figure that a key gives, without its unit."""
+    return next((name for name in _FIELDS if key.startswith(f"{name}_")), key)
 
 
 _MODELS = (
@@ -112,27 +203,22 @@ _MODELS = (
     ImuModel(
         "ADIS16488", "Analog Devices", "industrial",
         datasheet="ADIS16488 Data Sheet",
-        read_in="the example of NaveGo and a project after it, which quote the data sheet",
-        gyroscope={
-            "bias_deg_s": 0.2,
-            "random_walk_deg_sqrt_h": 0.3,
-            "bias_instability_deg_h": 6.25,
-        },
-        accelerometer={"bias_mg": 16.0, "random_walk_m_s_sqrt_h": 0.029, "bias_instability_mg": 0.1},
+        read_in="the example of NaveGo and a project after it, which quote the data sheet; its bias repeatability, 0.2 "
+        "deg/s and 16 mg, covers the life of a unit and all temperatures",
+        gyroscope={"random_walk_deg_sqrt_h": 0.3, "bias_instability_deg_h": 6.25},
+        accelerometer={"random_walk_m_s_sqrt_h": 0.029, "bias_instability_mg": 0.1},
     ),
     ImuModel(
         "SCH16T-K01", "Murata", "industrial",
         datasheet="SCH16T-K01 Data Sheet, Doc. No. 11624, Rev. 2, January 2024, tables 4 and 6",
-        read_in="the text of the data sheet",
+        read_in="the text of the data sheet; its offsets, 0.6 deg/s and 0.14 m/s^2, are limits over all temperatures",
         gyroscope={
-            "bias_deg_s": 0.6 / 3.0,
             "random_walk_deg_sqrt_h": 0.015,
             "bias_instability_deg_h": 0.5 * _FLICKER,
             "scale_percent": 0.3 / 3.0,
             "range_deg_s": 300.0,
         },
         accelerometer={
-            "bias_m_s2": 0.14 / 3.0,
             "random_walk_mm_s_sqrt_h": 30.0,
             "bias_instability_mm_s2": 0.20 * _FLICKER,
             "scale_percent": 0.15 / 3.0,
@@ -145,9 +231,10 @@ _MODELS = (
         datasheet="STIM300 Inertia Measurement Unit, document TS1524, rev. 9, accelerometers of 10 g",
         read_in="documentation of NavToolkit (stim300_model), which quotes rev. 9; angular random walk and bias "
         "instability also in quotations of rev. 31; bias instability is the lowest point of the Allan curve by the "
-        "manufacturer's FAQ",
+        "manufacturer's FAQ. Turn-on bias of gyroscopes: the error over static temperatures, 5 deg/h; the bias range, "
+        "250 deg/h, is a limit over the life of a unit. Of accelerometers: bias on/off, 0.75 mg",
         gyroscope={
-            "bias_deg_h": 250.0 / 3.0,
+            "bias_deg_h": 5.0,
             "random_walk_deg_sqrt_h": 0.15,
             "bias_instability_deg_h": 0.5,
             "scale_ppm": 500.0,
@@ -181,11 +268,20 @@ _MODELS = (
         correlation_time=_OPTICAL,
     ),
     ImuModel(
-        "PRIMUS 200", "Safran (Sagem)", "intermediate",
+        "PRIMUS 200", "Safran (Sagem)", "tactical",
         datasheet="PRIMUS 200 specification sheet",
-        read_in="documentation of NavToolkit (sagem_primus200_model), which quotes the sheet",
+        read_in="documentation of NavToolkit (sagem_primus200_model), which quotes the sheet. Its gyroscopes are of "
+        "intermediate grade, its accelerometers of tactical grade",
         gyroscope={"bias_deg_h": 0.05, "random_walk_deg_sqrt_h": 0.004, "scale_ppm": 10.0},
         accelerometer={"bias_mg": 2.0, "random_walk_ug_sqrt_hz": 60.0, "scale_ppm": 500.0},
+        correlation_time=_OPTICAL,
+    ),
+    ImuModel(
+        "Intermediate class", "no unit", "intermediate",
+        datasheet="none: no datasheet of this grade was found that states both triads",
+        read_in="all figures are assumed",
+        gyroscope={},
+        accelerometer={},
         correlation_time=_OPTICAL,
     ),
     ImuModel(
@@ -198,7 +294,7 @@ _MODELS = (
     ),
 )  # fmt: skip
 
-#: The IMUs by name, from the least accurate gyroscopes to the best.
+#: The IMUs by name and grade, from the least accurate grade to the best.
 IMU_MODELS: Mapping[str, ImuModel] = {model.name: model for model in _MODELS}
 
 #: Name of a grade -> the IMU that stands for it.
@@ -206,7 +302,7 @@ GRADES: Mapping[Grade, str] = {
     "mems": "MTi-1",
     "industrial": "ADIS16488",
     "tactical": "STIM300",
-    "intermediate": "PRIMUS 200",
+    "intermediate": "Intermediate class",
     "navigation": "HG9900",
 }
 assert set(GRADES) == set(get_args(Grade))

@@ -80,11 +80,11 @@ STATE = HULL_STATE + SAIL
 DIVE = np.array([DEPTH_REFERENCE, GAMMA_LIMIT])
 # ... in the integer state: sample, segment, waypoint, whether the segment has begun
 # ... and in the parameters.
-DT, TAU_U, TAU_R, TAU_G, TURN_RATE, HEEL, DIVES, CURRENT_N, CURRENT_E, SHEAR, ATTENUATION = range(11)
+DT, TAU_U, TAU_R, TAU_G, TURN_RATE, HEEL, DIVES, CURRENT_N, CURRENT_E, SHEAR, ATTENUATION, LONGEST = range(12)
 #: Natural angular frequency and damping ratio of these oscillators; zero: there are none.
-OSCILLATORS = 11
+OSCILLATORS = 12
 #: Whether there is a hull with three degrees of freedom, and its numbers.
-HAS_HULL, HULL_NUMBERS = 19, 20
+HAS_HULL, HULL_NUMBERS = 20, 21
 PARAMETERS = HULL_NUMBERS + HULL
 #: Columns of a tap: position 0:3, velocity 3:6, roll, pitch, yaw 6:9, angular rate 9:12, current north, east 12:14.
 TAP_COLUMNS = 14
@@ -310,7 +310,7 @@ def initialise(x: Vector, p: Vector, phase: Matrix, table: Matrix, eddies: Matri
     x[COS_PSI], x[SIN_PSI], x[COS_GAMMA], x[SIN_GAMMA] = cos(x[PSI]), sin(x[PSI]), cos(x[GAMMA]), sin(x[GAMMA])
     course = _course(x)
     north, east = _through_water(p, course)
-    w = wave_responses(phase, table, north, east, 0.0)
+    w = wave_responses(phase, table, north, east, 0.0, 0.0)
     if p[OSCILLATORS] > 0.0:
         own = p[OSCILLATORS:HAS_HULL]
         w = answers(
@@ -396,7 +396,7 @@ def _drift(
         course = course_at(block, k)
         # The encounter frequency is that of the speed through the water.
         north, east = _through_water(p, course)
-        waves = wave_responses(phase, table, north, east, dt)
+        waves = wave_responses(phase, table, north, east, dt, p[LONGEST])
         if p[OSCILLATORS] > 0.0:
             waves = answers(swell, own, waves, course.cos_heading, course.sin_heading, phase, table, dt, by)
         _water(x, p, eddies, (time + k + 1) * dt)
@@ -510,7 +510,7 @@ def advance(
     state : (w, 79) and (w, 4) int arrays
         The state vector, and the integer state: sample, segment, waypoint, and 1 if the segment has begun. Both are
         updated.
-    p : (w, 161) array
+    p : (w, 162) array
         Constants of the vessel, the water and the step, at the indices that this module names.
     sizes : (w, 4) int array
         Number of manoeuvres, points, waves and eddies of each world.

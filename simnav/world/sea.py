@@ -31,6 +31,12 @@ from simnav.types import Array
 __all__ = ["Sea", "Waves", "components", "spectrum", "steady", "wave_number"]
 
 _G = 9.81
+#: Share of the energy that lies below the highest frequency of the components.
+_SHARE = 0.999
+#: Where the spectrum of the first scenarios ends, over the frequency of its peak. Their recordings stay as they are.
+_FIRST_END = 4.0
+#: Advance of a phase in one step up to which the series of `simnav.world.seaway` are exact to rounding [rad].
+_LONGEST = 0.4
 #: Rows of the component table: phase rate, wave number north and east, cosine and sine gains of seven responses, and
 #: two cosine gains that yaw follows from.
 ROWS = 19
@@ -54,6 +60,9 @@ class Sea(Spec):
         Standard deviation of the components' directions [rad].
     components : int
         Number of components, each of the same energy.
+    spectrum_end : float or None
+        Highest frequency of the components over that of the peak [-]. None: 99.9 % of the energy is below it (5.3 for
+        JONSWAP with peakedness 3.3, 5.9 for Pierson-Moskowitz).
     heave_period, roll_period, pitch_period : float
         Natural periods of the responses [s].
     heave_damping, roll_damping, pitch_damping : float
@@ -75,6 +84,7 @@ class Sea(Spec):
     direction: Annotated[float, Field(ge=-6.2832, le=6.2832)] = quantity("deg", 0.0)
     spreading: NonNegative = quantity("deg", 0.4363323129985824)
     components: Annotated[int, Field(ge=4, le=256)] = 24
+    spectrum_end: Annotated[float, Field(ge=2.0, le=20.0)] | None = None
     heave_period: Positive = quantity("s", 6.0)
     roll_period: Positive = quantity("s", 9.0)
     pitch_period: Positive = quantity("s", 6.0)
@@ -91,8 +101,10 @@ class Sea(Spec):
 
     @model_serializer(mode="wrap")
     def _as_it_was(self, serialize: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """The digest of a scenario with the response ``absolute`` is what it was before there was another one."""
+        """The digest of a scenario of the first kind is what it was before there was another one."""
         table: dict[str, Any] = serialize(self)
+        if self.spectrum_end == _FIRST_END:
+            table.pop("spectrum_end", None)
         if self.response == "absolute":
             for name in ("response", "yaw_period", "yaw_damping", "yaw_gain"):
                 table.pop(name, None)
@@ -105,6 +117,11 @@ class Sea(Spec):
                 key = "yaw_period_s" if name == "yaw_period" else name
                 raise ValueError(f'{key} is of no use without response = "encounter"')
         return self
+
+    @property
+    def longest_step(self) -> float:
+        """Largest advance of a phase in one step of the motion [rad]; 0: any, as in the first scenarios."""
+        return 0.0 if self.spectrum_end == _FIRST_END else _LONGEST
 
     @property
     def oscillators(self) -> tuple[tuple[float, float], ...]:
@@ -143,6 +160,21 @@ def spectrum(sea: Sea, omega: Array) -> Array:
     area = float(np.sum(0.5 * (values[1:] + values[:-1]) * np.diff(grid)))
     density: Array = shape(np.asarray(omega, dtype=np.float64)) * (sea.significant_height**2 / 16.0 / area)
     return density
+
+
+def _highest(sea: Sea) -> float:
+    """Highest frequency of the components over that of the peak."""
+    if sea.spectrum_end is not None:
+        return sea.spectrum_end
+    ratio = np.geomspace(0.4, 40.0, 8000)
+    below = _cumulative(sea, 2.0 * np.pi / sea.peak_period * ratio)
+    return float(np.interp(_SHARE * below[-1], below, ratio))
+
+
+def _cumulative(sea: Sea, grid: Array) -> Array:
+    """Variance of the elevation between the first frequency of a grid [rad/s] and each of them [m^2]."""
+    density = spectrum(sea, grid)
+    return np.concatenate([[0.0], np.cumsum(np.diff(grid) * 0.5 * (density[1:] + density[:-1]))])
 
 
 def wave_number(omega: Array, depth: float | None = None) -> Array:
@@ -202,9 +234,8 @@ def components(sea: Sea | None, seed: int, depth: float | None = None) -> tuple[
     peak = 2.0 * np.pi / sea.peak_period
     # Components of equal energy, with a random frequency within each quantile: the variance is exact in every run, and
     # the waves repeat neither from run to run nor from hour to hour.
-    grid = peak * np.geomspace(0.4, 4.0, 4000)
-    density = spectrum(sea, grid)
-    cumulative = np.concatenate([[0.0], np.cumsum(np.diff(grid) * 0.5 * (density[1:] + density[:-1]))])
+    grid = peak * np.geomspace(0.4, _highest(sea), 4000)
+    cumulative = _cumulative(sea, grid)
     quantile = (np.arange(n) + rng.random(n)) / n
     omega = np.interp(quantile * cumulative[-1], cumulative, grid)
     amplitude = np.sqrt(2.0 * sea.significant_height**2 / 16.0 / n)

@@ -5,6 +5,7 @@ See `simnav.world.sea` for the model and for the arrays of components. `simnav.w
 
 from __future__ import annotations
 
+from math import sqrt
 from typing import NamedTuple
 
 from simnav.compiled import Array, helper
@@ -47,25 +48,40 @@ _UNCHANGED = Oscillation(1.0, 0.0, 0.0, 1.0)
 _STILL = Transitions(_UNCHANGED, _UNCHANGED, _UNCHANGED, _UNCHANGED)
 
 
+@helper(borrows=True)
+def _parts(table: Array, north: float, east: float, dt: float, longest: float) -> int:
+    """Number of parts of a step in which no phase advances by more than ``longest``. The last component is fastest."""
+    last = table.shape[1] - 1
+    if longest == 0.0 or last < 0:
+        return 1
+    number = sqrt(table[1, last] * table[1, last] + table[2, last] * table[2, last])
+    fastest = table[0, last] + number * sqrt(north * north + east * east)
+    return 1 + int(fastest * dt / longest)
+
+
 @helper(borrows=True, fastmath={"reassoc", "contract", "nsz", "arcp"})
-def wave_responses(phase: Array, table: Array, north: float, east: float, dt: float) -> Responses:
+def wave_responses(phase: Array, table: Array, north: float, east: float, dt: float, longest: float) -> Responses:
     """Advance the phases of the wave components by one step, and sum the seven responses.
 
     ``north`` and ``east`` are the velocity of the vessel through the water [m/s], ``dt`` is the length of the step [s].
+    A phase advances by at most ``longest`` at a time [rad]; 0: by the whole step.
     """
-    # Two loops: the second only reads the rows that the first writes. So the compiler can vectorise both without a
-    # check at run time whether the rows overlap.
-    for i in range(phase.shape[1]):
-        rate = table[0, i] - table[1, i] * north - table[2, i] * east
-        d = rate * dt
-        d2 = d * d
-        # Encounter phases advance by less than 0.2 rad a sample; the series are exact to rounding there.
-        sd = d * (1.0 - d2 / 6.0 * (1.0 - d2 / 20.0 * (1.0 - d2 / 42.0 * (1.0 - d2 / 72.0))))
-        cd = 1.0 - d2 / 2.0 * (1.0 - d2 / 12.0 * (1.0 - d2 / 30.0 * (1.0 - d2 / 56.0 * (1.0 - d2 / 90.0))))
-        c, s = phase[0, i], phase[1, i]
-        phase[0, i] = c * cd - s * sd
-        phase[1, i] = s * cd + c * sd
-        phase[2, i] = rate
+    parts = _parts(table, north, east, dt, longest)
+    part = dt / parts
+    # Two loops over the components: the second only reads the rows that the first writes. So the compiler can vectorise
+    # both without a check at run time whether the rows overlap.
+    for _ in range(parts):
+        for i in range(phase.shape[1]):
+            rate = table[0, i] - table[1, i] * north - table[2, i] * east
+            d = rate * part
+            d2 = d * d
+            # The series are exact to rounding up to 0.4 rad.
+            sd = d * (1.0 - d2 / 6.0 * (1.0 - d2 / 20.0 * (1.0 - d2 / 42.0 * (1.0 - d2 / 72.0))))
+            cd = 1.0 - d2 / 2.0 * (1.0 - d2 / 12.0 * (1.0 - d2 / 30.0 * (1.0 - d2 / 56.0 * (1.0 - d2 / 90.0))))
+            c, s = phase[0, i], phase[1, i]
+            phase[0, i] = c * cd - s * sd
+            phase[1, i] = s * cd + c * sd
+            phase[2, i] = rate
     s0 = s1 = s2 = s3 = s4 = s5 = s6 = 0.0
     for i in range(phase.shape[1]):
         c, s, rate = phase[0, i], phase[1, i], phase[2, i]

@@ -88,6 +88,8 @@ class World:
             p[motion.CURRENT_N] = current.speed * np.cos(current.direction)
             p[motion.CURRENT_E] = current.speed * np.sin(current.direction)
             p[motion.SHEAR] = current.shear / current.speed  # the variable part decreases with depth like the mean
+        if sea is not None:
+            p[motion.LONGEST] = sea.longest_step
         if sea is not None and vessel.dives:
             # Waves decrease as exp(-k z); the wave number at the peak is used for all, to keep the motion smooth.
             known = depth if sea.response == "encounter" else None

@@ -46,7 +46,11 @@ def make(imu: bool = True) -> Recording:
     }  # fmt: skip
     samples = ImuSamples(np.arange(8) / 2.0, np.full(8, 0.5), *rng.normal(size=(2, 8, 3))) if imu else None
     labels = ImuLabels(np.arange(8, dtype=np.uint32), rng.normal(size=(8, 6))) if imu else None
-    sheet = ImuDatasheet(2.0, TriadDatasheet(random_walk=1e-5), TriadDatasheet(bias=0.1, range=50.0)) if imu else None
+    sheet = (
+        ImuDatasheet(2.0, TriadDatasheet(random_walk=1e-5), TriadDatasheet(bias=0.1, range=50.0, assumed=("bias",)))
+        if imu
+        else None
+    )
     return Recording(
         "made-up-v3", 7, Instruments(sheets, sheet, 0.5), states(1),
         InitialState(0.0, *rng.normal(size=(3, 3)), np.eye(9)),

@@ -1,4 +1,4 @@
-"""IMUs by name and by grade, figures in the units of datasheets."""
+"""IMUs by name and by grade, figures in the units of datasheets; their drift without aids."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from simnav.scenario import parse
 from simnav.sensors.imu import ImuSpec
 from simnav.sensors.imu_models import GRADES, IMU_MODELS, MARKOV_PEAK
 from simnav.spec import UNITS, SpecError
+from tests.audit.grades import CLASSES, LOST, TIMES, misplaced, predicted, simulated
 
 SCENARIO = """
 name = "named"
@@ -34,7 +35,11 @@ def test_every_model_is_complete(name):
     assert model.read_in
     assert model.grade in GRADES
     assert spec.gyroscope.random_walk > 0.0
-    assert spec.gyroscope.bias > 0.0 or spec.gyroscope.bias_instability > 0.0
+    for triad, stated in ((spec.gyroscope, model.gyroscope), (spec.accelerometer, model.accelerometer)):
+        for figure, unlike in (("bias", "bias_instability"), ("scale", "scale_none")):
+            assert getattr(triad, figure) > 0.0
+            is_stated = any(key.startswith(figure) and not key.startswith(unlike) for key in stated)
+            assert (figure in triad.datasheet().assumed) is not is_stated
     assert spec == imu(**{key: value for key, value in spec.to_toml().items() if key not in ("kind", "rate_hz")})
     assert spec.model_dump() == ImuSpec(rate=100, model=name).model_dump()
 
@@ -63,6 +68,16 @@ def test_a_figure_beside_the_name_replaces_one_in_whatever_unit():
     assert spec.accelerometer.bias_instability == imu(model="STIM300").accelerometer.bias_instability
     assert spec.effects.delay == 0.01
     assert spec.effects.gyroscope_g_sensitivity > 0.0
+
+
+def test_a_figure_beside_the_name_is_not_assumed():
+    spec = imu(model="MTi-1", gyroscope={"bias_deg_s": 0.1}, accelerometer={"scale_ppm": 500.0})
+    assert spec.datasheet().gyroscope.assumed == ("scale",)
+    assert spec.datasheet().accelerometer.assumed == ("bias",)
+    again = imu(**{key: value for key, value in spec.to_toml().items() if key not in ("kind", "rate_hz")})
+    assert again.datasheet().gyroscope.assumed == ("scale",)
+    assert spec.ideal().datasheet().gyroscope.assumed == ()
+    assert "assumed" not in imu(gyroscope={"bias_deg_h": 1.0}).gyroscope.model_dump()
 
 
 def test_units_of_datasheets_say_the_same():
@@ -97,9 +112,41 @@ def test_the_name_decides_nothing_beside_the_figures():
         ({"model": "HG1700", "grade": "tactical"}, "give a model or a grade, not both"),
         ({"model": 300}, "model = 300 should be a name in quotes"),
         ({"gyroscope": {"bias_deg_h": 1.0, "bias_deg_s": 1.0}}, "gyroscope.bias_deg_s' says the same as another key"),
+        (
+            {"gyroscope": {"assumed": ["bais"]}},
+            "gyroscope: assumed: bais: there is no such figure; did you mean 'bias'",
+        ),
         ({"effects": {"delay": 1.0}}, "unknown key 'instruments.imu.effects.delay'.*'delay_s'"),
     ],
 )
 def test_mistakes_are_one_sentence(table, message):
     with pytest.raises(SpecError, match=message):
         imu(**table)
+
+
+def test_the_predicted_drift_is_in_the_order_of_grades_and_within_the_published_class():
+    drifts = {name: [predicted(imu(model=name), time) for time in TIMES] for name in IMU_MODELS}
+    for k in range(len(TIMES)):
+        assert misplaced({name: drift[k] for name, drift in drifts.items()}) == []
+    for name, drift in drifts.items():
+        published = CLASSES[IMU_MODELS[name].grade]
+        assert published.lowest <= drift[TIMES.index(published.time)] <= published.highest, name
+
+
+def test_the_simulated_drift_is_that_and_has_the_same_order():
+    early, late = {}, {}
+    for name, model in IMU_MODELS.items():
+        spec = imu(model=name)
+        lost = model.grade in LOST
+        drift = np.median(simulated(spec, range(8), TIMES[:1] if lost else TIMES), axis=0)
+        early[name] = drift[0]
+        assert drift[0] == pytest.approx(predicted(spec, TIMES[0]), rel=0.6)
+        if not lost:
+            late[name] = drift[1]
+            assert drift[1] == pytest.approx(predicted(spec, TIMES[1]), rel=0.6)
+    assert misplaced(early) == []
+    assert misplaced(late) == []
+
+
+def test_a_misplaced_pair_is_found():
+    assert len(misplaced({"STIM300": 1.0, "HG9900": 2.0, "HG1700": 3.0})) == 1
