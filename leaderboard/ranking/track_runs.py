@@ -12,9 +12,10 @@ from simnav.estimator import EstimatorError
 from simnav.estimator.registry import registered
 from simnav.leaderboard.campaign.request import comes_with_simnav
 
+from .learning import voyages_of
 from .runs import Runs, group
 from .scenario_runs import ScenarioRuns
-from .tracks import Track, catalogued, tracks_of
+from .tracks import BUDGETS, LEARNED_ON, Track, budget_of, catalogued, title, tracks_of
 from .variants import families, surplus
 
 if TYPE_CHECKING:
@@ -68,6 +69,15 @@ def runs_of_tracks(
         If an estimator has two results for one run.
     """
     runs = group(results)
+    found = list(_ordinary(runs, score, tracks))
+    yield from found
+    yield from _learned(found)
+
+
+def _ordinary(
+    runs: Mapping[str, Mapping[str, Runs]], score: str | None, tracks: Mapping[str, str] | None
+) -> Iterator[TrackRuns]:
+    """The runs of the tracks that scenarios name, and of post-processing."""
     headers = catalogued()  # what a scenario is, it says, and not what results say
     known = {**{name: h.track for name, h in headers.items()}, **(tracks or {})}
     for track in tracks_of(runs, known, score):
@@ -77,6 +87,21 @@ def runs_of_tracks(
         tables = [t for t in every if t.cells]
         if tables:
             yield TrackRuns(track, tables, apart)
+
+
+def _learned(found: Sequence[TrackRuns]) -> Iterator[TrackRuns]:
+    """The runs of the rows that learned, by the number of voyages; a track of one row alone is left out."""
+    parts = [runs for runs in found if runs.track.name in LEARNED_ON]
+    tables = [table for runs in parts for table in runs.tables]
+    cells = {name: cell for table in tables for name, cell in table.cells.items()}
+    rows = {name: track for name, cell in cells.items() if (track := budget_of(voyages_of(cell.runs.results)))}
+    references = {name for name, cell in cells.items() if cell.runs.reference}
+    for name in BUDGETS:
+        mine = {row for row, track in rows.items() if track == name}
+        if len(mine) > 1:
+            apart = {row: family for runs in parts for row, family in runs.apart.items()}
+            track = Track(name, title(name), parts[0].track.score, tuple(table.name for table in tables))
+            yield TrackRuns(track, tables, apart).of_rows(mine | references)
 
 
 def _families(track: Track, runs: Mapping[str, Mapping[str, Runs]]) -> list[list[str]]:
