@@ -1,9 +1,9 @@
 """The noise of each reading from a recurrent network, which sees the innovations of the filter.
 
-The network has one memory for each instrument. Its output is the expected information of the present reading, as a part
-w of what the datasheet says: ``R = R_datasheet / w``. If the noise is one of several, the information of the mixture is
-the mean of the informations (as in `simnav.estimators.adaptations.truth.MixtureNoise`), so a network that is trained to
-predict the mean of ``R_datasheet / R_true`` gives this noise.
+The network has one memory for each instrument. Its output is the information of the present reading, as a part w of
+what the datasheet says: ``R = R_datasheet / w``. It is trained to predict the mean of ``ln(R_datasheet / R_true)``. If
+the noise may be one of two, this is their geometric mean, between the mean of the informations, which trusts a reading
+that may be wrong, and the mean of the variances, which a rare large fault decides.
 
 It is in the manner of KalmanNet (G. Revach, N. Shlezinger, X. Ni et al., IEEE Trans. Signal Processing 70, 2022), where
 a recurrent network replaces the gain, and of A-KIT (N. Cohen and I. Klein, *Adaptive Kalman-informed transformer*,
@@ -53,18 +53,23 @@ HEARD, NOTED = range(2)
 HIDDEN = NOTED + NUMBER_OF_INPUTS
 #: Time constant of the mean sizes [s], and the size without a fault, ln(1 + 0.82).
 _MEMORY, _TYPICAL = 10.0, 0.6
+#: Innovations beyond this, in their sigmas, are none of the training.
+LARGEST = 1000.0
 
 
 @kernel
 def set_by_network(settings: Vector, memory: Vector, shared: Vector, prediction: Prediction) -> float:
-    """Note the inputs of a reading, ask the network, and scale the noise; return the weight w."""
+    """Note the inputs of a reading, ask the network, and scale the noise; return w, or 0 if it is not asked."""
     nominal, noise, m = prediction.nominal, prediction.noise, prediction.innovation.size
     time, group, units = shared[TIME], int(settings[GROUP]), int(settings[UNITS])
+    copied(nominal, noise)
     u0, u1, u2 = standardised(prediction.innovation, prediction.predicted, nominal)
-    square = max(normalised_square(prediction.innovation, prediction.predicted, nominal), 0.0)
-    size, before = log1p(sqrt(square / m)), 0.0
+    square, before = normalised_square(prediction.innovation, prediction.predicted, nominal), 0.0
     for i in range(m):
         before += prediction.predicted[i, i] / nominal[i, i]
+    if not (square >= 0.0 and before >= 0.0 and u0 * u0 + u1 * u1 + u2 * u2 < LARGEST * LARGEST):
+        return 0.0  # the filter is lost, and its innovations say nothing of the noise
+    size = log1p(sqrt(square / m))
     inputs = memory[NOTED : NOTED + NUMBER_OF_INPUTS]
     elapsed = time - memory[HEARD]
     inputs[0], inputs[1], inputs[2], inputs[3] = asinh(u0), asinh(u1), asinh(u2), size
@@ -80,7 +85,6 @@ def set_by_network(settings: Vector, memory: Vector, shared: Vector, prediction:
     shared[OWN + 2 * group + 1] = time
     output = advance(settings[WEIGHTS:], inputs, memory[HIDDEN : HIDDEN + units])
     weight = max(1.0 / (1.0 + exp(-output)), settings[LEAST])
-    copied(nominal, noise)
     for i in range(m):
         for j in range(m):
             noise[i, j] /= weight

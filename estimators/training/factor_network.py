@@ -3,7 +3,8 @@
 1. A window runs over training voyages, and the inputs of the network are noted at the last iteration of some epochs.
    The targets are `simnav.estimators.training.information`. On every second voyage all factors have the weight 1, and
    on the others that of the targets.
-2. PyTorch trains two hidden layers by the cross-entropy between target and output. Each voyage has the same weight.
+2. PyTorch trains two hidden layers by the squared error of the logarithm of the output. Each voyage has the same
+   weight.
 
 Run it; it takes less than half an hour on one core::
 
@@ -47,6 +48,8 @@ FAMILIES = ("training-voyages", "training-ships", "training-gnss-faults", "train
 #: One of so many epochs of a window is noted: neighbouring ones hardly differ.
 EVERY = 7
 UNITS, BATCH, RATE = 24, 1024, 3e-3
+#: Smallest weight that is learned.
+LEAST = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,7 +110,7 @@ def gather(recordings: Iterable[Recording]) -> list[Noted]:
 def fit(
     data: Sequence[Noted], checked: Sequence[Noted], epochs: int, seed: int
 ) -> tuple[dict[str, Array], list[float], list[float], float]:
-    """Train; the arrays of the best epoch, the cross-entropies of each epoch, and seconds per epoch. Needs PyTorch."""
+    """Train, with PyTorch; the arrays of the best epoch, the errors of each epoch, and processor time per epoch [s]."""
     import torch
 
     torch.set_num_threads(1)
@@ -126,27 +129,30 @@ def fit(
     x, y, w = joined(data)
     x_checked, y_checked, w_checked = joined(checked)
     w, w_checked = w / w.mean(), w_checked / w_checked.mean()
-    entropy = torch.nn.functional.binary_cross_entropy_with_logits
+
+    def squared(x: Any, y: Any, w: Any) -> Any:
+        return ((torch.nn.functional.logsigmoid(layers(x)[:, 0]) - torch.log(y.clamp(min=LEAST))) ** 2 * w).mean()
+
     steps = -(-len(y) // BATCH)
     optimizer = torch.optim.Adam(layers.parameters(), lr=RATE)
     schedule = torch.optim.lr_scheduler.OneCycleLR(optimizer, RATE, total_steps=epochs * steps)
-    training, validation, best, begin = [], [], (np.inf, dict[str, Array]()), time.perf_counter()
+    training, validation, best, begin = [], [], (np.inf, dict[str, Array]()), time.process_time()
     for _ in range(epochs):
         order, total = torch.from_numpy(rng.permutation(len(y))), 0.0
         for at in range(0, len(y), BATCH):
             rows = order[at : at + BATCH]
-            loss = entropy(layers(x[rows])[:, 0], y[rows], weight=w[rows])
+            loss = squared(x[rows], y[rows], w[rows])
             optimizer.zero_grad()
             loss.backward()
             optimizer.step()
             schedule.step()
             total += loss.item() * len(rows)
         with torch.no_grad():
-            validation.append(entropy(layers(x_checked)[:, 0], y_checked, weight=w_checked).item())
+            validation.append(squared(x_checked, y_checked, w_checked).item())
         training.append(total / len(y))
         if validation[-1] < best[0]:
             best = validation[-1], _arrays(layers)
-    return best[1], training, validation, (time.perf_counter() - begin) / epochs
+    return best[1], training, validation, (time.process_time() - begin) / epochs
 
 
 def _arrays(layers: Any) -> dict[str, Array]:
@@ -191,7 +197,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     network.save(options.output)
     options.output.with_suffix(".json").write_text(json.dumps(curve), encoding="utf-8")
     print(
-        f"{options.output}: {network.parameters} parameters, cross-entropy {min(curve['validation']):.4f} on "
+        f"{options.output}: {network.parameters} parameters, squared error {min(curve['validation']):.4f} on "
         f"validation, {curve['seconds_per_epoch']:.1f} s per epoch, {time.perf_counter() - begin:.0f} s in all"
     )
 

@@ -45,7 +45,7 @@ def streams_of(families: tuple[str, ...], split: Split, count: int) -> list[tupl
         if own:
             first = load(name).root(FIRST_SEEDS[split])
             found.append((first, first + own - 1))
-    return found
+    return sorted(set(found))  # families may have the same streams
 
 
 def versions() -> dict[str, str]:

@@ -1,6 +1,6 @@
 """Weights of the factors of a window from a network, which sees the residuals of all of them.
 
-The network has one hidden layer. It is asked for each measurement, and its output is the expected information of the
+The network has two hidden layers. It is asked for each measurement, and its output is the information of the
 measurement as a part of what the datasheet says, which is the weight. It sees the residual of the measurement, those of
 the same instrument before and after it and in the mean of the window, the mean size of the residuals of each group of
 instruments, and that of the motion. Motion is weighted by its own residuals (`weigh_motion`).
