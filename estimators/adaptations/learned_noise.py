@@ -84,7 +84,7 @@ def set_by_network(settings: Vector, memory: Vector, shared: Vector, prediction:
     shared[OWN + 2 * group] += part * (size - shared[OWN + 2 * group])
     shared[OWN + 2 * group + 1] = time
     output = advance(settings[WEIGHTS:], inputs, memory[HIDDEN : HIDDEN + units])
-    weight = max(1.0 / (1.0 + exp(-output)), settings[LEAST])
+    weight: float = max(1.0 / (1.0 + exp(-output)), settings[LEAST])
     for i in range(m):
         for j in range(m):
             noise[i, j] /= weight

@@ -87,7 +87,7 @@ def advance(weights: Vector, inputs: Vector, memory: Vector) -> float:
         for j in range(m):
             b += weights[inner + i * m + j] * memory[j]
         given[i], kept[i] = a, b
-    y = weights[output + m]
+    y: float = weights[output + m]
     for i in range(m):
         reset = 1.0 / (1.0 + exp(-given[i] - kept[i]))
         keep = 1.0 / (1.0 + exp(-given[m + i] - kept[m + i]))

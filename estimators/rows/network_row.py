@@ -18,8 +18,8 @@ class NetworkRow(Row):
     def network(self) -> Network:
         """The network."""
         solver: Any = self.solver
-        pieces = getattr(solver, "adaptation", None), getattr(solver, "weighting", None)
-        found: Network = next(p.network for p in pieces if hasattr(p, "network"))
+        piece: Any = solver.adaptation or solver.weighting
+        found: Network = piece.network
         return found
 
     @property

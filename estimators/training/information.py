@@ -20,7 +20,8 @@ def information(recording: Recording, stream: AidStream) -> Array:
     It is ``1 / mean_i((s_i^2 + k f_i^2) / d_i^2)`` over the components i, with the sigma s of the true noise, the
     error f that the faults added, and the sigma d of the datasheet. An error that lasts is the same in many readings,
     so that they have the information of one: k is the number of readings for which it lasts, the correlation time of
-    the fault or `LASTING`. It is 1 for gross errors.
+    the fault or `LASTING`. It is 1 for gross errors. A noise step is in s and, by what it added, in f as well, so that
+    it counts about twice.
 
     Parameters
     ----------

@@ -216,7 +216,8 @@ def fit(
         each = (torch.nn.functional.logsigmoid(logits) - torch.log(y)) ** 2 * mask
         return (each.sum(dim=1) / mask.sum(dim=1)).mean()
 
-    training, validation, best, begin = [], [], (np.inf, {}), time.process_time()
+    training, validation, begin = list[float](), list[float](), time.process_time()
+    best: tuple[float, dict[str, Array]] = np.inf, {}
     for _ in range(epochs):
         order, losses = rng.permutation(len(data)), []
         for at in range(0, len(data), BATCH):

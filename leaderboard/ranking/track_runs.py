@@ -94,10 +94,10 @@ def _learned(found: Sequence[TrackRuns]) -> Iterator[TrackRuns]:
     parts = [runs for runs in found if runs.track.name in LEARNED_ON]
     tables = [table for runs in parts for table in runs.tables]
     cells = {name: cell for table in tables for name, cell in table.cells.items()}
-    rows = {name: track for name, cell in cells.items() if (track := budget_of(voyages_of(cell.runs.results)))}
+    rows = {name: budget_of(voyages_of(cell.runs.results)) for name, cell in cells.items()}
     references = {name for name, cell in cells.items() if cell.runs.reference}
     for name in BUDGETS:
-        mine = {row for row, track in rows.items() if track == name}
+        mine = {row for row, budget in rows.items() if budget == name}
         if len(mine) > 1:
             apart = {row: family for runs in parts for row, family in runs.apart.items()}
             track = Track(name, title(name), parts[0].track.score, tuple(table.name for table in tables))

@@ -186,7 +186,7 @@ def test_a_learning_agent(tmp_path, monkeypatch, capsys):
 
 
 def test_a_learned_filter(tmp_path, monkeypatch, capsys):
-    """In a small form: two voyages, and one run of a scenario."""
+    """In a small form: two voyages, and few runs of a scenario."""
     pytest.importorskip("torch", reason="the extra learn is not installed")
     page, names = "tutorials/learned-filter.md", {}
     monkeypatch.chdir(tmp_path)
@@ -195,7 +195,7 @@ def test_a_learned_filter(tmp_path, monkeypatch, capsys):
     exec(train, names)
     assert "1553 parameters" in capsys.readouterr().out
     compare, rank = commands(page)
-    assert "net-ekf:file=mine.npz" in simnav(tmp_path, compare.replace("--runs 3", "--runs 1"))
+    assert "net-ekf:file=mine.npz" in simnav(tmp_path, compare.replace("--runs 3", "--runs 2"))
     campaign, board = rank.splitlines()
     assert "net-ekf:file=mine.npz,net-ekf,ekf,iae" in campaign
     small = campaign.replace("random-voyages,several-faults", "random-voyages").replace("-n 10", "-n 1")

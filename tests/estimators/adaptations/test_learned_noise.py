@@ -7,7 +7,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from simnav.estimator import make
+from simnav.estimator import EstimatorError, make
 from simnav.estimators.adaptations.learned_noise import (
     HIDDEN,
     NUMBER_OF_INPUTS,
@@ -20,6 +20,7 @@ from simnav.estimators.models.filtering import Prediction
 from simnav.estimators.networks.file import Network, NetworkError
 from simnav.estimators.networks.recurrent import shapes
 from simnav.estimators.training.voyages import streams_of
+from simnav.estimators.weightings.learned_weights import LearnedWeights
 from simnav.scenario import load
 from simnav.source import record
 from simnav.trial import run_trial
@@ -83,6 +84,8 @@ def test_an_innovation_that_says_nothing_is_not_asked_about(tmp_path):
 def test_a_file_that_is_no_network_of_the_recipe_is_refused(tmp_path):
     path = constant(tmp_path / "n.npz", 0.25, ())
     with pytest.raises(NetworkError, match="recipe should be 'factor-network', not 'noise-network'"):
+        LearnedWeights(path)
+    with pytest.raises(EstimatorError, match=r"estimator 'net-fgo': .*n\.npz: recipe should be"):
         make("net-fgo", file=path)
     with pytest.raises(ValueError, match=r"highest = 0\.5: it must be at least 1"):
         LearnedNoise(path, highest=0.5)

@@ -51,8 +51,8 @@ def test_the_information_of_readings_follows_from_their_labels():
     recording = record(parse(FAULTY), 0)
     stream = recording.data.aids["gnss"]
     found = information(recording, stream)
-    expected = np.ones(len(stream))
-    expected[(stream.time > 10.1) & (stream.time < 19.9)] = 1.0 / 9.0
+    expected, noisy = np.ones(len(stream)), (stream.time > 10.1) & (stream.time < 19.9)
+    expected[noisy] = 1.0 / (9.0 + np.mean((stream.fault_error[noisy] / 1.5) ** 2, axis=1))
     k = 2.0 * LASTING
     expected[(stream.time > 40.1) & (stream.time < 49.9)] = 1.0 / (1.0 + k * (3.0 / 1.5) ** 2 / 3.0)
     sure = np.min(np.abs(stream.time[:, None] - [10.0, 20.0, 40.0, 50.0]), axis=1) > 0.1
