@@ -85,6 +85,7 @@ from .statistics import (
 )
 from .superseded import only_version, superseded_by
 from .track_runs import TrackRuns, runs_of_tracks
+from .tracks import is_derived
 
 if TYPE_CHECKING:
     from simnav.leaderboard.results.result import Result
@@ -156,7 +157,7 @@ def rank(
     scenarios: dict[str, ScenarioRanking] = {}
     for found in runs_of_tracks(results, score, tracks):
         boards.append(rank_track(found.by_trouble(), requested))
-        if found.track.name != "post-processing":
+        if not is_derived(found.track.name):
             scenarios |= {t.name: _scenario(t, found.apart) for t in found.tables}
     return Ranking(tuple(boards), tuple(scenarios[name] for name in sorted(scenarios)))
 
@@ -216,7 +217,7 @@ def rank_track(runs: TrackRuns, requested: Mapping[str, Sequence[int]] | None = 
     for n in names:
         if cells[n] or any(n in t.cells for t in used):
             standing[n] = _standing(n, used, cells[n], apart)
-        elif track.name != "post-processing" and (why := _not_suited(n, used)):
+        elif not is_derived(track.name) and (why := _not_suited(n, used)):
             standing[n] = "unsuitable", why
     shown = {n: c for n, c in cells.items() if c}
     rows, separation, why = _rows(used, shown, standing)

@@ -12,10 +12,11 @@ from simnav.estimator import EstimatorError
 from simnav.estimator.registry import registered
 from simnav.leaderboard.campaign.request import comes_with_simnav
 
+from .learning import voyages_of
 from .runs import Runs, group
 from .scenario_runs import ScenarioRuns
 from .statistics import FIRST
-from .tracks import RECORDED, Track, catalogued, tracks_of
+from .tracks import BUDGETS, LEARNED_ON, RECORDED, Track, budget_of, catalogued, title, tracks_of
 from .troubles import trouble_of
 from .variants import families, surplus
 
@@ -78,6 +79,15 @@ def runs_of_tracks(
         If an estimator has two results for one run.
     """
     runs = group(results)
+    found = list(_ordinary(runs, score, tracks))
+    yield from found
+    yield from _learned(found)
+
+
+def _ordinary(
+    runs: Mapping[str, Mapping[str, Runs]], score: str | None, tracks: Mapping[str, str] | None
+) -> Iterator[TrackRuns]:
+    """The runs of the tracks that scenarios name, and of post-processing."""
     headers = catalogued()  # what a scenario is, it says, and not what results say
     known = {**{name: h.track for name, h in headers.items()}, **(tracks or {})}
     for track in tracks_of(runs, known, score):
@@ -94,6 +104,21 @@ def runs_of_tracks(
 def _most(by: Mapping[str, Runs]) -> int:
     """The largest number of seeds of a row that is no reference."""
     return max((len(runs.tried) for runs in by.values() if not runs.reference), default=0)
+
+
+def _learned(found: Sequence[TrackRuns]) -> Iterator[TrackRuns]:
+    """The runs of the rows that learned, by the number of voyages; a track of one row alone is left out."""
+    parts = [runs for runs in found if runs.track.name in LEARNED_ON]
+    tables = [table for runs in parts for table in runs.tables]
+    cells = {name: cell for table in tables for name, cell in table.cells.items()}
+    rows = {name: budget_of(voyages_of(cell.runs.results)) for name, cell in cells.items()}
+    references = {name for name, cell in cells.items() if cell.runs.reference}
+    for name in BUDGETS:
+        mine = {row for row, budget in rows.items() if budget == name}
+        if len(mine) > 1:
+            apart = {row: family for runs in parts for row, family in runs.apart.items()}
+            track = Track(name, title(name), parts[0].track.score, tuple(table.name for table in tables))
+            yield TrackRuns(track, tables, apart).of_rows(mine | references)
 
 
 def _families(track: Track, runs: Mapping[str, Mapping[str, Runs]]) -> list[list[str]]:

@@ -1,7 +1,8 @@
 """Tracks: scenarios that the same estimators can do. There are ranks within a track only.
 
 A scenario names its track in its file. The track ``post-processing`` is made of the scenarios of `POST_PROCESSED`,
-ranked by the smoothed trajectory.
+ranked by the smoothed trajectory. The tracks of `BUDGETS` are made of the scenarios of `LEARNED_ON`, for the rows that
+learned from no more voyages than that, so that methods are compared and not data.
 """
 
 from __future__ import annotations
@@ -15,7 +16,10 @@ from simnav.scenario.catalogue import headers
 if TYPE_CHECKING:
     from simnav.scenario.catalogue import Header
 
-__all__ = ["POST_PROCESSED", "RECORDED", "RECORDINGS", "SMOOTHED", "Track", "catalogued", "title", "tracks_of"]
+__all__ = [
+    "BUDGETS", "LEARNED_ON", "POST_PROCESSED", "RECORDED", "RECORDINGS", "SMOOTHED", "Track", "budget_of", "catalogued",
+    "is_derived", "title", "tracks_of",
+]  # fmt: skip
 
 RECORDED = "recorded"
 #: Public recordings that are no part of the catalogue (`simnav.leaderboard.recordings`).
@@ -24,6 +28,10 @@ RECORDINGS = "recordings"
 SMOOTHED = "smoothed_horizontal_rmse"
 #: The tracks whose scenarios are ranked for smoothed output, too.
 POST_PROCESSED = ("aided-ins", "underwater")
+#: The largest number of training voyages, by the name of the track.
+BUDGETS = {"learned-1000": 1000, "learned-20000": 20_000}
+#: The tracks whose scenarios are ranked for learned rows alone, too.
+LEARNED_ON = ("generalisation", "generalisation-no-imu")
 
 _TITLES = {
     "aided-ins": "Aided INS",
@@ -33,6 +41,8 @@ _TITLES = {
     "post-processing": "Post-processing",
     "generalisation": "Generalisation",
     "generalisation-no-imu": "Generalisation without an IMU",
+    "learned-1000": "Learned from 1 000 voyages at most",
+    "learned-20000": "Learned from 20 000 voyages at most",
     "robustness": "Beyond the datasheets",
     "coloured": "Errors as they are at sea",
     "satellites": "Satellites, tightly and loosely coupled",
@@ -97,6 +107,20 @@ def tracks_of(scenarios: Iterable[str], track: Mapping[str, str], score: str | N
         found.append(Track("post-processing", title("post-processing"), SMOOTHED, smoothed))
     order = list(_TITLES)
     return sorted(found, key=lambda t: (order.index(t.name) if t.name in order else len(order), t.name))
+
+
+def is_derived(track: str) -> bool:
+    """Whether a track is made of the scenarios of others."""
+    return track == "post-processing" or track in BUDGETS
+
+
+def budget_of(voyages: int) -> str:
+    """The track of a row that learned from so many voyages; empty for more than the largest budget.
+
+    >>> budget_of(300), budget_of(1001), budget_of(10**6)
+    ('learned-1000', 'learned-20000', '')
+    """
+    return next((name for name, most in BUDGETS.items() if voyages <= most), "")
 
 
 def title(track: str) -> str:

@@ -49,6 +49,7 @@ _FAMILIES = {
     "terrain": "Point-mass filter",
     "smoothers": "Smoother",
     "anfis": "Learned",
+    "learned": "Learned",
     "policy": "Learned",
     "dead_reckoning": "Dead reckoning",
     "oracles": "Oracle",

@@ -185,6 +185,24 @@ def test_a_learning_agent(tmp_path, monkeypatch, capsys):
     assert make("policy-ekf", file="policy.npz").policy.trained_on["voyages"] == 4
 
 
+def test_a_learned_filter(tmp_path, monkeypatch, capsys):
+    """In a small form: two voyages, and few runs of a scenario."""
+    pytest.importorskip("torch", reason="the extra learn is not installed")
+    page, names = "tutorials/learned-filter.md", {}
+    monkeypatch.chdir(tmp_path)
+    gather, train = blocks(page, "python")
+    exec(gather.replace("range(12)", "range(2)").replace("range(6)", "range(1)"), names)
+    exec(train, names)
+    assert "1553 parameters" in capsys.readouterr().out
+    compare, rank = commands(page)
+    assert "net-ekf(file=mine.npz)" in simnav(tmp_path, compare.replace("--runs 3", "--runs 2"))
+    campaign, board = rank.splitlines()
+    assert "net-ekf:file=mine.npz,net-ekf," in campaign
+    small = campaign.replace("random-voyages,several-faults", "random-voyages").replace("-n 10", "-n 1")
+    simnav(tmp_path, small)
+    assert "Learned from 1 000 voyages at most" in simnav(tmp_path, board)
+
+
 # -- guides --------------------------------------------------------------------------------------------------
 
 

@@ -119,3 +119,18 @@ def test_a_policy_in_plain_arrays_is_the_network_of_the_library(example):
     assert np.abs(actions).max() > 0.01
     np.testing.assert_allclose(policy(observation)[:, :1], actions, atol=1e-5)
     assert (policy(observation)[:, 1] == 0.0).all()  # the process noise
+
+
+def test_a_recurrent_policy(example):
+    pytest.importorskip("sb3_contrib", reason="the extra rl is not installed")
+    example("stable_baselines")
+    module = example("recurrent_policy")
+    seen = []
+    options = {"num_envs": 4, "same": 2, "voyages": 2, "length": 20, "cells": 4}
+    model = module.train(steps=160, parts=2, after=lambda done, model: seen.append(done), **options)
+    assert seen == [80, 160]
+    act, observation = module.agent_of(model, 3), np.ones((3, 24), np.float32)
+    first, second = act(observation), act(observation)
+    assert first.shape == (3, 2)
+    assert (first[:, 1] == 0.0).all()
+    assert np.abs(first - second).max() > 0.0  # it remembers

@@ -1,0 +1,1 @@
+"""Trained networks as plain arrays: their files, and the compiled steps by which an estimator asks them."""

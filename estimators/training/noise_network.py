@@ -1,0 +1,312 @@
+"""The recipe of `simnav.estimators.adaptations.learned_noise`: a recurrent network that sets the noise of each reading.
+
+1. A filter runs over training voyages, and the inputs of the network are noted at each reading. The targets are
+   `simnav.estimators.training.information`. On every second voyage the filter uses the noise of the datasheets, and on
+   the others that of the targets. So the network sees the innovations of a filter that was misled, and those of one
+   that was not; with the network, the filter will be between the two.
+2. PyTorch trains a layer of gated units by the squared error of the logarithm of the output, whose minimum is the mean
+   logarithm of the target given all innovations so far. Each instrument of a voyage is a sequence of equal weight.
+
+Run it; it takes less than half an hour on one core::
+
+    pip install simnav[learn]
+    python -m simnav.estimators.training.noise_network --voyages 1000 --seed 0 --output noise_network.npz
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import time
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from simnav.compiled import kernel
+from simnav.estimators.adaptations.learned_noise import (
+    HIDDEN,
+    LEAST,
+    NOTED,
+    NUMBER_OF_INPUTS,
+    RECIPE,
+    UNITS,
+    VERSION,
+    LearnedNoise,
+    set_by_network,
+)
+from simnav.estimators.adaptations.rules import TIME, copied
+from simnav.estimators.models.filtering import Prediction
+from simnav.estimators.models.suitable import Suitable
+from simnav.estimators.networks.file import Network
+from simnav.estimators.networks.recurrent import shapes
+from simnav.estimators.solvers.iterated import poor_heading
+from simnav.estimators.solvers.kalman import KalmanEstimator
+from simnav.kernel_types import Vector
+from simnav.recording import Recording
+from simnav.types import Array, Instruments
+
+from .information import information
+from .voyages import streams_of, versions, voyages
+
+__all__ = ["FAMILIES", "Fitted", "Readings", "fit", "gather", "main", "train"]
+
+#: Whole voyages with and without an IMU, faults of receivers, outages, poor IMUs, and nothing wrong.
+FAMILIES = (
+    "training-voyages", "training-ships", "training-gnss-faults", "training-clean", "training-outages",
+    "training-poor-imu-faults",
+)  # fmt: skip
+#: Largest factor on a sigma that is learned.
+HIGHEST = 30.0
+#: Units of the network; longest part of a sequence in a step of the training; sequences in a batch; rate of learning.
+HIDDEN_UNITS, LONGEST, BATCH, RATE = 16, 256, 64, 6e-3
+
+
+@dataclass(frozen=True, eq=False)
+class Readings:
+    """The readings of one instrument of one voyage.
+
+    Attributes
+    ----------
+    kind : str
+        Kind of the instrument.
+    inputs : (k, n) float32 array
+        Inputs of the network at each reading.
+    target : (k,) float32 array
+        The information of each reading, in (0, 1].
+    """
+
+    kind: str
+    inputs: Any
+    target: Any
+
+
+@dataclass(frozen=True, eq=False)
+class Fitted:
+    """A network, the mean squared errors on training and validation in each epoch, and processor time per epoch [s]."""
+
+    network: Network
+    training: list[float]
+    validation: list[float]
+    seconds: float
+
+
+#: Places in a row of the table of an instrument: time and target of a reading, whether it was noted, and its inputs.
+_TIME, _TARGET, _NOTED, _INPUTS = range(4)
+_WIDTH = _INPUTS + NUMBER_OF_INPUTS
+
+
+@kernel(passed=True)
+def noted_noise(settings: Vector, memory: Vector, shared: Vector, prediction: Prediction) -> float:
+    """Note the inputs of the network in the table behind its memory, and use the noise of the datasheet or the target.
+
+    Before the table are the number of its rows that are past, and whether the target is used.
+    """
+    asked = set_by_network(settings, memory, shared, prediction)
+    copied(prediction.nominal, prediction.noise)
+    past = HIDDEN + int(settings[UNITS])
+    leads, table = memory[past + 1], memory[past + 2 :]
+    k, count = int(memory[past]), table.size // _WIDTH
+    while k < count and table[k * _WIDTH + _TIME] < shared[TIME] - 1e-9:
+        k += 1
+    memory[past] = float(k)
+    if k == count or asked == 0.0:
+        return 0.0
+    row = table[k * _WIDTH : (k + 1) * _WIDTH]
+    row[_NOTED] = 1.0
+    for i in range(NUMBER_OF_INPUTS):
+        row[_INPUTS + i] = memory[NOTED + i]
+    if leads > 0.0:
+        for i in range(prediction.noise.shape[0]):
+            for j in range(prediction.noise.shape[0]):
+                prediction.noise[i, j] /= max(row[_TARGET], settings[LEAST])
+    return 0.0
+
+
+class _Noting(LearnedNoise):
+    """Notes the inputs of the network at each reading of a recording.
+
+    Parameters
+    ----------
+    recording : Recording
+        The run.
+    leads : bool
+        Whether the noise is that of the targets, or that of the datasheets.
+    """
+
+    rule = noted_noise
+
+    def __init__(self, recording: Recording, leads: bool):
+        arrays = {name: np.zeros(shape) for name, shape in shapes(NUMBER_OF_INPUTS, 1).items()}
+        self.use(Network(RECIPE, VERSION, arrays))
+        self.highest, self._leads, self._recording = HIGHEST, leads, recording
+
+    def in_scope(self, kind: str) -> bool:
+        return True
+
+    def reset(self, instruments: Instruments) -> None:
+        super().reset(instruments)
+        parts = []
+        for name in self.index:
+            stream = self._recording.data.aids[name]
+            table = np.zeros((len(stream), _WIDTH))
+            table[:, _TIME], table[:, _TARGET] = stream.time, information(self._recording, stream)
+            parts.append(np.concatenate([self.memory_of(name)[1], [0.0, float(self._leads)], table.ravel()]))
+        self.rule_memory, self.rule_first = np.concatenate(parts), np.cumsum([0, *map(len, parts)])
+
+    def noted(self, *told: Any) -> None:  # nothing is reported
+        pass
+
+    def sequence(self, name: str) -> Readings:
+        """What was noted of an instrument."""
+        table = self.memory_of(name)[1][HIDDEN + self._units + 2 :].reshape(-1, _WIDTH)
+        rows = table[table[:, _NOTED] > 0.0].astype(np.float32)
+        return Readings(self.instruments[name].kind, rows[:, _INPUTS:], rows[:, _TARGET])
+
+
+def gather(recordings: Iterable[Recording]) -> list[list[Readings]]:
+    """Run the filter over voyages; for each voyage, what was noted of its instruments."""
+    found = []
+    for k, recording in enumerate(recordings):
+        noting = _Noting(recording, leads=k // len(FAMILIES) % 2 == 1)
+        solver = KalmanEstimator(Suitable(), noting, poor_heading())
+        solver.reset(recording.start, recording.instruments)
+        for packet in recording.steps():
+            solver.update(packet)
+        noted = [noting.sequence(name) for name in noting.index]
+        found.append([readings for readings in noted if len(readings.target) > 1])
+    return found
+
+
+def fit(
+    data: Sequence[Readings], checked: Sequence[Readings], epochs: int, seed: int, units: int = HIDDEN_UNITS
+) -> Fitted:
+    """Train a network; needs PyTorch.
+
+    Parameters
+    ----------
+    data, checked : sequence of Readings
+        For training and for validation. The network of the best epoch on the validation is returned.
+    epochs : int
+        Passes over the data. In each, a random part of each sequence is used.
+    seed : int
+        Decides the first parameters, and the order.
+    units : int
+        Size of the memory.
+    """
+    import torch
+
+    torch.set_num_threads(1)
+    torch.manual_seed(seed)
+    rng = np.random.default_rng(seed)
+    layer, output = torch.nn.GRU(NUMBER_OF_INPUTS, units, batch_first=True), torch.nn.Linear(units, 1)
+    with torch.no_grad():
+        output.bias[:] = 2.0  # most readings are good
+    parameters = [*layer.parameters(), *output.parameters()]
+    steps = max(1, epochs * -(-len(data) // BATCH))
+    optimizer = torch.optim.Adam(parameters, lr=RATE)
+    schedule = torch.optim.lr_scheduler.OneCycleLR(optimizer, RATE, total_steps=steps)
+
+    def loss_of(batch: list[Readings]) -> Any:
+        parts = [_part(s, rng) for s in batch]
+        x, y, mask = (torch.from_numpy(a) for a in _padded(parts))
+        logits = output(layer(x)[0])[..., 0]
+        each = (torch.nn.functional.logsigmoid(logits) - torch.log(y)) ** 2 * mask
+        return (each.sum(dim=1) / mask.sum(dim=1)).mean()
+
+    training, validation, begin = list[float](), list[float](), time.process_time()
+    best: tuple[float, dict[str, Array]] = np.inf, {}
+    for _ in range(epochs):
+        order, losses = rng.permutation(len(data)), []
+        for at in range(0, len(data), BATCH):
+            loss = loss_of([data[i] for i in order[at : at + BATCH]])
+            optimizer.zero_grad()
+            loss.backward()
+            torch.nn.utils.clip_grad_norm_(parameters, 1.0)
+            optimizer.step()
+            schedule.step()
+            losses.append(loss.item())
+        rng, kept = np.random.default_rng(seed), rng  # the same parts in each validation
+        with torch.no_grad():
+            checks = [loss_of(list(checked[at : at + BATCH])).item() for at in range(0, len(checked), BATCH)]
+        rng = kept
+        training.append(float(np.mean(losses)))
+        validation.append(float(np.mean(checks)))
+        if validation[-1] < best[0]:
+            best = validation[-1], _arrays(layer, output)
+    seconds = (time.process_time() - begin) / max(epochs, 1)
+    kinds = tuple(sorted({s.kind for s in data}))
+    return Fitted(Network(RECIPE, VERSION, best[1], kinds), training, validation, seconds)
+
+
+def _arrays(layer: Any, output: Any) -> dict[str, Array]:
+    """The parameters of the modules of PyTorch as `simnav.estimators.networks.recurrent` takes them."""
+    own = {
+        "input_weight": layer.weight_ih_l0, "input_bias": layer.bias_ih_l0, "memory_weight": layer.weight_hh_l0,
+        "memory_bias": layer.bias_hh_l0, "output_weight": output.weight[0], "output_bias": output.bias,
+    }  # fmt: skip
+    return {name: tensor.detach().numpy().astype(np.float64) for name, tensor in own.items()}
+
+
+def _part(sequence: Readings, rng: np.random.Generator) -> tuple[Any, Any]:
+    """A random part of a sequence, at most `LONGEST` long; half of them from the beginning."""
+    spare = len(sequence.target) - LONGEST
+    begin = int(rng.integers(spare + 1)) if spare > 0 and rng.random() < 0.75 else 0
+    return sequence.inputs[begin : begin + LONGEST], sequence.target[begin : begin + LONGEST]
+
+
+def _padded(parts: list[tuple[Any, Any]]) -> tuple[Any, Any, Any]:
+    """Inputs, targets and a mask of several parts of different lengths."""
+    longest = max(len(y) for _, y in parts)
+    x = np.zeros((len(parts), longest, NUMBER_OF_INPUTS), np.float32)
+    y, mask = np.ones((len(parts), longest), np.float32), np.zeros((len(parts), longest), np.float32)
+    for i, (inputs, target) in enumerate(parts):
+        x[i, : len(target)], mask[i, : len(target)] = inputs, 1.0
+        y[i, : len(target)] = np.maximum(target, HIGHEST**-2)
+    return x, y, mask
+
+
+def train(data: Sequence[Sequence[Readings]], checked: Sequence[Sequence[Readings]], epochs: int, seed: int) -> Fitted:
+    """Train on the first voyages of `FAMILIES`, and add the record of the training.
+
+    Parameters
+    ----------
+    data, checked : sequence of voyages
+        From `gather`, of the splits ``train`` and ``validation``.
+    epochs, seed : int
+        As for `fit`.
+    """
+    fitted = fit([r for voyage in data for r in voyage], [r for voyage in checked for r in voyage], epochs, seed)
+    record = {
+        "families": list(FAMILIES), "voyages": len(data), "streams": streams_of(FAMILIES, "train", len(data)),
+        "seed": seed, "epochs": epochs, "seconds_per_epoch": round(fitted.seconds, 2),
+        "validation": round(min(fitted.validation), 6), "versions": versions(),
+    }  # fmt: skip
+    return replace(fitted, network=replace(fitted.network, trained_on=record))
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Train, and write the network and its learning curve."""
+    parser = argparse.ArgumentParser(description="Train the network that sets the noise of each reading.")
+    parser.add_argument("--voyages", type=int, default=1000)
+    parser.add_argument("--epochs", type=int, default=20)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--output", type=Path, default=Path("noise_network.npz"))
+    options = parser.parse_args(arguments)
+    begin, few = time.perf_counter(), max(options.voyages // 10, len(FAMILIES))
+    data = gather(voyages(FAMILIES, "train", range(options.voyages)))
+    checked = gather(voyages(FAMILIES, "validation", range(few)))
+    fitted = train(data, checked, options.epochs, options.seed)
+    fitted.network.save(options.output)
+    curve = {"training": fitted.training, "validation": fitted.validation, "seconds_per_epoch": fitted.seconds}
+    options.output.with_suffix(".json").write_text(json.dumps(curve), encoding="utf-8")
+    print(
+        f"{options.output}: {fitted.network.parameters} parameters, squared error {min(fitted.validation):.4f} on "
+        f"validation, {fitted.seconds:.1f} s per epoch, {time.perf_counter() - begin:.0f} s in all"
+    )
+
+
+if __name__ == "__main__":
+    main()

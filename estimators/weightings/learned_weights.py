@@ -1,0 +1,162 @@
+"""Weights of the factors of a window from a network, which sees the residuals of all of them.
+
+The network has two hidden layers. It is asked for each measurement, and its output is the information of the
+measurement as a part of what the datasheet says, which is the weight. It sees the residual of the measurement, those of
+the same instrument before and after it and in the mean of the window, the mean size of the residuals of each group of
+instruments, and that of the motion. Motion is weighted by its own residuals (`weigh_motion`).
+
+Unlike the weight of an M-estimator, the weight is no function of one residual: a bias shows in the mean of the window
+only. The recipe is `simnav.estimators.training.factor_network`. Weights of residuals that are learned, and not chosen,
+are an idea of R. Ranftl and V. Koltun, *Deep fundamental matrix estimation*, ECCV 2018; the network, its inputs and its
+targets are ours.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from math import asinh, log1p, sqrt
+from pathlib import Path
+
+import numpy as np
+
+from simnav.compiled import kernel
+from simnav.estimators.networks.file import Network
+from simnav.kernel_types import IntegerVector, Matrix, Vector
+from simnav.types import KINDS, Array, Instruments
+
+from .base import Factors
+from .robust_weighting import RobustWeighting
+
+__all__ = ["INPUTS", "RECIPE", "VERSION", "LearnedWeights", "inputs_of", "shapes_of", "shipped"]
+
+RECIPE, VERSION = "factor-network", 1
+_GROUPS = {"fix": 0, "velocity": 1, "heading": 2}
+GROUPS = 4
+#: The inputs of the network, in order.
+INPUTS = (
+    "component_0", "component_1", "component_2", "size", "size_of_mean", "along_mean", "mean_size", "size_before",
+    "size_after", "age", "number", "motion", "is_fix", "is_velocity", "is_heading", "is_other", "mean_of_fixes",
+    "mean_of_velocities", "mean_of_headings", "mean_of_others",
+)  # fmt: skip
+NUMBER_OF_INPUTS = len(INPUTS)
+
+
+@kernel
+def _fill(
+    instrument: IntegerVector,
+    components: IntegerVector,
+    time: Vector,
+    whitened: Matrix,
+    norm: Vector,
+    group: IntegerVector,
+    motion: float,
+    inputs: Matrix,
+) -> None:
+    """Overwrite the (M, n) inputs of M measurements (`INPUTS`); ``group`` is that of each instrument."""
+    k = group.size
+    count, size, mean = np.zeros(k), np.zeros(k), np.zeros((k, 3))
+    in_group, of_group = np.zeros(GROUPS), np.zeros(GROUPS)
+    last = np.full(k, -1, np.int64)
+    newest = 0.0
+    for i in range(norm.size):
+        a, own = instrument[i], log1p(norm[i] / sqrt(components[i]))
+        count[a] += 1.0
+        size[a] += own
+        in_group[group[a]] += 1.0
+        of_group[group[a]] += own
+        for c in range(3):
+            mean[a, c] += whitened[i, c]
+        newest = max(newest, time[i])
+    for i in range(norm.size):
+        a, row = instrument[i], inputs[i]
+        along, square = 0.0, 0.0
+        for c in range(3):
+            m = mean[a, c] / count[a]
+            along += whitened[i, c] * m
+            square += m * m
+            row[c] = asinh(whitened[i, c])
+        row[3] = log1p(norm[i] / sqrt(components[i]))
+        row[4], row[5], row[6] = log1p(sqrt(square)), asinh(along), size[a] / count[a]
+        row[7], row[8] = 0.0, 0.0
+        if last[a] >= 0:
+            row[7] = inputs[last[a], 3]
+            inputs[last[a], 8] = row[3]
+        last[a] = i
+        row[9], row[10], row[11] = 0.3 * log1p(newest - time[i]), 0.3 * log1p(count[a]), motion
+        for g in range(GROUPS):
+            row[12 + g] = 1.0 if g == group[a] else 0.0
+            row[12 + GROUPS + g] = of_group[g] / in_group[g] if in_group[g] > 0.0 else 0.0
+
+
+def shapes_of(arrays: Mapping[str, Array]) -> dict[str, tuple[int, ...]]:
+    """The shapes that the arrays of a network should have, by the length of its output weight."""
+    units = np.size(arrays.get("output_weight", ()))
+    return {
+        "weight_0": (units, NUMBER_OF_INPUTS), "bias_0": (units,), "weight_1": (units, units), "bias_1": (units,),
+        "output_weight": (units,), "output_bias": (1,),
+    }  # fmt: skip
+
+
+def inputs_of(factors: Factors, group: Mapping[str, int]) -> Array:
+    """(M, n) array: the inputs of the network for the M measurements of a window.
+
+    Parameters
+    ----------
+    factors : Factors
+        The factors of the window.
+    group : mapping of str to int
+        Group of each instrument or channel, by name.
+    """
+    motion = factors.motion_norm
+    size = log1p(sqrt(float(motion @ motion) / max(factors.motion_residual.size, 1)))
+    groups = np.array([group.get(name, GROUPS - 1) for name in factors.names], dtype=np.int64)
+    inputs: Array = np.empty((len(factors.norm), NUMBER_OF_INPUTS))
+    _fill(
+        np.ascontiguousarray(factors.instrument, dtype=np.int64),
+        np.ascontiguousarray(factors.components, dtype=np.int64),
+        np.ascontiguousarray(factors.time), np.ascontiguousarray(factors.whitened),
+        np.ascontiguousarray(factors.norm), groups, size, inputs,
+    )  # fmt: skip
+    return inputs
+
+
+def shipped() -> Path:
+    """The network that comes with simnav."""
+    return Path(__file__).parents[1] / "networks" / "factor_network.npz"
+
+
+class LearnedWeights(RobustWeighting):
+    """Weights from a network, which sees the residuals of the whole window (see the module).
+
+    Measurements of kinds that the network has not learned from keep the weight 1.
+
+    Parameters
+    ----------
+    file : str
+        Network of the recipe `simnav.estimators.training.factor_network`; empty: the one that comes with simnav.
+
+    Raises
+    ------
+    NetworkError
+        If the file cannot be used.
+    """
+
+    def __init__(self, file: str = "", smallest: float = 1e-3):
+        super().__init__(smallest)
+        path = Path(file).expanduser() if file else shipped()
+        self.network = Network.load(path, RECIPE, VERSION, shapes_of)
+
+    def reset(self, instruments: Instruments) -> None:
+        """Begin a run."""
+        self._group = {n: _GROUPS.get(KINDS[s.kind].role, GROUPS - 1) for n, s in instruments.items()}
+        self._known = {name for name, sheet in instruments.items() if sheet.kind in self.network.kinds}
+
+    def choose(self, factors: Factors) -> bool:
+        """Set the weights of the measurements."""
+        own, x = self.network.arrays, inputs_of(factors, self._group)
+        for layer in ("0", "1"):
+            x = np.tanh(x @ own[f"weight_{layer}"].T + own[f"bias_{layer}"])
+        logits = x @ own["output_weight"] + own["output_bias"][0]
+        known = np.array([name in self._known for name in factors.names])[factors.instrument]
+        factors.weight[:] = np.where(known, 1.0 / (1.0 + np.exp(-np.clip(logits, -30.0, 30.0))), 1.0)
+        return True
