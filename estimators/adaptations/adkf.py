@@ -74,7 +74,9 @@ SETTINGS = structure(printed=int, two_segment=int, three_segment=int, c0=float, 
 
 
 @kernel(passed=True)
-def adkf_noise(settings: Vector, memory: Vector, readings: Readings, k: int, prediction: Prediction) -> float:
+def adkf_noise(
+    settings: Vector, memory: Vector, common: Vector, readings: Readings, k: int, prediction: Prediction
+) -> float:
     """Divide the nominal noise by the factor of the residual statistic (`AdaptiveFactor`).
 
     Returns

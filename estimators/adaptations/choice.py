@@ -46,13 +46,13 @@ class Choice(Record):
         The memories of all instruments, one after the other.
     first : (j + 1,) array of int
         Index of the first element of each memory.
-    before : (1,) array
-        Time of the last reading for which the rule was asked [s]; NaN before the first.
+    common : (c,) array
+        What the rule keeps of all instruments together.
     tested : TestedPrediction
         The tests of the prediction.
     """
 
-    rule: Callable[[Vector, Vector, Readings, int, Prediction], float]
+    rule: Callable[[Vector, Vector, Vector, Readings, int, Prediction], float]
     estimates: bool
     inflates_disturbed: bool
     index: IntegerVector
@@ -61,7 +61,7 @@ class Choice(Record):
     settings: Matrix
     memories: Vector
     first: IntegerVector
-    before: Vector
+    common: Vector
     tested: TestedPrediction
 
 
@@ -105,7 +105,7 @@ def choose_noise(choice: Choice, covariance: Matrix, readings: Readings, k: int,
     covariance : (n, n) array
         Covariance of the model's error before the reading.
     readings : Readings
-        Of reading k, ``sigma``, ``reported``, ``elapsed``, ``inflation``, ``rejected`` and ``wrong`` are set.
+        Of reading k, ``sigma``, ``reported``, ``inflation``, ``rejected`` and ``wrong`` are set.
     k : int
         The reading.
     prediction : Prediction
@@ -133,17 +133,17 @@ def choose_noise(choice: Choice, covariance: Matrix, readings: Readings, k: int,
             if last[0] > 0.0:
                 copied(last[: m * m].reshape((m, m)), noise)
         else:
-            readings.elapsed[k] = readings.time[k] - choice.before[0]
-            choice.before[0] = readings.time[k]
             memory = choice.memories[choice.first[i] : choice.first[i + 1]]
-            readings.reported[k] = choice.rule(choice.settings[i], memory, readings, k, prediction)
+            readings.reported[k] = choice.rule(choice.settings[i], memory, choice.common, readings, k, prediction)
             if readings.rejected[k]:
                 return
     remember(noise, last, readings.sigma[k])
 
 
 @kernel(passed=True)
-def keep_nominal(settings: Vector, memory: Vector, readings: Readings, k: int, prediction: Prediction) -> float:
+def keep_nominal(
+    settings: Vector, memory: Vector, common: Vector, readings: Readings, k: int, prediction: Prediction
+) -> float:
     """The rule that uses the noise of the datasheet."""
     copied(prediction.nominal, prediction.noise)
     return 0.0
@@ -154,5 +154,5 @@ def no_choice() -> Choice:
     return Choice(
         rule=keep_nominal, estimates=False, inflates_disturbed=False, index=np.empty(0, np.int64),
         in_scope=np.empty(0, np.bool_), last=np.empty((0, 9)), settings=np.empty((0, 0)), memories=np.empty(0),
-        first=np.empty(0, np.int64), before=np.empty(0), tested=PredictionTest(Instruments()).tested(0),
+        first=np.empty(0, np.int64), common=np.empty(0), tested=PredictionTest(Instruments()).tested(0),
     )  # fmt: skip

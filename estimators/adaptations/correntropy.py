@@ -78,7 +78,9 @@ SETTINGS = structure(bandwidth=float, smallest=float, iterations=int, from_updat
 
 
 @kernel(passed=True)
-def correntropy_rule(settings: Vector, memory: Vector, readings: Readings, k: int, prediction: Prediction) -> float:
+def correntropy_rule(
+    settings: Vector, memory: Vector, common: Vector, readings: Readings, k: int, prediction: Prediction
+) -> float:
     """Call `correntropy_noise`."""
     own = settings.view(SETTINGS)[0]
     innovation, _, predicted, nominal, noise = prediction

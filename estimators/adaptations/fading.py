@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from math import exp, isnan
 
+import numpy as np
+
 from simnav.compiled import kernel
 from simnav.estimators.models.filtering import Prediction, Readings
 from simnav.kernel_types import Vector
@@ -17,14 +19,20 @@ __all__ = ["FadingMemory", "fading_noise"]
 
 #: Time in which the weight of information decreases by a factor of e [s].
 SETTINGS = structure(memory=float)
+#: Time of the last reading of any instrument [s]; NaN before the first.
+TOGETHER = structure(time=float)
 
 
 @kernel(passed=True)
-def fading_noise(settings: Vector, memory: Vector, readings: Readings, k: int, prediction: Prediction) -> float:
+def fading_noise(
+    settings: Vector, memory: Vector, common: Vector, readings: Readings, k: int, prediction: Prediction
+) -> float:
     """Inflate P by the time since the last measurement (`FadingMemory`); the noise is the nominal one; 0."""
     copied(prediction.nominal, prediction.noise)
-    if not isnan(readings.elapsed[k]):
-        readings.inflation[k] = exp(readings.elapsed[k] / settings.view(SETTINGS)[0].memory)
+    last, time = common.view(TOGETHER)[0], readings.time[k]
+    if not isnan(last.time):
+        readings.inflation[k] = exp((time - last.time) / settings.view(SETTINGS)[0].memory)
+    last.time = time
     return 0.0
 
 
@@ -53,3 +61,7 @@ class FadingMemory(NoiseAdaptation):
     def settings_of(self, longer: float) -> Array:
         """As `NoiseAdaptation.settings_of`."""
         return filled(SETTINGS, memory=self.memory)
+
+    def begun_together(self) -> Array:
+        """As `NoiseAdaptation.begun_together`."""
+        return filled(TOGETHER, time=np.nan)

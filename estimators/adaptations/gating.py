@@ -29,7 +29,9 @@ MEMORY = structure(heard=float, failing=float)
 
 
 @kernel(passed=True)
-def gate_noise(settings: Vector, memory: Vector, readings: Readings, k: int, prediction: Prediction) -> float:
+def gate_noise(
+    settings: Vector, memory: Vector, common: Vector, readings: Readings, k: int, prediction: Prediction
+) -> float:
     """Make the test of `ChiSquareGate`, without the witnesses among channels; 1 if it fails, else 0."""
     gate, instrument = settings.view(SETTINGS)[0], memory.view(MEMORY)[0]
     copied(prediction.nominal, prediction.noise)

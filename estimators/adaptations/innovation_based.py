@@ -199,7 +199,9 @@ def _contradicted(limits: Array, residual: int, estimate: Array, nominal: Array,
 
 
 @kernel(passed=True)
-def innovation_noise(settings: Vector, memory: Vector, readings: Readings, k: int, prediction: Prediction) -> float:
+def innovation_noise(
+    settings: Vector, memory: Vector, common: Vector, readings: Readings, k: int, prediction: Prediction
+) -> float:
     """Estimate the noise (`InnovationBased`), and write it into ``noise`` within its bounds, or the nominal one.
 
     Returns

@@ -22,17 +22,18 @@ import numpy as np
 
 from simnav.compiled import kernel
 from simnav.estimators.algebra.direct_update import normalised_square
-from simnav.estimators.models.filtering import Prediction
+from simnav.estimators.models.filtering import Prediction, Readings
 from simnav.estimators.networks.file import Network
 from simnav.estimators.networks.recurrent import advance, fitting, flat
 from simnav.kernel_types import Vector
+from simnav.structures import filled, length, structure
 from simnav.types import KINDS, Array, Instruments
 
 from .noise import NoiseAdaptation
 from .prediction import standardised
-from .rules import OWN, TIME, copied
+from .rules import copied
 
-__all__ = ["INPUTS", "NOTED", "RECIPE", "VERSION", "LearnedNoise", "learned_noise", "set_by_network", "shipped"]
+__all__ = ["INPUTS", "MEMORY", "RECIPE", "VERSION", "LearnedNoise", "learned_noise", "set_by_network", "shipped"]
 
 RECIPE, VERSION = "noise-network", 1
 #: Groups of instruments, by role. The network sees how large the innovations of each group are.
@@ -46,11 +47,13 @@ INPUTS = (
     "component_0", "component_1", "component_2", "size", "certainty", "elapsed", "is_fix", "is_velocity", "is_heading",
     "is_other", "mean_of_fixes", "mean_of_velocities", "mean_of_headings", "mean_of_others",
 )  # fmt: skip
-#: Places in the settings: group, smallest weight, number of units, then the parameters of the network.
-GROUP, LEAST, UNITS, WEIGHTS = range(4)
-#: Places in the memory: time of the last reading, the inputs of the last reading, then the memory of the network.
-HEARD, NOTED = range(2)
-HIDDEN = NOTED + NUMBER_OF_INPUTS
+#: Group of the instrument, smallest weight, and number of units; behind them are the parameters of the network.
+SETTINGS = structure(group=int, least=float, units=int)
+#: Time and inputs of the last reading; behind them is the memory of the network.
+MEMORY = structure(heard=float, inputs=NUMBER_OF_INPUTS)
+#: Of each group: mean size of the innovations, and the time of the last one.
+TOGETHER = structure(size=GROUPS, time=GROUPS)
+_WEIGHTS, HIDDEN = length(SETTINGS), length(MEMORY)
 #: Time constant of the mean sizes [s], and the size without a fault, ln(1 + 0.82).
 _MEMORY, _TYPICAL = 10.0, 0.6
 #: Innovations beyond this, in their sigmas, are none of the training.
@@ -58,10 +61,13 @@ LARGEST = 1000.0
 
 
 @kernel
-def set_by_network(settings: Vector, memory: Vector, shared: Vector, prediction: Prediction) -> float:
+def set_by_network(
+    settings: Vector, memory: Vector, common: Vector, readings: Readings, k: int, prediction: Prediction
+) -> float:
     """Note the inputs of a reading, ask the network, and scale the noise; return w, or 0 if it is not asked."""
     nominal, noise, m = prediction.nominal, prediction.noise, prediction.innovation.size
-    time, group, units = shared[TIME], int(settings[GROUP]), int(settings[UNITS])
+    own, kept = settings[:_WEIGHTS].view(SETTINGS)[0], memory[:HIDDEN].view(MEMORY)[0]
+    groups, time, group = common.view(TOGETHER)[0], readings.time[k], own.group
     copied(nominal, noise)
     u0, u1, u2 = standardised(prediction.innovation, prediction.predicted, nominal)
     square, before = normalised_square(prediction.innovation, prediction.predicted, nominal), 0.0
@@ -70,21 +76,20 @@ def set_by_network(settings: Vector, memory: Vector, shared: Vector, prediction:
     if not (square >= 0.0 and before >= 0.0 and u0 * u0 + u1 * u1 + u2 * u2 < LARGEST * LARGEST):
         return 0.0  # the filter is lost, and its innovations say nothing of the noise
     size = log1p(sqrt(square / m))
-    inputs = memory[NOTED : NOTED + NUMBER_OF_INPUTS]
-    elapsed = time - memory[HEARD]
+    inputs, elapsed = kept.inputs[:], time - kept.heard
     inputs[0], inputs[1], inputs[2], inputs[3] = asinh(u0), asinh(u1), asinh(u2), size
     inputs[4] = min(max(log(before / m + 1e-12), -10.0), 10.0) / 3.0
     inputs[5] = log1p(max(elapsed, 0.0)) if elapsed == elapsed else 0.0
     for g in range(GROUPS):
         inputs[6 + g] = 1.0 if g == group else 0.0
-        inputs[6 + GROUPS + g] = shared[OWN + 2 * g]
-    memory[HEARD] = time
-    own = shared[OWN + 2 * group + 1]
-    part = 1.0 - exp(-max(time - own, 0.0) / _MEMORY) if own == own else 0.3
-    shared[OWN + 2 * group] += part * (size - shared[OWN + 2 * group])
-    shared[OWN + 2 * group + 1] = time
-    output = advance(settings[WEIGHTS:], inputs, memory[HIDDEN : HIDDEN + units])
-    weight: float = max(1.0 / (1.0 + exp(-output)), settings[LEAST])
+        inputs[6 + GROUPS + g] = groups.size[g]
+    kept.heard = time
+    last = groups.time[group]
+    part = 1.0 - exp(-max(time - last, 0.0) / _MEMORY) if last == last else 0.3
+    groups.size[group] += part * (size - groups.size[group])
+    groups.time[group] = time
+    output = advance(settings[_WEIGHTS:], inputs, memory[HIDDEN : HIDDEN + own.units])
+    weight: float = max(1.0 / (1.0 + exp(-output)), own.least)
     for i in range(m):
         for j in range(m):
             noise[i, j] /= weight
@@ -92,9 +97,11 @@ def set_by_network(settings: Vector, memory: Vector, shared: Vector, prediction:
 
 
 @kernel(passed=True)
-def learned_noise(settings: Vector, memory: Vector, shared: Vector, prediction: Prediction) -> float:
+def learned_noise(
+    settings: Vector, memory: Vector, common: Vector, readings: Readings, k: int, prediction: Prediction
+) -> float:
     """The rule of `LearnedNoise`: scale the noise by the network, and report the weight."""
-    return set_by_network(settings, memory, shared, prediction)
+    return set_by_network(settings, memory, common, readings, k, prediction)
 
 
 def shipped() -> Path:
@@ -141,20 +148,21 @@ class LearnedNoise(NoiseAdaptation):
         """Whether the network has learned from this kind of instrument."""
         return kind in self.network.kinds
 
-    def settings_of(self, longer: float) -> list[float]:
+    def settings_of(self, longer: float) -> Array:
         """As `NoiseAdaptation.settings_of`; `reset` fills in the group."""
-        return [0.0, self.highest**-2, float(self._units), *self._weights.tolist()]
+        return np.concatenate([filled(SETTINGS, least=self.highest**-2, units=self._units), self._weights])
 
     def begun(self, longer: float, m: int) -> Array:
         """As `NoiseAdaptation.begun`."""
-        memory = np.zeros(HIDDEN + self._units)
-        memory[HEARD] = np.nan
-        return memory
+        return np.concatenate([filled(MEMORY, heard=np.nan), np.zeros(self._units)])
+
+    def begun_together(self) -> Array:
+        """As `NoiseAdaptation.begun_together`."""
+        return filled(TOGETHER, size=_TYPICAL, time=np.nan)
 
     def reset(self, instruments: Instruments) -> None:
         """Begin a run."""
         super().reset(instruments)
         roles = [KINDS[sheet.kind].role for sheet in instruments.values()]
-        self.rule_settings[:, GROUP] = [_GROUPS.get(role, GROUPS - 1) for role in roles]
-        self.rule_shared = np.full(OWN + 2 * GROUPS, np.nan)
-        self.rule_shared[OWN::2] = _TYPICAL
+        for settings, role in zip(self.rule_settings, roles, strict=True):
+            settings[:_WEIGHTS].view(SETTINGS)[0].group = _GROUPS.get(role, GROUPS - 1)

@@ -108,6 +108,7 @@ class NoiseAdaptation(Adaptation):
         begun = [self.begun(longer, len(self._labels[name])) for name, longer in self.longer.items()]
         self.rule_first = np.cumsum([0, *map(len, begun)])
         self.rule_memory = np.concatenate([*begun, np.empty(0)])
+        self.rule_common = self.begun_together()
         self._choice: Choice | None = None
         self._reading = room_for(1)
 
@@ -122,6 +123,10 @@ class NoiseAdaptation(Adaptation):
 
     def begun(self, longer: float, m: int) -> Array:
         """What the rule keeps of an instrument of m components, at the start of a run."""
+        return np.empty(0)
+
+    def begun_together(self) -> Array:
+        """What the rule keeps of all instruments together, at the start of a run."""
         return np.empty(0)
 
     def memory_of(self, name: str) -> tuple[Array, Array]:
@@ -142,7 +147,7 @@ class NoiseAdaptation(Adaptation):
             index=np.array([self.index[name] for name in names], dtype=np.int64),
             in_scope=np.array([self.in_scope(sheet.kind) for sheet in sheets], dtype=np.bool_),
             last=np.zeros((len(names), 9)), settings=self.rule_settings.reshape(len(self.index), -1),
-            memories=self.rule_memory, first=self.rule_first, before=np.full(1, np.nan),
+            memories=self.rule_memory, first=self.rule_first, common=self.rule_common,
             tested=self.prediction.tested(size),
         )  # fmt: skip
 
@@ -165,7 +170,9 @@ class NoiseAdaptation(Adaptation):
         self.noted(m.instrument, reading.sigma[0].tolist(), float(reading.reported[0]))
         return prediction.noise
 
-    def _ask(self, settings: Array, memory: Array, readings: Readings, k: int, prediction: Prediction) -> float:
+    def _ask(
+        self, settings: Array, memory: Array, common: Array, readings: Readings, k: int, prediction: Prediction
+    ) -> float:
         """The rule of an adaptation that chooses in Python."""
         chosen = self.choose(self._innovation)
         readings.inflation[k], readings.rejected[k] = self.inflation, chosen is None
@@ -177,7 +184,7 @@ class NoiseAdaptation(Adaptation):
         """What a kernel of a rule returns for a measurement; it overwrites the noise."""
         m, residual, predicted, nominal, *_ = innovation
         prediction = Prediction(residual, _NO_CROSS, predicted, nominal, noise)
-        return rule(*self.memory_of(m.instrument), self._reading, 0, prediction)
+        return rule(*self.memory_of(m.instrument), self.rule_common, self._reading, 0, prediction)
 
     def choose(self, innovation: Innovation) -> Array | None:
         """The (m, m) noise to use, or None to reject the measurement; for an adaptation without a rule."""

@@ -73,7 +73,9 @@ HUBER, IGG3 = structure(k=float, smallest=float), structure(k0=float, k1=float, 
 
 
 @kernel(passed=True)
-def huber_noise(settings: Vector, memory: Vector, readings: Readings, k: int, prediction: Prediction) -> float:
+def huber_noise(
+    settings: Vector, memory: Vector, common: Vector, readings: Readings, k: int, prediction: Prediction
+) -> float:
     """Divide the nominal noise by Huber's weights; the least."""
     own = settings.view(HUBER)[0]
     innovation, _, predicted, nominal, noise = prediction
@@ -82,7 +84,9 @@ def huber_noise(settings: Vector, memory: Vector, readings: Readings, k: int, pr
 
 
 @kernel(passed=True)
-def igg3_noise(settings: Vector, memory: Vector, readings: Readings, k: int, prediction: Prediction) -> float:
+def igg3_noise(
+    settings: Vector, memory: Vector, common: Vector, readings: Readings, k: int, prediction: Prediction
+) -> float:
     """Divide the nominal noise by IGG-III weights; the least."""
     own = settings.view(IGG3)[0]
     innovation, _, predicted, nominal, noise = prediction

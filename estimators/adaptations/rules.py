@@ -1,12 +1,13 @@
 """Rules: the functions by which adaptations choose the noise of a reading.
 
-A rule is called ``rule(settings, memory, readings, k, prediction)``. It receives its settings and its memory for an
-instrument, the readings of the step with the index k of this one, and a `Prediction`: the innovation, H P H' and the
-nominal R. It updates its memory, overwrites ``prediction.noise`` with the noise to be used, and returns a number to be
-reported, or 0. It may also set ``readings.rejected[k]``, and ``readings.inflation[k]``, the factor on P.
+A rule is called ``rule(settings, memory, common, readings, k, prediction)``. It receives its settings and its memory
+for an instrument, what it keeps of all instruments together, the readings of the step with the index k of this one, and
+a `Prediction`: the innovation, H P H' and the nominal R. It updates its memories, overwrites ``prediction.noise`` with
+the noise to be used, and returns a number to be reported, or 0. It may also set ``readings.rejected[k]``, and
+``readings.inflation[k]``, the factor on P.
 
-Settings and memory are structures (`simnav.structures`), so that a rule reads their numbers by name. A new rule is one
-such function, a kernel with ``passed=True`` or plain Python, in a class that says its settings and its memory
+Settings and memories are structures (`simnav.structures`), so that a rule reads their numbers by name. A new rule is
+one such function, a kernel with ``passed=True`` or plain Python, in a class that says its settings and its memory
 (`simnav.estimators.adaptations.noise.NoiseAdaptation`).
 """
 

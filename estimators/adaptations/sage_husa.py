@@ -23,7 +23,9 @@ MEMORY = structure(count=float, begun=int, estimate=9)
 
 
 @kernel(passed=True)
-def sage_husa_noise(settings: Vector, memory: Vector, readings: Readings, k: int, prediction: Prediction) -> float:
+def sage_husa_noise(
+    settings: Vector, memory: Vector, common: Vector, readings: Readings, k: int, prediction: Prediction
+) -> float:
     """Update the estimate by the recursion of `SageHusa`, and write it into ``noise`` within its bounds; 0."""
     innovation, _, predicted, nominal, noise = prediction
     own, kept = settings.view(SETTINGS)[0], memory.view(MEMORY)[0]

@@ -83,7 +83,9 @@ SETTINGS = structure(dof=float, iterations=int)
 
 
 @kernel(passed=True)
-def student_t_noise(settings: Vector, memory: Vector, readings: Readings, k: int, prediction: Prediction) -> float:
+def student_t_noise(
+    settings: Vector, memory: Vector, common: Vector, readings: Readings, k: int, prediction: Prediction
+) -> float:
     """Divide the nominal noise by `student_weight`, which is returned."""
     own = settings.view(SETTINGS)[0]
     innovation, _, predicted, nominal, noise = prediction

@@ -74,7 +74,7 @@ MEMORY = structure(shape=float, scales=3)
 
 @kernel(passed=True)
 def variational_bayes_noise(
-    settings: Vector, memory: Vector, readings: Readings, k: int, prediction: Prediction
+    settings: Vector, memory: Vector, common: Vector, readings: Readings, k: int, prediction: Prediction
 ) -> float:
     """Make one step of `VariationalBayes`, and write the noise of its last iteration into ``noise``; 0."""
     innovation, _, predicted, nominal, noise = prediction

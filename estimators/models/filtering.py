@@ -176,8 +176,6 @@ class Readings(Record):
         Roots of the variances that an adaptation chose; NaN where none was chosen.
     reported : (k,) array
         A further number that an adaptation reports, or 0.
-    elapsed : (k,) array
-        Time since the last reading, of any instrument, for which a rule was asked [s]; NaN before the first.
     inflation : (k,) array
         Factor by which the covariance of the prediction is inflated before the reading is used.
     rejected, wrong : (k,) array of bool
@@ -192,7 +190,6 @@ class Readings(Record):
     size: Vector
     sigma: Matrix
     reported: Vector
-    elapsed: Vector
     inflation: Vector
     rejected: FlagVector
     wrong: FlagVector
@@ -245,7 +242,7 @@ def room_for(count: int) -> Readings:
     return Readings(
         instrument=np.zeros(count, whole), components=np.zeros(count, whole), time=np.zeros(count),
         value=np.zeros((count, 3)), nis=np.zeros(count), size=np.zeros(count),
-        sigma=np.zeros((count, 3)), reported=np.zeros(count), elapsed=np.zeros(count), inflation=np.ones(count),
+        sigma=np.zeros((count, 3)), reported=np.zeros(count), inflation=np.ones(count),
         rejected=np.zeros(count, np.bool_), wrong=np.zeros(count, np.bool_),
     )  # fmt: skip
 

@@ -121,7 +121,7 @@ class ImmEstimator(KalmanEstimator):
             last=np.zeros((i, 9)),
             settings=np.tile([*self._variances, *self.transition.ravel()], (len(instruments), 1)),
             memories=probability.ravel(), first=np.arange(0, probability.size + 1, len(self._variances)),
-            before=np.full(1, np.nan), tested=PredictionTest(instruments).tested(self.model.size),
+            common=np.empty(0), tested=PredictionTest(instruments).tested(self.model.size),
         )  # fmt: skip
 
     def correct(self, dynamics: Dynamics, choice: Choice, readings: Readings, k: int, prediction: Prediction) -> float:

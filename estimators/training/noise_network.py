@@ -28,17 +28,17 @@ import numpy as np
 from simnav.compiled import kernel
 from simnav.estimators.adaptations.learned_noise import (
     HIDDEN,
-    LEAST,
-    NOTED,
+    MEMORY,
     NUMBER_OF_INPUTS,
     RECIPE,
-    UNITS,
+    SETTINGS,
     VERSION,
     LearnedNoise,
     set_by_network,
 )
-from simnav.estimators.adaptations.rules import TIME, copied
+from simnav.estimators.adaptations.rules import copied
 from simnav.estimators.models.filtering import Prediction
+from simnav.estimators.models.filtering import Readings as ReadingsOfStep
 from simnav.estimators.models.suitable import Suitable
 from simnav.estimators.networks.file import Network
 from simnav.estimators.networks.recurrent import shapes
@@ -46,6 +46,7 @@ from simnav.estimators.solvers.iterated import poor_heading
 from simnav.estimators.solvers.kalman import KalmanEstimator
 from simnav.kernel_types import Vector
 from simnav.recording import Recording
+from simnav.structures import filled, length, structure
 from simnav.types import Array, Instruments
 
 from .information import information
@@ -93,35 +94,35 @@ class Fitted:
     seconds: float
 
 
-#: Places in a row of the table of an instrument: time and target of a reading, whether it was noted, and its inputs.
-_TIME, _TARGET, _NOTED, _INPUTS = range(4)
-_WIDTH = _INPUTS + NUMBER_OF_INPUTS
+#: A row of the table of an instrument: time and target of a reading, whether it was noted, and its inputs.
+ROW = structure(time=float, target=float, noted=int, inputs=NUMBER_OF_INPUTS)
+#: Before the table: number of its rows that are past, and whether the target is used.
+TABLE = structure(past=int, leads=int)
+_WEIGHTS, _TABLE = length(SETTINGS), length(TABLE)
 
 
 @kernel(passed=True)
-def noted_noise(settings: Vector, memory: Vector, shared: Vector, prediction: Prediction) -> float:
-    """Note the inputs of the network in the table behind its memory, and use the noise of the datasheet or the target.
-
-    Before the table are the number of its rows that are past, and whether the target is used.
-    """
-    asked = set_by_network(settings, memory, shared, prediction)
+def noted_noise(
+    settings: Vector, memory: Vector, common: Vector, readings: ReadingsOfStep, k: int, prediction: Prediction
+) -> float:
+    """Note the inputs in the table behind the memory of the network; use the noise of the datasheet or the target."""
+    asked = set_by_network(settings, memory, common, readings, k, prediction)
     copied(prediction.nominal, prediction.noise)
-    past = HIDDEN + int(settings[UNITS])
-    leads, table = memory[past + 1], memory[past + 2 :]
-    k, count = int(memory[past]), table.size // _WIDTH
-    while k < count and table[k * _WIDTH + _TIME] < shared[TIME] - 1e-9:
-        k += 1
-    memory[past] = float(k)
-    if k == count or asked == 0.0:
+    own = settings[:_WEIGHTS].view(SETTINGS)[0]
+    begin = HIDDEN + own.units
+    table, rows = memory[begin : begin + _TABLE].view(TABLE)[0], memory[begin + _TABLE :].view(ROW)
+    while table.past < rows.size and rows[table.past].time < readings.time[k] - 1e-9:
+        table.past += 1
+    if table.past == rows.size or asked == 0.0:
         return 0.0
-    row = table[k * _WIDTH : (k + 1) * _WIDTH]
-    row[_NOTED] = 1.0
+    row, inputs = rows[table.past], memory[:HIDDEN].view(MEMORY)[0].inputs
+    row.noted = 1
     for i in range(NUMBER_OF_INPUTS):
-        row[_INPUTS + i] = memory[NOTED + i]
-    if leads > 0.0:
+        row.inputs[i] = inputs[i]
+    if table.leads:
         for i in range(prediction.noise.shape[0]):
             for j in range(prediction.noise.shape[0]):
-                prediction.noise[i, j] /= max(row[_TARGET], settings[LEAST])
+                prediction.noise[i, j] /= max(row.target, own.least)
     return 0.0
 
 
@@ -151,9 +152,10 @@ class _Noting(LearnedNoise):
         parts = []
         for name in self.index:
             stream = self._recording.data.aids[name]
-            table = np.zeros((len(stream), _WIDTH))
-            table[:, _TIME], table[:, _TARGET] = stream.time, information(self._recording, stream)
-            parts.append(np.concatenate([self.memory_of(name)[1], [0.0, float(self._leads)], table.ravel()]))
+            rows = np.zeros(len(stream), ROW)
+            rows["time"], rows["target"] = stream.time, information(self._recording, stream)
+            table = filled(TABLE, leads=self._leads)
+            parts.append(np.concatenate([self.memory_of(name)[1], table, rows.view(np.float64)]))
         self.rule_memory, self.rule_first = np.concatenate(parts), np.cumsum([0, *map(len, parts)])
 
     def noted(self, *told: Any) -> None:  # nothing is reported
@@ -161,9 +163,10 @@ class _Noting(LearnedNoise):
 
     def sequence(self, name: str) -> Readings:
         """What was noted of an instrument."""
-        table = self.memory_of(name)[1][HIDDEN + self._units + 2 :].reshape(-1, _WIDTH)
-        rows = table[table[:, _NOTED] > 0.0].astype(np.float32)
-        return Readings(self.instruments[name].kind, rows[:, _INPUTS:], rows[:, _TARGET])
+        rows = self.memory_of(name)[1][HIDDEN + self._units + _TABLE :].view(ROW)
+        rows = rows[rows["noted"] > 0]
+        kind = self.instruments[name].kind
+        return Readings(kind, rows["inputs"].astype(np.float32), rows["target"].astype(np.float32))
 
 
 def gather(recordings: Iterable[Recording]) -> list[list[Readings]]:

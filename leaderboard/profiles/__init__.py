@@ -40,6 +40,7 @@ KEYS: Mapping[str, str] = {
     "scenarios": "names of scenarios; this or `tracks`",
     "tracks": "names of tracks, which stand for their scenarios",
     "estimators": "names of estimators, or the name of a group; default: all that are not slow",
+    "without": "names of estimators that are left out",
     "runs": "required: seeds of each scenario, from 0 on",
     "more": "true: rows that may be the best of a kind of trouble or of the track have more seeds; `runs` is then 30",
     "shortest_s": "with `tracks`: only scenarios that take longer than this",
@@ -151,7 +152,9 @@ def _part(where: str, table: dict[str, Any], groups: dict[str, list[str]]) -> Pa
             raise RequestError(f"{where}: there is no group {asked!r} of estimators{closest(asked, list(groups))}")
         table = table | {"estimators": groups[asked]}
     everyone = tuple(n for n in names() if not describe(n).slow)
-    return Part(scenarios, _texts(where, table, "estimators") if "estimators" in table else everyone, runs, more)
+    rows = _texts(where, table, "estimators") if "estimators" in table else everyone
+    left_out = _texts(where, table, "without") if "without" in table else ()
+    return Part(scenarios, tuple(n for n in rows if n not in left_out), runs, more)
 
 
 def _seconds(where: str, table: dict[str, Any], key: str, default: float) -> float:

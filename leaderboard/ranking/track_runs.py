@@ -79,13 +79,13 @@ def runs_of_tracks(
         If an estimator has two results for one run.
     """
     runs = group(results)
-    found = list(_ordinary(runs, score, tracks))
+    found = list(_ordinary(runs, score, tracks, staged))
     yield from found
     yield from _learned(found)
 
 
 def _ordinary(
-    runs: Mapping[str, Mapping[str, Runs]], score: str | None, tracks: Mapping[str, str] | None
+    runs: Mapping[str, Mapping[str, Runs]], score: str | None, tracks: Mapping[str, str] | None, staged: bool
 ) -> Iterator[TrackRuns]:
     """The runs of the tracks that scenarios name, and of post-processing."""
     headers = catalogued()  # what a scenario is, it says, and not what results say

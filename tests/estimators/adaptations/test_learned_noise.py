@@ -16,7 +16,7 @@ from simnav.estimators.adaptations.learned_noise import (
     LearnedNoise,
     set_by_network,
 )
-from simnav.estimators.models.filtering import Prediction
+from simnav.estimators.models.filtering import Prediction, room_for
 from simnav.estimators.networks.file import Network, NetworkError
 from simnav.estimators.networks.recurrent import shapes
 from simnav.estimators.training.voyages import streams_of
@@ -63,12 +63,13 @@ def test_an_innovation_that_says_nothing_is_not_asked_about(tmp_path):
     learned = LearnedNoise(constant(tmp_path / "n.npz", 0.25, ("gnss_position",)))
     learned.reset(recording().instruments)
     settings, memory = learned.memory_of("gnss")
-    learned.rule_shared[0] = 1.0
+    readings = room_for(1)
+    readings.time[0] = 1.0
     before, eye = memory.copy(), np.eye(2)
 
     def asked(innovation, predicted):
         prediction = Prediction(np.array(innovation), np.empty((0, 0)), predicted, eye, np.empty((2, 2)))
-        return set_by_network(settings, memory, learned.rule_shared, prediction), prediction.noise
+        return set_by_network(settings, memory, learned.rule_common, readings, 0, prediction), prediction.noise
 
     for innovation, predicted in (([np.nan, 0.0], eye), ([1e9, 0.0], eye), ([1.0, 0.0], -0.5 * eye)):
         weight, noise = asked(innovation, predicted)
