@@ -47,7 +47,7 @@ class MidValue(
     isolation=FaultIsolation,
     iteration=poor_heading,
 ):
-    version = 3
+    version = 4
     def __init__(
         self,
         *,

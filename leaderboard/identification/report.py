@@ -199,7 +199,7 @@ class _Used:
 
 def _used(scenario: Scenario, predictions: Predictions, fitted: Fitted, changes: dict[str, dict[str, Any]]) -> _Used:
     """The figures with which positions after a time without fixes are the most likely: all, or without some of them."""
-    tries: list[Any] = []
+    tries: list[_Used] = []
     for left_out, some in (
         ("", changes),
         ("lever arms and delays", without(changes, PLACES)),
@@ -215,7 +215,7 @@ def _used(scenario: Scenario, predictions: Predictions, fitted: Fitted, changes:
         for path, figures in enlarged(scenario, last.instruments, names).items():
             found.setdefault(path, {}).update(figures)
         tries.append(_Used(found, left_out, names, last, predictions.judged(last)))
-    best = max(tries, key=lambda t: t.judged.log_likelihood)
+    best: _Used = max(tries, key=lambda t: t.judged.log_likelihood)
     return best if best.judged.log_likelihood > tries[0].judged.log_likelihood + _BETTER else tries[0]
 
 
