@@ -18,16 +18,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from simnav.geometry.rotation import (
-    dcm_from_quaternion,
-    dcm_from_rpy,
-    quaternion_from_dcm,
-    rpy_from_dcm,
-    wrap_angle,
-)
+from simnav.geometry.rotation import dcm_from_rpy, wrap_angle
 from simnav.kinds import BODY_VELOCITY, HEADING, VELOCITY
+from simnav.log.attitude_readings import of_attitude
 from simnav.log.channel import Series, read_channel, skip_of
 from simnav.log.comparisons import COURSE_FROM, Inertial, Streams, comparisons
+from simnav.log.hypotheses import FLIPS, Reading, flip, shown, with_series
 from simnav.log.imu_series import read_imu
 from simnav.log.likelihood import Fit, fit, log_ratios
 from simnav.log.units import DIMENSIONS, factor
@@ -52,17 +48,13 @@ _DELAYS = np.arange(0.5, 5.01, 0.5)
 _SAME = 1.0
 #: Mistakes that are looked for, one after the other.
 _ROUNDS = 4
-_FLIPS = (1.0, -1.0)
 #: The mean specific force of a vessel points up by at least this [m/s^2].
 _UPRIGHT = 4.0
-#: From axes forward, left, up to forward, starboard, down; from east, north, up to north, east, down, and back.
-_LEFT = np.array([1.0, -1.0, -1.0])
-_EAST = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
 #: The 48 matrices that permute axes and change signs.
 _AXES = tuple(
     np.eye(3)[list(order)] * np.array(signs)[:, None]
     for order in itertools.permutations(range(3))
-    for signs in itertools.product(_FLIPS, repeat=3)
+    for signs in itertools.product(FLIPS, repeat=3)
 )
 
 
@@ -110,23 +102,6 @@ class ProbableReading:
             f"{self.what}: the other streams say so with probability {self.shown}{alike}; "
             f"as it is read now it has {self.present:.1g}; {right}"
         )
-
-
-@dataclass(frozen=True, eq=False)
-class _Reading:
-    """A hypothesis: the streams read so, the streams that it alters, how many changes it is, and what to write.
-
-    With nothing to write, the stream is no such instrument. Comparisons with the stream ``apart`` say nothing of it.
-    """
-
-    stream: str
-    parts: tuple[str, ...]
-    alter: Callable[[Streams], Streams]
-    number: float
-    what: str
-    changes: tuple[tuple[str, str, Any], ...]
-    delay: float = 0.0
-    apart: str = ""
 
 
 def probable_readings(scenario: Scenario, recording: str) -> list[ProbableReading]:
@@ -197,7 +172,7 @@ def _read(scenario: Scenario, log: RecordedSpec, recording: str, unfit: Collecti
                    begin + skip_of(log, recording))  # fmt: skip
 
 
-def _best(log: RecordedSpec, streams: Streams) -> tuple[_Reading, ProbableReading] | None:
+def _best(log: RecordedSpec, streams: Streams) -> tuple[Reading, ProbableReading] | None:
     """The reading that is most likely by far, if there is one."""
     compared = comparisons(streams)
     present: dict[tuple[str, ...], Fit] = {}
@@ -205,7 +180,7 @@ def _best(log: RecordedSpec, streams: Streams) -> tuple[_Reading, ProbableReadin
         residual = compare(streams)
         if residual is not None:
             present[parts] = fit(residual)
-    readings: dict[str, list[tuple[_Reading, float, bool]]] = {}
+    readings: dict[str, list[tuple[Reading, float, bool]]] = {}
     for reading in _readings(log, streams):
         involved = [p for p in present if set(p) & set(reading.parts) and reading.apart not in p]
         if not involved:
@@ -222,7 +197,7 @@ def _best(log: RecordedSpec, streams: Streams) -> tuple[_Reading, ProbableReadin
             before, after = (f.mean_square + 0.1 * f.size**2 for f in (present[parts], fitted))
             left += float(np.sum(np.log(after / before)[np.abs(each) > _TELLING]))
         readings.setdefault(reading.stream, []).append((reading, ratio, left < np.log(_PART)))
-    likeliest: tuple[_Reading, ProbableReading] | None = None
+    likeliest: tuple[Reading, ProbableReading] | None = None
     for stream, tried in readings.items():
         told = _told(stream, tried)
         if told is not None and (likeliest is None or told[1].log_ratio > likeliest[1].log_ratio + _SAME):
@@ -230,7 +205,7 @@ def _best(log: RecordedSpec, streams: Streams) -> tuple[_Reading, ProbableReadin
     return likeliest
 
 
-def _told(stream: str, tried: list[tuple[_Reading, float, bool]]) -> tuple[_Reading, ProbableReading] | None:
+def _told(stream: str, tried: list[tuple[Reading, float, bool]]) -> tuple[Reading, ProbableReading] | None:
     """The likeliest reading of one stream, with its probability, if it is far more likely than the present one."""
     ratios = np.array([ratio for _, ratio, _ in tried])
     top = float(ratios.max())
@@ -251,7 +226,7 @@ def _told(stream: str, tried: list[tuple[_Reading, float, bool]]) -> tuple[_Read
                                     max(0, len(others) - 1))  # fmt: skip
 
 
-def _readings(log: RecordedSpec, s: Streams) -> Iterator[_Reading]:
+def _readings(log: RecordedSpec, s: Streams) -> Iterator[Reading]:
     """All hypotheses about all streams."""
     if s.imu is not None and log.imu is not None:
         yield from _of_imu(log, s)
@@ -273,8 +248,7 @@ def _readings(log: RecordedSpec, s: Streams) -> Iterator[_Reading]:
     if s.velocity is not None and log.reference.velocity is not None and log.reference.velocity.columns:
         yield from _of_vector("reference.velocity", "log.reference.velocity", log.reference.velocity, s.velocity, False)
     if s.attitude is not None and log.reference.attitude is not None and log.reference.attitude.columns:
-        of = _of_quaternion if len(log.reference.attitude.columns) == 4 else _of_attitude
-        yield from of(log.reference.attitude, s.attitude)
+        yield from of_attitude(log.reference.attitude, s.attitude)
     yield from _reference_late(log, s)
 
 
@@ -283,25 +257,13 @@ def _changed(matrix: Array) -> int:
     return int(np.sum(np.diag(matrix) != 1.0)) + int(np.linalg.det(matrix) < 0.0)
 
 
-def _flip(column: int | str) -> int | str:
-    if isinstance(column, int):
-        return -column
-    if column.startswith("="):
-        return f"={-float(column[1:]):g}" if column != "=nan" else column
-    return column[1:] if column.startswith("-") else f"-{column}"
-
-
 def _columns(columns: tuple[int | str, ...], matrix: Array) -> list[int | str]:
     """The columns of a stream whose values are turned by a matrix of signs and orders."""
     order = np.argmax(np.abs(matrix), axis=1)
-    return [columns[j] if matrix[i, j] > 0.0 else _flip(columns[j]) for i, j in enumerate(order)]
+    return [columns[j] if matrix[i, j] > 0.0 else flip(columns[j]) for i, j in enumerate(order)]
 
 
-def _shown(columns: list[int | str]) -> str:
-    return ", ".join(map(str, columns))
-
-
-def _of_imu(log: RecordedSpec, s: Streams) -> Iterator[_Reading]:
+def _of_imu(log: RecordedSpec, s: Streams) -> Iterator[Reading]:
     """Axes and signs of gyroscopes and accelerometers, each alone and together; units of the gyroscopes; delay."""
     imu = log.imu
     assert imu is not None
@@ -326,27 +288,27 @@ def _of_imu(log: RecordedSpec, s: Streams) -> Iterator[_Reading]:
             new = _columns(rates, matrix)
             changes: list[tuple[str, str, Any]] = [("log.imu", "angular_rate", new)] if _changed(matrix) else []
             changes += [("log.imu", "angular_rate_unit", unit)] if unit else []
-            what = f"the gyroscopes' forward, starboard, down are {_shown(new)}" + (f" in {unit}" if unit else "")
-            yield _Reading("gyroscope", ("gyroscope",), read(gyroscope=times * matrix), number, what, tuple(changes))
+            what = f"the gyroscopes' forward, starboard, down are {shown(new)}" + (f" in {unit}" if unit else "")
+            yield Reading("gyroscope", ("gyroscope",), read(gyroscope=times * matrix), number, what, tuple(changes))
         if not _changed(matrix):
             continue
         if (mounting @ matrix @ mounting.T @ pull)[2] > -_UPRIGHT:  # a vessel does not lie on its side
             continue
         new = _columns(forces, matrix)
-        yield _Reading("accelerometer", ("accelerometer",), read(accelerometer=matrix), _changed(matrix),
-                       f"the accelerometers' forward, starboard, down are {_shown(new)}",
+        yield Reading("accelerometer", ("accelerometer",), read(accelerometer=matrix), _changed(matrix),
+                       f"the accelerometers' forward, starboard, down are {shown(new)}",
                        (("log.imu", "specific_force", new),))  # fmt: skip
         both = _columns(rates, matrix), new
         changes = [("log.imu", "angular_rate", both[0]), ("log.imu", "specific_force", both[1])]
-        yield _Reading("imu", ("gyroscope", "accelerometer"), read(gyroscope=matrix, accelerometer=matrix),
-                       _changed(matrix) + 0.5, f"the IMU's forward, starboard, down are {_shown(both[0])} and "
-                       f"{_shown(both[1])}", tuple(changes))  # fmt: skip
+        yield Reading("imu", ("gyroscope", "accelerometer"), read(gyroscope=matrix, accelerometer=matrix),
+                       _changed(matrix) + 0.5, f"the IMU's forward, starboard, down are {shown(both[0])} and "
+                       f"{shown(both[1])}", tuple(changes))  # fmt: skip
     channels = [*log.instruments.values(), log.reference.position, log.reference.velocity, log.reference.attitude]
     shared = any(c is not None and c.file == imu.file for c in channels)
     file = log.files[imu.file]
     if imu.specific_force_file is None and not shared and not isinstance(file.offset, tuple):
         for by in _both_ways():
-            yield _Reading(
+            yield Reading(
                 "imu", ("gyroscope", "accelerometer"),
                 lambda t, by=by: t.altered(imu=None if t.imu is None else t.imu.altered(delay=by)),  # type: ignore[misc]
                 1.0, f"the IMU is {_late_by(by)}", ((f"log.files.{imu.file}", "offset_s", _rounded(file.offset - by)),),
@@ -355,7 +317,7 @@ def _of_imu(log: RecordedSpec, s: Streams) -> Iterator[_Reading]:
 
 
 def _both_ways() -> list[float]:
-    return [float(sign * d) for d in _DELAYS for sign in _FLIPS]
+    return [float(sign * d) for d in _DELAYS for sign in FLIPS]
 
 
 def _late_by(by: float) -> str:
@@ -366,23 +328,13 @@ def _rounded(value: float) -> float:
     return float(f"{value:.9g}") if abs(value) < 1e6 else round(value, 3)
 
 
-def _late(name: str, table: str, offset: float, series: Series) -> Iterator[_Reading]:
+def _late(name: str, table: str, offset: float, series: Series) -> Iterator[Reading]:
     for by in _both_ways():
-        yield _Reading(name, (name,), _with_series(name, time=series.time - by), 1.0, f"{name!r} is {_late_by(by)}",
+        yield Reading(name, (name,), with_series(name, time=series.time - by), 1.0, f"{name!r} is {_late_by(by)}",
                        ((table, "offset_s", _rounded(offset - by)),), by)  # fmt: skip
 
 
-def _with_series(name: str, **changes: Array) -> Callable[[Streams], Streams]:
-    """The streams with another series of an instrument, or of a part of the reference."""
-
-    def alter(t: Streams) -> Streams:
-        part = name.removeprefix("reference.")
-        return t.with_instrument(name, **changes) if part == name else t.with_reference(part, **changes)
-
-    return alter
-
-
-def _reference_late(log: RecordedSpec, s: Streams) -> Iterator[_Reading]:
+def _reference_late(log: RecordedSpec, s: Streams) -> Iterator[Reading]:
     parts = [n for n in ("position", "velocity", "attitude") if getattr(log.reference, n) is not None]
     if s.imu is None and not s.instruments:
         return
@@ -390,7 +342,7 @@ def _reference_late(log: RecordedSpec, s: Streams) -> Iterator[_Reading]:
         changes = tuple(
             (f"log.reference.{n}", "offset_s", _rounded(getattr(log.reference, n).offset - by)) for n in parts
         )
-        yield _Reading("reference", tuple(f"reference.{n}" for n in parts),
+        yield Reading("reference", tuple(f"reference.{n}" for n in parts),
                        lambda t, by=by: t.altered(late=by), 1.5, f"the reference is {_late_by(by)}",  # type: ignore[misc]
                        changes, by)  # fmt: skip
 
@@ -402,7 +354,7 @@ def _units_of(channel: ChannelSpec | LogInstrumentSpec, count: int) -> tuple[str
 
 def _of_vector(
     name: str, table: str, channel: ChannelSpec | LogInstrumentSpec, series: Series, body: bool,
-) -> Iterator[_Reading]:  # fmt: skip
+) -> Iterator[Reading]:  # fmt: skip
     """Axes, signs and units of three components."""
     mounting = dcm_from_rpy(np.asarray(channel.mounting)) if body else np.eye(3)
     units = _units_of(channel, 3)
@@ -429,15 +381,15 @@ def _of_vector(
                 changes.append((table, "units", unit))
             elif len(set(units)) > 1:
                 changes.append((table, "units", [units[j] for j in np.argmax(np.abs(matrix), axis=1)]))
-            what = f"{name!r} has {names} in {_shown(new)}" + (f", in {unit}" if unit else "")
-            yield _Reading(name, (name,), _with_series(name, value=times * value), number, what,
+            what = f"{name!r} has {names} in {shown(new)}" + (f", in {unit}" if unit else "")
+            yield Reading(name, (name,), with_series(name, value=times * value), number, what,
                            tuple(changes))  # fmt: skip
 
 
-def _of_heading(name: str, table: str, where: LogInstrumentSpec, series: Series) -> Iterator[_Reading]:
+def _of_heading(name: str, table: str, where: LogInstrumentSpec, series: Series) -> Iterator[Reading]:
     """Sign and zero of a heading: clockwise from north, or anticlockwise from east; mounted backwards or across."""
     column, mounted = where.columns[0], float(np.round(np.degrees(where.mounting[2]), 6))
-    for sign in _FLIPS:
+    for sign in FLIPS:
         for yaw in (0.0, 90.0, 180.0, -90.0):
             if sign > 0.0 and yaw == 0.0:
                 continue
@@ -446,7 +398,7 @@ def _of_heading(name: str, table: str, where: LogInstrumentSpec, series: Series)
             if frame:
                 changes = [(table, "frame", "geodetic" if where.frame == "enu" else "enu")]
             else:
-                changes += [(table, "columns", [_flip(column)])] if sign < 0.0 else []
+                changes += [(table, "columns", [flip(column)])] if sign < 0.0 else []
                 changes += [(table, "mounting_deg", [0.0, 0.0, mounted - yaw])] if yaw else []
             if not frame and where.frame == "enu":
                 continue
@@ -454,17 +406,17 @@ def _of_heading(name: str, table: str, where: LogInstrumentSpec, series: Series)
             other = "north, clockwise" if where.frame == "enu" else "east, anticlockwise"
             what = f"{'minus ' if sign < 0.0 else ''}{column}" + (f" and {yaw:g} deg" if yaw else "")
             what = f"the heading of {name!r} is " + (f"counted from {other}" if frame else what)
-            yield _Reading(name, (name,), _with_series(name, value=value),
+            yield Reading(name, (name,), with_series(name, value=value),
                            float(len(changes)), what, tuple(changes))  # fmt: skip
     unit = _units_of(where, 1)[0]
     if unit in ("deg", "rad", "1"):
         new = "rad" if unit == "deg" else "deg"
         value = wrap_angle(series.value * factor(new) / factor(unit))
-        yield _Reading(name, (name,), _with_series(name, value=value), 1.0,
+        yield Reading(name, (name,), with_series(name, value=value), 1.0,
                        f"the heading of {name!r} is in {new}", ((table, "units", new),))  # fmt: skip
 
 
-def _as_course(name: str, series: Series, s: Streams) -> Iterator[_Reading]:
+def _as_course(name: str, series: Series, s: Streams) -> Iterator[Reading]:
     """The course over the ground in place of a heading: they part by leeway and current."""
     if s.attitude is None:
         return
@@ -473,27 +425,27 @@ def _as_course(name: str, series: Series, s: Streams) -> Iterator[_Reading]:
     apart = wrap_angle(s.attitudes(series.time)[:, 2] - np.arctan2(way[:, 1], way[:, 0]))
     value = wrap_angle(series.value + np.where(moving & np.isfinite(apart), apart, 0.0)[:, None])
     what = f"{name!r} is the course over the ground, and no heading"
-    yield _Reading(name, (name,), _with_series(name, value=value), 1.0, what, (), apart="reference.position")
+    yield Reading(name, (name,), with_series(name, value=value), 1.0, what, (), apart="reference.position")
 
 
-def _of_scalar(name: str, table: str, where: LogInstrumentSpec, series: Series) -> Iterator[_Reading]:
+def _of_scalar(name: str, table: str, where: LogInstrumentSpec, series: Series) -> Iterator[Reading]:
     """Sign and unit of a speed or a depth."""
     present = _units_of(where, 1)[0]
     units = next((g for g in (("m_s", "kn", "km_h", "cm_s", "mm_s"), ("m", "ft", "cm", "km")) if present in g), ())
-    for sign in _FLIPS:
+    for sign in FLIPS:
         for unit in (present, *(u for u in units if u != present)):
             if sign > 0.0 and unit == present:
                 continue
-            changes: list[tuple[str, str, Any]] = [(table, "columns", [_flip(where.columns[0])])] if sign < 0.0 else []
+            changes: list[tuple[str, str, Any]] = [(table, "columns", [flip(where.columns[0])])] if sign < 0.0 else []
             changes += [(table, "units", unit)] if unit != present else []
             value = sign * series.value * factor(unit) / factor(present)
             text = f"{name!r} is {'minus ' if sign < 0.0 else ''}{where.columns[0]}"
             text += f" in {unit}" if unit != present else ""
-            yield _Reading(name, (name,), _with_series(name, value=value),
+            yield Reading(name, (name,), with_series(name, value=value),
                            float(len(changes)), text, tuple(changes))  # fmt: skip
 
 
-def _of_positions(log: RecordedSpec, s: Streams) -> Iterator[_Reading]:
+def _of_positions(log: RecordedSpec, s: Streams) -> Iterator[Reading]:
     """Latitude and longitude exchanged or with another sign: of the reference, of each fix, and of all of one file."""
     fixes = [n for n, (kind, _, _) in s.instruments.items() if KINDS[kind].geodetic and log.instruments[n].columns]
     channels: dict[str, Any] = {n: log.instruments[n] for n in fixes}
@@ -518,7 +470,7 @@ def _of_positions(log: RecordedSpec, s: Streams) -> Iterator[_Reading]:
         return new
 
     for group in groups:
-        for swap, north, east in itertools.product((False, True), _FLIPS, _FLIPS):
+        for swap, north, east in itertools.product((False, True), FLIPS, FLIPS):
             if not swap and north > 0.0 and east > 0.0:
                 continue
             ways: dict[str, Array] = {}
@@ -532,8 +484,8 @@ def _of_positions(log: RecordedSpec, s: Streams) -> Iterator[_Reading]:
                 first, second = channel.columns[a], channel.columns[b]
                 columns = list(channel.columns)
                 columns[a], columns[b] = (second, first) if swap else (first, second)
-                columns[a] = columns[a] if north > 0.0 else _flip(columns[a])
-                columns[b] = columns[b] if east > 0.0 else _flip(columns[b])
+                columns[a] = columns[a] if north > 0.0 else flip(columns[a])
+                columns[b] = columns[b] if east > 0.0 else flip(columns[b])
                 table = f"log.{name}" if name == "reference.position" else f"log.instruments.{name}"
                 if channel.frame == "ned" and swap and north > 0.0 and east > 0.0:
                     ways[name][:, 2:] *= -1.0  # about the sea, near enough
@@ -546,7 +498,7 @@ def _of_positions(log: RecordedSpec, s: Streams) -> Iterator[_Reading]:
                 "latitude and longitude (north and east) are exchanged" if swap else "",
                 "north has the other sign" if north < 0.0 else "",
                 "east has the other sign" if east < 0.0 else ""]))  # fmt: skip
-            yield _Reading(
+            yield Reading(
                 group[0] if len(group) == 1 else "positions", group, _positions_as(ways),
                 0.9 * swap + (north < 0.0) + (east < 0.0) + 0.4 * (len(group) > 1), f"{' and '.join(group)}: {what}",
                 tuple(changes),
@@ -556,64 +508,10 @@ def _of_positions(log: RecordedSpec, s: Streams) -> Iterator[_Reading]:
 def _positions_as(ways: Mapping[str, Array]) -> Callable[[Streams], Streams]:
     def alter(t: Streams) -> Streams:
         for name, value in ways.items():
-            t = _with_series(name, value=value)(t)
+            t = with_series(name, value=value)(t)
         return t
 
     return alter
-
-
-def _of_attitude(channel: ChannelSpec, series: Series) -> Iterator[_Reading]:
-    """Signs of roll, pitch and yaw, roll for pitch, and yaw counted from east."""
-    table = "log.reference.attitude"
-    a, b, c = series.value.T
-    if channel.frame == "enu":
-        b, c = -b, 0.5 * np.pi - c
-    for swap, roll, pitch, yaw, east in itertools.product((False, True), _FLIPS, _FLIPS, _FLIPS, (False, True)):
-        columns = list(channel.columns)
-        columns[:2] = columns[1::-1] if swap else columns[:2]
-        columns = [n if sign > 0.0 else _flip(n) for n, sign in zip(columns, (roll, pitch, yaw), strict=True)]
-        other_frame = east != (channel.frame == "enu")
-        changes: list[tuple[str, str, Any]] = [(table, "columns", columns)] if columns != list(channel.columns) else []
-        changes += [(table, "frame", "enu" if east else "geodetic")] if other_frame else []
-        if not changes:
-            continue
-        x, y, z = roll * (b if swap else a), pitch * (a if swap else b), yaw * c
-        value = np.stack([x, -y if east else y, wrap_angle(0.5 * np.pi - z if east else z)], axis=-1)
-        number = 2.0 * swap + (roll < 0.0) + (pitch < 0.0) + (yaw < 0.0) + other_frame
-        what = f"roll, pitch, yaw of the reference are {_shown(columns)}" + (
-            f", of axes {'east, north, up' if east else 'north, east, down'}" if other_frame else "")  # fmt: skip
-        yield _Reading("reference.attitude", ("reference.attitude",),
-                       _with_series("reference.attitude", value=value), number, what,
-                       tuple(changes))  # fmt: skip
-
-
-def _of_quaternion(channel: ChannelSpec, series: Series) -> Iterator[_Reading]:
-    """Order of a quaternion (scalar first or last), its inverse (Hamilton, JPL), axes of the body and of the world."""
-    table, present = "log.reference.attitude", list(channel.columns)
-    dcm = dcm_from_rpy(series.value)
-    quaternion = quaternion_from_dcm(_EAST @ dcm * _LEFT if channel.frame == "enu" else dcm)
-    orders = ((0, 1, 2, 3), (3, 0, 1, 2), (1, 2, 3, 0))
-    flipped = (1, -1.0), (0, 1.0), (3, 1.0), (2, -1.0)  # turned by 180 deg about the forward axis of the body
-    for order, inverse, turned, east in itertools.product(orders, (False, True), (False, True), (False, True)):
-        other_frame = east != (channel.frame == "enu")
-        number = float((order != orders[0]) + inverse + 1.5 * turned + other_frame)
-        if not number:
-            continue
-        chosen = [(i, -1.0 if inverse and k else 1.0) for k, i in enumerate(order)]
-        if turned:
-            chosen = [(chosen[i][0], sign * chosen[i][1]) for i, sign in flipped]
-        scalar = chosen[0][1]  # minus a quaternion is the same turn
-        chosen = [(i, sign * scalar) for i, sign in chosen]
-        columns = [present[i] if sign > 0.0 else _flip(present[i]) for i, sign in chosen]
-        new = dcm_from_quaternion(np.stack([sign * quaternion[:, i] for i, sign in chosen], axis=-1))
-        value = rpy_from_dcm(_EAST @ new * _LEFT if east else new)
-        changes: list[tuple[str, str, Any]] = [(table, "columns", columns)] if columns != present else []
-        changes += [(table, "frame", "enu" if east else "geodetic")] if other_frame else []
-        axes = "forward, left, up in east, north, up" if east else "forward, starboard, down in north, east, down"
-        what = f"the quaternion of the reference (scalar, x, y, z) is {_shown(columns)}"
-        what += f", of axes {axes}" if other_frame else ""
-        yield _Reading("reference.attitude", ("reference.attitude",),
-                       _with_series("reference.attitude", value=value), number, what, tuple(changes))  # fmt: skip
 
 
 def _written(log: RecordedSpec, changes: tuple[tuple[str, str, Any], ...]) -> RecordedSpec:

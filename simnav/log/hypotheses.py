@@ -1,0 +1,54 @@
+"""A hypothesis about a stream of a log: read so, what it alters, and what to write (`simnav.log.readings`)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from simnav.log.comparisons import Streams
+from simnav.types import Array
+
+__all__ = ["FLIPS", "Reading", "flip", "shown", "with_series"]
+
+#: Signs that an axis may have.
+FLIPS = (1.0, -1.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Reading:
+    """A hypothesis: the streams read so, the streams that it alters, how many changes it is, and what to write.
+
+    With nothing to write, the stream is no such instrument. Comparisons with the stream ``apart`` say nothing of it.
+    """
+
+    stream: str
+    parts: tuple[str, ...]
+    alter: Callable[[Streams], Streams]
+    number: float
+    what: str
+    changes: tuple[tuple[str, str, Any], ...]
+    delay: float = 0.0
+    apart: str = ""
+
+
+def flip(column: int | str) -> int | str:
+    if isinstance(column, int):
+        return -column
+    if column.startswith("="):
+        return f"={-float(column[1:]):g}" if column != "=nan" else column
+    return column[1:] if column.startswith("-") else f"-{column}"
+
+
+def shown(columns: list[int | str]) -> str:
+    return ", ".join(map(str, columns))
+
+
+def with_series(name: str, **changes: Array) -> Callable[[Streams], Streams]:
+    """The streams with another series of an instrument, or of a part of the reference."""
+
+    def alter(t: Streams) -> Streams:
+        part = name.removeprefix("reference.")
+        return t.with_instrument(name, **changes) if part == name else t.with_reference(part, **changes)
+
+    return alter
