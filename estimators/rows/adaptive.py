@@ -27,11 +27,16 @@ __all__ += ["Imm", "Mckf", "Rae", "SageHusaKf", "SageHusaPaper", "VbAkf"]
 INNOVATIONS_AS_PRINTED = piece(
     InnovationBased,
     defaults={
-        "newest": True, "significance": 1.0, "lowest": 0.1, "highest": 100.0, "full": True, "scope": "fixes",
+        "newest": True,
+        "significance": 1.0,
+        "lowest": 0.1,
+        "highest": 100.0,
+        "full": True,
+        "scope": "fixes",
         "always": True,
     },
     source="innovation",
-)  # fmt: skip
+)
 #: `innovations` was the window of these rows, as a filter has no other.
 _FORMERLY = {"window": "innovations"}
 

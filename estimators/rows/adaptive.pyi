@@ -22,7 +22,12 @@ __all__ += ["Imm", "Mckf", "Rae", "SageHusaKf", "SageHusaPaper", "VbAkf"]
 INNOVATIONS_AS_PRINTED = piece(
     InnovationBased,
     defaults={
-        "newest": True, "significance": 1.0, "lowest": 0.1, "highest": 100.0, "full": True, "scope": "fixes",
+        "newest": True,
+        "significance": 1.0,
+        "lowest": 0.1,
+        "highest": 100.0,
+        "full": True,
+        "scope": "fixes",
         "always": True,
     },
     source="innovation",

@@ -11,7 +11,7 @@ from simnav.geometry.rotation import dcm_from_rpy, quaternion_from_dcm
 from simnav.inverse_strapdown import increments
 from tests.cases.tiny_log import write_csv
 
-RATE, LENGTH = 50.0, 120.0
+RATE = 50.0
 #: Field of the Earth, north-east-down [nT].
 FIELD = np.array([18000.0, 700.0, 46000.0])
 
@@ -124,12 +124,12 @@ field_nt = [18000.0, 700.0, 46000.0]
 """
 
 
-def make_log(root: Path, *, steady: bool = False) -> None:
+def make_log(root: Path, length: float = 120.0, *, steady: bool = False) -> None:
     """Write the files; a steady vessel goes straight ahead at a constant speed, level."""
     folder = root / "manoeuvring"
     folder.mkdir(exist_ok=True)
     chance = np.random.default_rng(5)
-    time = np.arange(round(LENGTH * RATE) + 1) / RATE
+    time = np.arange(round(length * RATE) + 1) / RATE
     sway = 0.0 if steady else 1.0
     yaw = 0.6 + sway * (0.9 * np.sin(0.045 * time) + 0.5 * np.sin(0.11 * time))
     roll, pitch = sway * 0.12 * np.sin(0.7 * time), sway * (0.07 * np.sin(0.55 * time + 1.0) + 0.03)
