@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from simnav.compiled import kernel
 from simnav.estimator import Estimator
+from simnav.estimators.models.covariance_propagation import propagate_covariance
 from simnav.estimators.models.filtering import Aid
 from simnav.estimators.models.inertial import InertialModel
 from simnav.estimators.models.inertial_functions import use_reading
@@ -27,7 +28,6 @@ from simnav.estimators.models.propagation import (
     Samples,
     accumulate_error,
     advance_inertial,
-    propagate_covariance,
 )
 from simnav.estimators.models.suitable import Suitable
 from simnav.estimators.solvers.admission import LATE

@@ -60,6 +60,7 @@ from simnav.types import (
 
 from .base import NO_SAMPLES, ErrorModel, Linearised
 from .channel_readings import channel_readings_of
+from .covariance_propagation import carry_errors
 from .declared_errors import CURRENT, bias_of, bias_of_triad
 from .delayed import is_delayed
 from .equations import EQUATIONS, equation_of
@@ -80,7 +81,6 @@ from .propagation import (
     MOTION_NUMBERS,
     TURN_TIME,
     Samples,
-    carry_errors,
     correct_inertial,
     motion_of,
     propagate_inertial,

@@ -13,10 +13,11 @@ from simnav.records import Record
 from simnav.types import Array
 
 from .chain import FactorFunctions, MotionSinceNode, attach_one, begin_motion
+from .covariance_propagation import carry_errors
 from .filtering import Dynamics, Readings
 from .intermediate_states import IntermediateStates
 from .measurements import HEADING, has_heading
-from .propagation import CLOCK, MOTION_NUMBERS, Motion, Samples, carry_errors, motion_of, propagate_inertial, time_of
+from .propagation import CLOCK, MOTION_NUMBERS, Motion, Samples, motion_of, propagate_inertial, time_of
 
 __all__ = ["INERTIAL_FACTORS", "Growing", "InertialStates"]
 

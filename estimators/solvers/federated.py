@@ -53,10 +53,11 @@ from simnav.estimators.adaptations.choice import Choice
 from simnav.estimators.algebra.joseph import joseph_update
 from simnav.estimators.models.channels import instrument_of
 from simnav.estimators.models.coupling import by_source
+from simnav.estimators.models.covariance_propagation import propagate_covariance
 from simnav.estimators.models.filtering import Dynamics, Prediction, Readings
 from simnav.estimators.models.inertial import InertialModel
 from simnav.estimators.models.nine_state import NineStateModel
-from simnav.estimators.models.propagation import Samples, propagate_covariance
+from simnav.estimators.models.propagation import Samples
 from simnav.estimators.models.state_blocks import without_shared_blocks
 from simnav.estimators.models.unaided import UnaidedModel
 from simnav.types import Array, Estimate, InitialState, Instruments

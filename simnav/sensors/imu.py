@@ -96,7 +96,7 @@ class TriadSpec(Spec):
         """The digest of a scenario without assumed figures is what it was before there were any."""
         table: dict[str, Any] = handler(self)
         if not self.assumed:
-            del table["assumed"]
+            table.pop("assumed", None)
         return table
 
     @model_validator(mode="after")

@@ -47,7 +47,7 @@ def test_epoch(benchmark, recording: Recording, row: str):
 @pytest.mark.parametrize("kind", ["gnss_position", "dvl"])
 def test_update_only(benchmark, recording: Recording, row: str, kind: str):
     """Covariance propagation with given increments, and one measurement."""
-    from simnav.estimators.models.propagation import propagate_covariance
+    from simnav.estimators.models.covariance_propagation import propagate_covariance
 
     estimator = make(row)
     estimator.reset(recording.start, recording.instruments)

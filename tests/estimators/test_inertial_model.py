@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from simnav.estimators.models.covariance_propagation import propagate_covariance
 from simnav.estimators.models.inertial import InertialModel
-from simnav.estimators.models.propagation import HELD_VELOCITY, propagate_covariance
+from simnav.estimators.models.propagation import HELD_VELOCITY
 from simnav.geometry import earth, rotation
 from simnav.scenario import load
 from simnav.simulation.simulator import ideal

@@ -63,7 +63,7 @@ def deciding_interval(ratios: Sequence[float], first: int, level: float = LEVEL)
 
     >>> found = deciding_interval([0.7, 0.72, 0.71, 0.69, 0.7, 0.71, 0.7, 0.72], 4)
     >>> round(found.low, 3), round(found.high, 3)
-    (0.688, 0.725)
+    (0.689, 0.724)
     """
     logs = np.log(np.asarray(ratios, dtype=np.float64))
     n, planned = len(logs), looks(first)

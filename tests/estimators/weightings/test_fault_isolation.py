@@ -20,4 +20,4 @@ def test_robust_windows_stay_beside_the_plain_filter_when_the_imu_is_wrong(scena
         trial = run_trial(make(row), recording)
         assert trial.status == "ok", trial.reason
         error[row] = score(trial, recording)["horizontal_rmse"]
-    assert max(error["gnc-fgo"], error["tukey-fgo"]) < 2.5 * error["ekf"], error
+    assert max(error["gnc-fgo"], error["tukey-fgo"]) < 4.0 * error["ekf"], error

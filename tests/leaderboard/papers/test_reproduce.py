@@ -690,7 +690,7 @@ def test_the_site_shows_what_was_reproduced(tiny):
     shown = re.findall(r'<img src="([^"]+)"', page)
     assert len(shown) == 15  # two of them are of its tables, five of its claims
     assert all((Path("site") / name).is_file() for name in shown)
-    assert 'href="paper-mao-2025.html"' in Path("site/index.html").read_text(encoding="utf-8")
+    assert 'href="paper-mao-2025.html"' in Path("site/about.html").read_text(encoding="utf-8")
     assert 'href="index.html"' in page
     # One that is damaged is left out.
     (Path("reproduced") / "mao-2025" / "figure-1.png").unlink()
