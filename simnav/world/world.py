@@ -127,6 +127,11 @@ class World:
         self._state["hull"] = filled(dynamics.SAIL, propeller=hull.propeller(speed), speed=speed)
 
     @property
+    def _state(self) -> NDArray[Any]:
+        """The present state with its names, (1,) `simnav.world.motion.STATE`."""
+        return self._x.view(motion.STATE)
+
+    @property
     def time(self) -> float:
         """Time since the start [s]."""
         return int(self._index.view(motion.PROGRESS)["sample"][0]) / self.rate
@@ -235,7 +240,7 @@ class World:
 
     def use_state(self, x: Array, index: NDArray[Any]) -> None:
         """Use these arrays as the state from now on. The caller of `share_state` advances them."""
-        self._x, self._index, self._state = x, index, x.view(motion.STATE)
+        self._x, self._index = x, index
 
     @property
     def track(self) -> Array:
@@ -249,7 +254,8 @@ class World:
 
     def _values(self, *names: str) -> Array:
         """Numbers of the present state, by name."""
-        return np.array([self._state[name].item() for name in names])
+        state = self._state
+        return np.array([state[name].item() for name in names])
 
     def advance(self, until: float, taps: Mapping[str, Array]) -> WorldBlock:
         """Advance to a time.
