@@ -225,12 +225,12 @@ class GuidedVoyages:
         )  # fmt: skip
         motion.command(active, runs.x, self._commands.wrong, self._commands.heading, self._commands.speed)
         dive = self._routes.dive(self._at)
-        for j, place in enumerate(motion.DIVE):
-            runs.x[active, place] = dive[active, j]
+        state = runs.x.view(motion.STATE)[:, 0]
+        state["target_depth"][active], state["largest_path_angle"][active] = dive[active].T
         runs.advance(active)
         self.navigators.update(active)
         last = runs.step >= self._steps
-        paces = self._dt, self._commands.planned, np.ascontiguousarray(runs.x[:, motion.U])
+        paces = self._dt, self._commands.planned, np.ascontiguousarray(state["speed"])
         judge.unchecked(
             (active, last), paces, runs.truth, tracks,
             (ROUTES.index(o.route), o.half_width), self._true_at, self._tally,

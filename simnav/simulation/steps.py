@@ -75,8 +75,8 @@ class SteppedRuns:
     ----------
     simulators : list of Simulator
         The simulator of each run; its vessel may be steered if it can.
-    x : (n, 79) array
-        States of the worlds (`simnav.world.motion`), for runs whose trajectory is a `simnav.world.World`.
+    x : (n, k) array
+        States of the worlds (`simnav.world.motion.STATE`), for runs whose trajectory is a `simnav.world.World`.
     step : (n,) int array
         Number of steps of each run so far.
     truth : (n, 9) array

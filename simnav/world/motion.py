@@ -10,17 +10,18 @@ loop, whose iterations the processor overlaps, or a loop of vector instructions.
 from __future__ import annotations
 
 from math import atan2, cos, exp, inf, sin
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from simnav.compiled import Array, Integers, helper, kernel
+from simnav.compiled import Array, helper, kernel
 from simnav.geometry.rotation import wrap_scalar
 from simnav.inverse_strapdown import AXES, BLOCK, BLOCK_COLUMNS, INTERVAL, POSITION, VELOCITY, ideal_samples
 from simnav.kernel_types import FlagVector, IntegerMatrix, IntegerVector, Matrix, Stack, Vector
 from simnav.strapdown import Triple
+from simnav.structures import length, structure
 from simnav.world.manoeuvres import ACCELERATE, COLUMNS, DEPTH, HOLD, TURN, WAYPOINTS, ZIGZAG
-from simnav.world.manoeuvring.dynamics import HULL, RATE, RATE_CHANGE, SAIL, SPEED, SPEED_CHANGE, SWAY, sail
+from simnav.world.manoeuvring.dynamics import HULL, SAIL, sail
 from simnav.world.motion_block import (
     ANGLES,
     BLOCK_ROWS,
@@ -37,14 +38,11 @@ from simnav.world.motion_block import (
     wrapped,
 )
 from simnav.world.sea import ROWS
-from simnav.world.seaway import Responses, Transitions, answers, transitions, wave_responses
+from simnav.world.seaway import OSCILLATIONS, OSCILLATORS, Responses, Transitions, answers, transitions, wave_responses
 
 __all__ = [
-    "DIVE",
-    "HAS_HULL",
-    "HULL_NUMBERS",
-    "HULL_STATE",
     "PARAMETERS",
+    "PROGRESS",
     "STATE",
     "TAP_COLUMNS",
     "RequestedStates",
@@ -53,39 +51,37 @@ __all__ = [
     "initialise",
 ]
 
-# Indices in the state vector.
-U, DU, R, DR, PSI, GAMMA, DGAMMA, DEPTH_CALM, NORTH, EAST = range(10)
-LATITUDE, LONGITUDE, HEIGHT = 10, 11, 12
-V = 13
-C = 16
-MEMORY = 25
-SPEED_COMMAND, SPEED_TARGET, SPEED_SLEW, PSI_REFERENCE, RATE_LIMIT, DEPTH_REFERENCE, GAMMA_LIMIT = range(31, 38)
-SEGMENT_TIME, SEGMENT_PSI, SEGMENT_SIGN, SEGMENT_NORTH, SEGMENT_EAST = range(38, 43)
-BODY_RATE = 43
-ERROR_NORTH, ERROR_EAST = 46, 47
-ROLL, PITCH = 48, 49
-COS_PSI, SIN_PSI, COS_GAMMA, SIN_GAMMA = range(50, 54)
-WATER_NORTH, WATER_EAST = 54, 55
-# In closed loop: error of the heading by which the vessel is steered, and the heading correction back to the track.
-# In a turn for a given time, where the rate is commanded and not the heading: the parts of both already turned.
-ERROR_HEADING, TO_TRACK, TURNED = 56, 57, 58
-#: Heave velocity, roll, pitch and yaw that follow from the waves as oscillators, each with value, rate and what drives
-#: it (`simnav.world.sea.steady`); without them all are zero.
-ANSWERS = 59
-YAW_ANSWER = ANSWERS + 9
-#: State of a hull with three degrees of freedom.
-HULL_STATE = 71
-STATE = HULL_STATE + SAIL
-#: Where the state holds the depth that is steered for, and the largest path angle.
-DIVE = np.array([DEPTH_REFERENCE, GAMMA_LIMIT])
-# ... in the integer state: sample, segment, waypoint, whether the segment has begun
-# ... and in the parameters.
-DT, TAU_U, TAU_R, TAU_G, TURN_RATE, HEEL, DIVES, CURRENT_N, CURRENT_E, SHEAR, ATTENUATION, LONGEST = range(12)
-#: Natural angular frequency and damping ratio of these oscillators; zero: there are none.
-OSCILLATORS = 12
-#: Whether there is a hull with three degrees of freedom, and its numbers.
-HAS_HULL, HULL_NUMBERS = 20, 21
-PARAMETERS = HULL_NUMBERS + HULL
+#: The state of a vessel. Speed through the water along the bow [m/s], yaw rate [rad/s], heading and path angle [rad],
+#: with their changes; depth without the waves, distances north and east of the start [m]. Position, velocity, elements
+#: of the DCM, and what the ideal samples remember (`simnav.inverse_strapdown`). What the guidance steers for: the
+#: commanded speed, which approaches the target by at most so much a second; targets and limits. Of the present
+#: manoeuvre: time, heading and place at its start, and the side to which it turns. Body rate of the last sample. In
+#: closed loop: errors of the position and heading by which the vessel is steered, and the heading correction back to
+#: the track; in a turn for a given time, where the rate is commanded and not the heading: the part of both already
+#: turned. Roll and pitch; cosines and sines of heading and path angle; velocity of the surface water [m/s].
+#: What follows from the waves as oscillators (`simnav.world.seaway.OSCILLATIONS`, `simnav.world.sea.steady`); without
+#: them all are zero. The state of a hull (`simnav.world.manoeuvring.dynamics.SAIL`).
+STATE = structure(
+    speed=float, speed_change=float, yaw_rate=float, yaw_rate_change=float, heading=float, path_angle=float,
+    path_rate=float, depth=float, north=float, east=float, position=3, velocity=3, dcm=9, increments=6,
+    commanded_speed=float, target_speed=float, largest_speed_change=float, target_heading=float, largest_yaw_rate=float,
+    target_depth=float, largest_path_angle=float,
+    segment_time=float, segment_heading=float, segment_sign=float, segment_north=float, segment_east=float,
+    body_rate=3, north_error=float, east_error=float, roll=float, pitch=float,
+    cos_heading=float, sin_heading=float, cos_path=float, sin_path=float, water_north=float, water_east=float,
+    heading_error=float, to_track=float, turned=float, oscillations=length(OSCILLATIONS), hull=length(SAIL),
+)  # fmt: skip
+#: The integer state of a vessel: sample, manoeuvre, waypoint, and 1 if the manoeuvre has begun.
+PROGRESS = structure(sample=int, segment=int, waypoint=int, begun=int)
+#: Constants of a vessel and its water. Step and time constants [s]; largest yaw rate [rad/s]; heel in a turn; 1 if it
+#: dives; mean current [m/s]; decrease of current and waves with depth [1/m]; largest advance of the phase of a wave at
+#: once [rad]; the oscillators (`simnav.world.seaway.OSCILLATORS`), zero if there are none; 1 if there is a hull with
+#: three degrees of freedom, and its numbers (`simnav.world.manoeuvring.dynamics.HULL`).
+PARAMETERS = structure(
+    step=float, speed_time=float, turn_time=float, climb_time=float, turn_rate=float, heel=float, dives=int,
+    current_north=float, current_east=float, shear=float, attenuation=float, longest_phase=float,
+    oscillators=length(OSCILLATORS), has_hull=int, hull=length(HULL),
+)  # fmt: skip
 #: Columns of a tap: position 0:3, velocity 3:6, roll, pitch, yaw 6:9, angular rate 9:12, current north, east 12:14.
 TAP_COLUMNS = 14
 #: Rows of the phases of waves, and columns of an eddy.
@@ -125,111 +121,111 @@ def _lag(x: float, dx: float, command: float, dt: float, tau: float, decay: floa
 
 
 @helper(borrows=True)
-def _waypoint(points: Array, j: int, relative: float, x: Array) -> tuple[float, float]:
+def _waypoint(points: Array, j: int, relative: float, x: Any) -> tuple[float, float]:
     """Waypoint j as distances north and east of the start of the run [m]."""
     a, b = points[j, 0], points[j, 1]
     if relative > 0.0:
-        c, s = cos(x[SEGMENT_PSI]), sin(x[SEGMENT_PSI])
-        return x[SEGMENT_NORTH] + c * a - s * b, x[SEGMENT_EAST] + s * a + c * b
+        c, s = cos(x.segment_heading), sin(x.segment_heading)
+        return x.segment_north + c * a - s * b, x.segment_east + s * a + c * b
     return a, b
 
 
 @helper(borrows=True)
-def _guide(x: Array, index: Integers, p: Array, rows: Array, points: Array, time: float) -> float:
+def _guide(x: Any, index: Any, p: Any, rows: Array, points: Array, time: float) -> float:
     """Execute the manoeuvre table: store the references in the state, and return the commanded yaw rate [rad/s]."""
-    psi = x[PSI] + x[ERROR_HEADING] - x[TO_TRACK]
+    psi = x.heading + x.heading_error - x.to_track
     # The heading at which the vessel would stop turning if the commanded rate became zero now.
-    rest = psi + 2.0 * p[TAU_R] * x[R] + p[TAU_R] ** 2 * x[DR]
+    rest = psi + 2.0 * p.turn_time * x.yaw_rate + p.turn_time**2 * x.yaw_rate_change
     direct = inf  # a rate that is commanded directly, without the heading loop
     for _ in range(rows.shape[0] + 1):
-        i = index[1]
+        i = index.segment
         if i >= rows.shape[0]:
             break
         kind = int(rows[i, 0])
-        if index[3] == 0:
-            index[3] = 1
-            x[SEGMENT_TIME] = time
-            x[SEGMENT_PSI] = x[PSI_REFERENCE]
-            x[RATE_LIMIT] = p[TURN_RATE]
+        if index.begun == 0:
+            index.begun = 1
+            x.segment_time = time
+            x.segment_heading = x.target_heading
+            x.largest_yaw_rate = p.turn_rate
             if kind == ACCELERATE:
-                x[SPEED_TARGET], x[SPEED_SLEW] = rows[i, 2], rows[i, 3]
+                x.target_speed, x.largest_speed_change = rows[i, 2], rows[i, 3]
             elif kind == TURN:
-                x[SEGMENT_SIGN] = 1.0 if rows[i, 2] > 0.0 else -1.0
+                x.segment_sign = 1.0 if rows[i, 2] > 0.0 else -1.0
                 if abs(rows[i, 2]) < inf:
-                    x[PSI_REFERENCE] += rows[i, 2]
+                    x.target_heading += rows[i, 2]
             elif kind == ZIGZAG:
-                x[SEGMENT_SIGN] = 1.0
+                x.segment_sign = 1.0
             elif kind == WAYPOINTS:
-                index[2] = int(rows[i, 2])
-                x[SEGMENT_NORTH], x[SEGMENT_EAST] = x[NORTH], x[EAST]
+                index.waypoint = int(rows[i, 2])
+                x.segment_north, x.segment_east = x.north, x.east
             elif kind == DEPTH:
-                x[DEPTH_REFERENCE], x[GAMMA_LIMIT] = rows[i, 2], rows[i, 3]
-        done = time - x[SEGMENT_TIME] >= rows[i, 1] - 1e-9
+                x.target_depth, x.largest_path_angle = rows[i, 2], rows[i, 3]
+        done = time - x.segment_time >= rows[i, 1] - 1e-9
         if kind == HOLD:
             pass
         elif kind == ACCELERATE:
-            reached = abs(x[U] - rows[i, 2]) < 0.01 * max(1.0, rows[i, 2]) and abs(x[DU]) < 1e-3
+            reached = abs(x.speed - rows[i, 2]) < 0.01 * max(1.0, rows[i, 2]) and abs(x.speed_change) < 1e-3
             done = done or (rows[i, 1] == inf and reached)
         elif kind == TURN:
             rate = rows[i, 3]
             if rows[i, 4] > 0.0:
-                rate = x[U] / rows[i, 4]
+                rate = x.speed / rows[i, 4]
             if rate <= 0.0:
-                rate = p[TURN_RATE]
-            x[RATE_LIMIT] = rate
+                rate = p.turn_rate
+            x.largest_yaw_rate = rate
             if abs(rows[i, 2]) < inf:
-                done = done or (abs(x[PSI_REFERENCE] - psi) < 0.005 and abs(x[R]) < 5e-4)
+                done = done or (abs(x.target_heading - psi) < 0.005 and abs(x.yaw_rate) < 5e-4)
             elif done:
-                x[PSI_REFERENCE] = rest
+                x.target_heading = rest
             else:
-                extra = (x[TO_TRACK] - x[ERROR_HEADING] - x[TURNED]) / (2.0 * p[TAU_R])
-                extra = min(max(extra, -p[TURN_RATE]), p[TURN_RATE])
-                x[TURNED] += extra * p[DT]
-                direct = x[SEGMENT_SIGN] * rate + extra
+                extra = (x.to_track - x.heading_error - x.turned) / (2.0 * p.turn_time)
+                extra = min(max(extra, -p.turn_rate), p.turn_rate)
+                x.turned += extra * p.step
+                direct = x.segment_sign * rate + extra
         elif kind == ZIGZAG:
-            rate = rows[i, 3] if rows[i, 3] > 0.0 else p[TURN_RATE]
-            if x[SEGMENT_SIGN] * (psi - x[SEGMENT_PSI]) >= rows[i, 2]:
-                x[SEGMENT_SIGN] = -x[SEGMENT_SIGN]
+            rate = rows[i, 3] if rows[i, 3] > 0.0 else p.turn_rate
+            if x.segment_sign * (psi - x.segment_heading) >= rows[i, 2]:
+                x.segment_sign = -x.segment_sign
             if not done:
-                extra = (x[TO_TRACK] - x[ERROR_HEADING] - x[TURNED]) / (2.0 * p[TAU_R])
-                extra = min(max(extra, -p[TURN_RATE]), p[TURN_RATE])
-                x[TURNED] += extra * p[DT]
-                direct = x[SEGMENT_SIGN] * rate + extra
+                extra = (x.to_track - x.heading_error - x.turned) / (2.0 * p.turn_time)
+                extra = min(max(extra, -p.turn_rate), p.turn_rate)
+                x.turned += extra * p.step
+                direct = x.segment_sign * rate + extra
         elif kind == WAYPOINTS:
             # The vessel is steered by its estimated position.
-            north, east = x[NORTH] + x[ERROR_NORTH], x[EAST] + x[ERROR_EAST]
-            while index[2] < int(rows[i, 3]):
-                j = index[2]
+            north, east = x.north + x.north_error, x.east + x.east_error
+            while index.waypoint < int(rows[i, 3]):
+                j = index.waypoint
                 a, b = _waypoint(points, j, rows[i, 5], x)
-                from_a, from_b = x[SEGMENT_NORTH], x[SEGMENT_EAST]
+                from_a, from_b = x.segment_north, x.segment_east
                 if j > int(rows[i, 2]):
                     from_a, from_b = _waypoint(points, j - 1, rows[i, 5], x)
                 # Reached within the radius, or when it is abeam: otherwise the vessel might circle a point for ever.
                 passed = (north - a) * (a - from_a) + (east - b) * (b - from_b) > 0.0
                 if (a - north) ** 2 + (b - east) ** 2 > rows[i, 4] ** 2 and not passed:
                     # The vessel steers for the waypoint itself: there is no correction back to a track.
-                    x[PSI_REFERENCE] = psi + wrapped(atan2(b - east, a - north) - x[TO_TRACK] - psi)
+                    x.target_heading = psi + wrapped(atan2(b - east, a - north) - x.to_track - psi)
                     break
-                index[2] += 1
-            done = index[2] >= int(rows[i, 3])
+                index.waypoint += 1
+            done = index.waypoint >= int(rows[i, 3])
         elif kind == DEPTH:
-            done = done or (abs(x[DEPTH_CALM] - rows[i, 2]) < 0.5 and abs(x[GAMMA]) < 0.02)
+            done = done or (abs(x.depth - rows[i, 2]) < 0.5 and abs(x.path_angle) < 0.02)
         if not done:
             break
-        index[1] += 1
-        index[3] = 0
+        index.segment += 1
+        index.begun = 0
         direct = inf
     if direct < inf:
         return direct
-    x[TURNED] = x[TO_TRACK] - x[ERROR_HEADING]
+    x.turned = x.to_track - x.heading_error
     # Control of the heading at rest makes the loop a simple exponential: its derivative is the commanded rate itself.
-    wanted = (x[PSI_REFERENCE] - rest) / (2.0 * p[TAU_R])
-    rate_command: float = min(max(wanted, -x[RATE_LIMIT]), x[RATE_LIMIT])
+    wanted = (x.target_heading - rest) / (2.0 * p.turn_time)
+    rate_command: float = min(max(wanted, -x.largest_yaw_rate), x.largest_yaw_rate)
     return rate_command
 
 
 @helper(borrows=True)
-def _compose(course: Course, water: tuple[float, float], yaw_answer: float, p: Array, waves: Responses) -> Composed:
+def _compose(course: Course, water: tuple[float, float], yaw_answer: float, p: Any, waves: Responses) -> Composed:
     """Velocity, roll, pitch, and cosine and sine of the heading of the bow, with current and waves added."""
     u, cp, sp, cg = course.speed, course.cos_heading, course.sin_heading, course.cos_path
     depth, sway = course.depth, course.sway
@@ -237,147 +233,145 @@ def _compose(course: Course, water: tuple[float, float], yaw_answer: float, p: A
     # The bow yaws about the course that the vessel keeps.
     ch, sh = cp, sp
     if depth > 0.0:
-        shade = exp(-p[ATTENUATION] * depth)
-        flow = max(0.0, 1.0 - p[SHEAR] * depth)
-    if p[OSCILLATORS] > 0.0:
+        shade = exp(-p.attenuation * depth)
+        flow = max(0.0, 1.0 - p.shear * depth)
+    if p.oscillators.view(OSCILLATORS)[0].heave[0] > 0.0:
         yaw = course.heading + shade * yaw_answer
         ch, sh = cos(yaw), sin(yaw)
     v0 = u * cg * cp + flow * water[0] + shade * waves.north
     v1 = u * cg * sp + flow * water[1] + shade * waves.east
     v2 = -u * course.sin_path + shade * waves.down
-    roll = shade * (waves.roll_north * sp - waves.roll_east * cp) - p[HEEL] * u * course.yaw_rate * (1.0 / 9.81)
+    roll = shade * (waves.roll_north * sp - waves.roll_east * cp) - p.heel * u * course.yaw_rate * (1.0 / 9.81)
     pitch = course.path + shade * (waves.pitch_north * cp + waves.pitch_east * sp)
-    if p[HAS_HULL] > 0.0:
+    if p.has_hull:
         v0, v1 = v0 - sway * sp, v1 + sway * cp
     return Composed((v0, v1, v2), roll, pitch, ch, sh)
 
 
 @helper(borrows=True)
-def _course(x: Array) -> Course:
+def _course(x: Any) -> Course:
     """The course of a state."""
     return Course(
-        speed=x[U],
-        yaw_rate=x[R],
-        heading=x[PSI],
-        cos_heading=x[COS_PSI],
-        sin_heading=x[SIN_PSI],
-        path=x[GAMMA],
-        cos_path=x[COS_GAMMA],
-        sin_path=x[SIN_GAMMA],
-        depth=x[DEPTH_CALM],
-        sway=x[HULL_STATE + SWAY],
+        speed=x.speed,
+        yaw_rate=x.yaw_rate,
+        heading=x.heading,
+        cos_heading=x.cos_heading,
+        sin_heading=x.sin_heading,
+        path=x.path_angle,
+        cos_path=x.cos_path,
+        sin_path=x.sin_path,
+        depth=x.depth,
+        sway=x.hull.view(SAIL)[0].sway,
     )
 
 
 @helper(borrows=True)
-def _through_water(p: Array, course: Course) -> tuple[float, float]:
+def _through_water(p: Any, course: Course) -> tuple[float, float]:
     """Velocity through the water, north and east [m/s], without the waves."""
     ahead = course.speed * course.cos_path
     north, east = ahead * course.cos_heading, ahead * course.sin_heading
-    if p[HAS_HULL] > 0.0:
+    if p.has_hull:
         north -= course.sway * course.sin_heading
         east += course.sway * course.cos_heading
     return north, east
 
 
 @helper(borrows=True)
-def _water(x: Array, p: Array, eddies: Array, time: float) -> None:
+def _water(x: Any, p: Any, eddies: Array, time: float) -> None:
     """Store the velocity of the surface water at the vessel's position in the state."""
-    north, east = p[CURRENT_N], p[CURRENT_E]
+    north, east = p.current_north, p.current_east
     for i in range(eddies.shape[0]):
-        c = cos(eddies[i, 0] * x[NORTH] + eddies[i, 1] * x[EAST] - eddies[i, 2] * time + eddies[i, 3])
+        c = cos(eddies[i, 0] * x.north + eddies[i, 1] * x.east - eddies[i, 2] * time + eddies[i, 3])
         north += eddies[i, 4] * c
         east += eddies[i, 5] * c
-    x[WATER_NORTH], x[WATER_EAST] = north, east
+    x.water_north, x.water_east = north, east
 
 
 @helper(borrows=True)
-def _sail(x: Array, p: Array, rate_command: float, time: float, decay: tuple[float, float]) -> None:
+def _sail(x: Any, p: Any, rate_command: float, time: float, decay: tuple[float, float]) -> None:
     """Advance speed, sway, yaw rate and heading of a hull with three degrees of freedom by one sample."""
-    dt, h = p[DT], x[HULL_STATE:STATE]
-    h[SPEED], h[SPEED_CHANGE] = _lag(h[SPEED], h[SPEED_CHANGE], x[SPEED_COMMAND], dt, p[TAU_U], decay[0])
-    h[RATE], h[RATE_CHANGE] = _lag(h[RATE], h[RATE_CHANGE], rate_command, dt, p[TAU_R], decay[1])
-    flow = max(0.0, 1.0 - p[SHEAR] * max(0.0, x[DEPTH_CALM]))
-    water = flow * x[WATER_NORTH], flow * x[WATER_EAST]
-    at = sail(p[HULL_NUMBERS:PARAMETERS], h, (x[U], x[R], x[PSI]), (p[TAU_U], p[TAU_R]), water, time, dt)
-    x[U], x[DU], x[R], x[DR], x[PSI] = at.surge, at.surge_change, at.yaw_rate, at.yaw_rate_change, at.heading
+    dt, h = p.step, x.hull.view(SAIL)[0]
+    h.speed, h.speed_change = _lag(h.speed, h.speed_change, x.commanded_speed, dt, p.speed_time, decay[0])
+    h.yaw_rate, h.yaw_rate_change = _lag(h.yaw_rate, h.yaw_rate_change, rate_command, dt, p.turn_time, decay[1])
+    flow = max(0.0, 1.0 - p.shear * max(0.0, x.depth))
+    water = flow * x.water_north, flow * x.water_east
+    at = sail(p.hull.view(HULL)[0], h, (x.speed, x.yaw_rate, x.heading), (p.speed_time, p.turn_time), water, time, dt)
+    x.speed, x.speed_change, x.heading = at.surge, at.surge_change, at.heading
+    x.yaw_rate, x.yaw_rate_change = at.yaw_rate, at.yaw_rate_change
 
 
 @kernel
-def initialise(x: Vector, p: Vector, phase: Matrix, table: Matrix, eddies: Matrix) -> None:
-    """Complete the state at time 0: velocity and attitude with the waves and the current of that time."""
+def initialise(state: Vector, parameters: Vector, phase: Matrix, table: Matrix, eddies: Matrix) -> None:
+    """Complete the state at time 0: velocity and attitude with the waves and the current of that time.
+
+    ``state`` is a `STATE`, ``parameters`` are `PARAMETERS`. The other arguments are those of `advance`, of one world.
+    """
+    x, p = state.view(STATE)[0], parameters.view(PARAMETERS)[0]
     _water(x, p, eddies, 0.0)
-    x[COS_PSI], x[SIN_PSI], x[COS_GAMMA], x[SIN_GAMMA] = cos(x[PSI]), sin(x[PSI]), cos(x[GAMMA]), sin(x[GAMMA])
+    x.cos_heading, x.sin_heading = cos(x.heading), sin(x.heading)
+    x.cos_path, x.sin_path = cos(x.path_angle), sin(x.path_angle)
     course = _course(x)
     north, east = _through_water(p, course)
     w = wave_responses(phase, table, north, east, 0.0, 0.0)
-    if p[OSCILLATORS] > 0.0:
-        own = p[OSCILLATORS:HAS_HULL]
-        w = answers(
-            x[ANSWERS:HULL_STATE],
-            own,
-            w,
-            course.cos_heading,
-            course.sin_heading,
-            phase,
-            table,
-            0.0,
-            transitions(own, 0.0),
-        )
-    now = _compose(course, (x[WATER_NORTH], x[WATER_EAST]), x[YAW_ANSWER], p, w)
-    x[V], x[V + 1], x[V + 2] = now.velocity
+    swell, own = x.oscillations.view(OSCILLATIONS)[0], p.oscillators.view(OSCILLATORS)[0]
+    if own.heave[0] > 0.0:
+        by = transitions(own, 0.0)
+        w = answers(swell, own, w, course.cos_heading, course.sin_heading, phase, table, 0.0, by)
+    now = _compose(course, (x.water_north, x.water_east), swell.yaw[0], p, w)
+    x.velocity[0], x.velocity[1], x.velocity[2] = now.velocity
     cr, sr = cosine_sine(now.roll)
     ct, st = cosine_sine(now.pitch)
     c = matrix(cr, sr, ct, st, now.cos_bow, now.sin_bow)
-    x[C], x[C + 1], x[C + 2] = c.c00, c.c01, c.c02
-    x[C + 3], x[C + 4], x[C + 5] = c.c10, c.c11, c.c12
-    x[C + 6], x[C + 7], x[C + 8] = c.c20, c.c21, c.c22
-    x[ROLL], x[PITCH] = now.roll, now.pitch
+    dcm = x.dcm
+    dcm[0], dcm[1], dcm[2] = c.c00, c.c01, c.c02
+    dcm[3], dcm[4], dcm[5] = c.c10, c.c11, c.c12
+    dcm[6], dcm[7], dcm[8] = c.c20, c.c21, c.c22
+    x.roll, x.pitch = now.roll, now.pitch
 
 
 @helper(borrows=True)
-def _steer(x: Array, index: Integers, p: Array, plan: tuple[Array, Array], block: Array, first: int, last: int) -> None:
+def _steer(x: Any, index: Any, p: Any, plan: tuple[Array, Array], block: Array, first: int, last: int) -> None:
     """Guidance and the dynamics of the vessel in intervals of a block: store the course at their ends.
 
     ``first`` and ``last`` are the number of the first interval, and that after the last one. The other arguments are
     those of `advance`.
     """
     rows, points = plan
-    dt = p[DT]
-    decay_u, decay_r, decay_g = exp(-dt / p[TAU_U]), exp(-dt / p[TAU_R]), exp(-dt / p[TAU_G])
-    psi = x[PSI]
+    dt = p.step
+    decay_u, decay_r, decay_g = exp(-dt / p.speed_time), exp(-dt / p.turn_time), exp(-dt / p.climb_time)
+    psi = x.heading
     for k in range(first, last):
-        t0 = index[0] * dt
-        index[0] += 1
+        t0 = index.sample * dt
+        index.sample += 1
         rate_command = _guide(x, index, p, rows, points, t0)
-        step = x[SPEED_SLEW] * dt
-        x[SPEED_COMMAND] = min(max(x[SPEED_TARGET], x[SPEED_COMMAND] - step), x[SPEED_COMMAND] + step)
-        if p[HAS_HULL] > 0.0:
+        step = x.largest_speed_change * dt
+        x.commanded_speed = min(max(x.target_speed, x.commanded_speed - step), x.commanded_speed + step)
+        if p.has_hull:
             _sail(x, p, rate_command, t0, (decay_u, decay_r))
         else:
-            x[U], x[DU] = _lag(x[U], x[DU], x[SPEED_COMMAND], dt, p[TAU_U], decay_u)
-            r, dr = x[R], x[DR]
-            x[R], x[DR] = _lag(r, dr, rate_command, dt, p[TAU_R], decay_r)
+            x.speed, x.speed_change = _lag(x.speed, x.speed_change, x.commanded_speed, dt, p.speed_time, decay_u)
+            r, dr = x.yaw_rate, x.yaw_rate_change
+            x.yaw_rate, x.yaw_rate_change = _lag(r, dr, rate_command, dt, p.turn_time, decay_r)
             # Hermite's rule: of fourth order, and as smooth as the rate
-            x[PSI] += 0.5 * dt * (r + x[R]) + dt * dt / 12.0 * (dr - x[DR])
-        if p[DIVES] > 0.0:
-            climb = (x[DEPTH_CALM] - x[DEPTH_REFERENCE]) / (max(x[U], 0.3) * 5.0 * p[TAU_G])
-            climb = min(max(climb, -x[GAMMA_LIMIT]), x[GAMMA_LIMIT])
-            sink = -x[U] * x[SIN_GAMMA]
-            x[GAMMA], x[DGAMMA] = _lag(x[GAMMA], x[DGAMMA], climb, dt, p[TAU_G], decay_g)
-            x[COS_GAMMA], x[SIN_GAMMA] = cos(x[GAMMA]), sin(x[GAMMA])
-            x[DEPTH_CALM] += 0.5 * dt * (sink - x[U] * x[SIN_GAMMA])
-        if x[PSI] != psi:
-            psi = x[PSI]
-            x[COS_PSI], x[SIN_PSI] = cos(psi), sin(psi)
+            x.heading += 0.5 * dt * (r + x.yaw_rate) + dt * dt / 12.0 * (dr - x.yaw_rate_change)
+        if p.dives:
+            climb = (x.depth - x.target_depth) / (max(x.speed, 0.3) * 5.0 * p.climb_time)
+            climb = min(max(climb, -x.largest_path_angle), x.largest_path_angle)
+            sink = -x.speed * x.sin_path
+            x.path_angle, x.path_rate = _lag(x.path_angle, x.path_rate, climb, dt, p.climb_time, decay_g)
+            x.cos_path, x.sin_path = cos(x.path_angle), sin(x.path_angle)
+            x.depth += 0.5 * dt * (sink - x.speed * x.sin_path)
+        if x.heading != psi:
+            psi = x.heading
+            x.cos_heading, x.sin_heading = cos(psi), sin(psi)
         put_course(block, k, _course(x))
 
 
 @helper(borrows=True)
 def _drift(
-    x: Array,
+    x: Any,
     time: int,
-    p: Array,
+    p: Any,
     water: tuple[Array, Array, Array],
     by: Transitions,
     block: Array,
@@ -390,31 +384,31 @@ def _drift(
     arguments are those of `_steer` and `advance`.
     """
     phase, table, eddies = water
-    dt = p[DT]
-    swell, own = x[ANSWERS:HULL_STATE], p[OSCILLATORS:HAS_HULL]
+    dt = p.step
+    swell, own = x.oscillations.view(OSCILLATIONS)[0], p.oscillators.view(OSCILLATORS)[0]
     for k in range(first, last):
         course = course_at(block, k)
         # The encounter frequency is that of the speed through the water.
         north, east = _through_water(p, course)
-        waves = wave_responses(phase, table, north, east, dt, p[LONGEST])
-        if p[OSCILLATORS] > 0.0:
+        waves = wave_responses(phase, table, north, east, dt, p.longest_phase)
+        if own.heave[0] > 0.0:
             waves = answers(swell, own, waves, course.cos_heading, course.sin_heading, phase, table, dt, by)
         _water(x, p, eddies, (time + k + 1) * dt)
-        now = _compose(course, (x[WATER_NORTH], x[WATER_EAST]), x[YAW_ANSWER], p, waves)
+        now = _compose(course, (x.water_north, x.water_east), swell.yaw[0], p, waves)
         v = now.velocity
         block[VELOCITY, k + 1], block[VELOCITY + 1, k + 1], block[VELOCITY + 2, k + 1] = v
         block[ANGLES, k + 1], block[ANGLES + 1, k + 1] = now.roll, now.pitch
         block[BOW, k], block[BOW + 1, k] = now.cos_bow, now.sin_bow
-        block[FLOW, k], block[FLOW + 1, k] = x[WATER_NORTH], x[WATER_EAST]
-        x[NORTH] += 0.5 * dt * (block[VELOCITY, k] + v[0])
-        x[EAST] += 0.5 * dt * (block[VELOCITY + 1, k] + v[1])
+        block[FLOW, k], block[FLOW + 1, k] = x.water_north, x.water_east
+        x.north += 0.5 * dt * (block[VELOCITY, k] + v[0])
+        x.east += 0.5 * dt * (block[VELOCITY + 1, k] + v[1])
 
 
 @helper(borrows=True)
 def _advance_one(
-    x: Array,
-    index: Integers,
-    p: Array,
+    x: Any,
+    index: Any,
+    p: Any,
     plan: tuple[Array, Array],
     water: tuple[Array, Array, Array],
     tap_time: Array,
@@ -424,9 +418,9 @@ def _advance_one(
 ) -> None:
     """Advance one world by as many samples as ``imu`` has room for. The arguments are those of `advance`."""
     rate, force = imu
-    dt, tap = p[DT], 0
-    memory = x[MEMORY : MEMORY + 6]
-    by = transitions(p[OSCILLATORS:HAS_HULL], dt)
+    dt, tap = p.step, 0
+    position, velocity, dcm, turning = x.position, x.velocity, x.dcm, x.body_rate
+    by = transitions(p.oscillators.view(OSCILLATORS)[0], dt)
     # Guidance is ahead of the waves, unless waypoints or eddies make it depend on the position.
     ahead = water[2].shape[0] == 0
     for i in range(plan[0].shape[0]):
@@ -435,18 +429,18 @@ def _advance_one(
         block[INTERVAL, k] = dt
     for start in range(0, rate.shape[0], BLOCK):
         n = min(BLOCK, rate.shape[0] - start)
-        first = index[0]
+        first = index.sample
         for i in range(3):
-            block[VELOCITY + i, 0], block[POSITION + i, 0] = x[V + i], x[LATITUDE + i]
+            block[VELOCITY + i, 0], block[POSITION + i, 0] = velocity[i], position[i]
         for i in range(9):
-            block[AXES + i, 0] = x[C + i]
-        block[ANGLES, 0], block[ANGLES + 1, 0] = x[ROLL], x[PITCH]
+            block[AXES + i, 0] = dcm[i]
+        block[ANGLES, 0], block[ANGLES + 1, 0] = x.roll, x.pitch
         for k in range(0, n, n if ahead else 1):
             upto = n if ahead else k + 1
             _steer(x, index, p, plan, block, k, upto)
             _drift(x, first, p, water, by, block, k, upto)
         orient(block, n)
-        ideal_samples(block, n, memory, rate[start : start + n], force[start : start + n])
+        ideal_samples(block, n, x.increments, rate[start : start + n], force[start : start + n])
         # Taps between the states at both ends of an interval
         k, last = 0, rate.shape[0] - 1
         while tap < tap_time.size:
@@ -454,18 +448,18 @@ def _advance_one(
                 k += 1
             if k == n:
                 break
-            before = x[BODY_RATE], x[BODY_RATE + 1], x[BODY_RATE + 2]
+            before = turning[0], turning[1], turning[2]
             if k > 0:
                 before = body_rate(block, k - 1, rate[start + k - 1])
-            turning = before, body_rate(block, k, rate[start + k])
-            tap_at(taps[tap], min((tap_time[tap] - (first + k) * dt) / dt, 1.0), block, k, turning, p[SHEAR])
+            rates = before, body_rate(block, k, rate[start + k])
+            tap_at(taps[tap], min((tap_time[tap] - (first + k) * dt) / dt, 1.0), block, k, rates, p.shear)
             tap += 1
-        x[BODY_RATE], x[BODY_RATE + 1], x[BODY_RATE + 2] = body_rate(block, n - 1, rate[start + n - 1])
+        turning[0], turning[1], turning[2] = body_rate(block, n - 1, rate[start + n - 1])
         for i in range(3):
-            x[V + i], x[LATITUDE + i] = block[VELOCITY + i, n], block[POSITION + i, n]
+            velocity[i], position[i] = block[VELOCITY + i, n], block[POSITION + i, n]
         for i in range(9):
-            x[C + i] = block[AXES + i, n]
-        x[ROLL], x[PITCH] = block[ANGLES, n], block[ANGLES + 1, n]
+            dcm[i] = block[AXES + i, n]
+        x.roll, x.pitch = block[ANGLES, n], block[ANGLES + 1, n]
 
 
 class RequestedStates(NamedTuple):
@@ -507,11 +501,10 @@ def advance(
     ----------
     active : (w,) bool array
         True for each world that is advanced.
-    state : (w, 79) and (w, 4) int arrays
-        The state vector, and the integer state: sample, segment, waypoint, and 1 if the segment has begun. Both are
-        updated.
-    p : (w, 162) array
-        Constants of the vessel, the water and the step, at the indices that this module names.
+    state : (w, n) and (w, 4) int arrays
+        A `STATE` and a `PROGRESS` of each world; both are updated.
+    p : (w, m) array
+        The `PARAMETERS` of each world.
     sizes : (w, 4) int array
         Number of manoeuvres, points, waves and eddies of each world.
     plan : two (w, ...) arrays
@@ -538,7 +531,7 @@ def advance(
         r, q, c, e = sizes[w, 0], sizes[w, 1], sizes[w, 2], sizes[w, 3]
         n, m = samples[w], last[w] - first[w]
         _advance_one(
-            x[w], index[w], p[w],
+            x[w].view(STATE)[0], index[w].view(PROGRESS)[0], p[w].view(PARAMETERS)[0],
             (rows[w, : COLUMNS * r].reshape((r, COLUMNS)), points[w, : 2 * q].reshape((q, 2))),
             (
                 phase[w, : PHASES * c].reshape((PHASES, c)), table[w, : ROWS * c].reshape((ROWS, c)),
@@ -556,8 +549,8 @@ def command(active: FlagVector, x: Matrix, wrong: Vector, heading: Vector, speed
     ----------
     active : (w,) bool array
         True for each world that gets a command.
-    x : (w, 79) array
-        State vectors; updated.
+    x : (w, n) array
+        A `STATE` of each world; updated.
     wrong : (w,) array
         Error of the estimated heading by which the vessel is steered [rad]; NaN: as before.
     heading, speed : (w,) array
@@ -565,8 +558,9 @@ def command(active: FlagVector, x: Matrix, wrong: Vector, heading: Vector, speed
     """
     for w in range(active.size):
         if active[w]:
+            vessel = x[w].view(STATE)[0]
             if wrong[w] == wrong[w]:
-                x[w, ERROR_HEADING] = wrong[w]
-            estimated = x[w, PSI] + x[w, ERROR_HEADING]
-            x[w, PSI_REFERENCE] = estimated + wrap_scalar(heading[w] - estimated)
-            x[w, SPEED_TARGET] = max(speed[w], 0.0)
+                vessel.heading_error = wrong[w]
+            estimated = vessel.heading + vessel.heading_error
+            vessel.target_heading = estimated + wrap_scalar(heading[w] - estimated)
+            vessel.target_speed = max(speed[w], 0.0)

@@ -6,13 +6,19 @@ See `simnav.world.sea` for the model and for the arrays of components. `simnav.w
 from __future__ import annotations
 
 from math import sqrt
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from simnav.compiled import Array, helper
 from simnav.declared_process import Oscillation, oscillation
+from simnav.structures import structure
 from simnav.world.sea import YAW
 
-__all__ = ["Responses", "Transitions", "answers", "transitions", "wave_responses"]
+__all__ = ["OSCILLATIONS", "OSCILLATORS", "Responses", "Transitions", "answers", "transitions", "wave_responses"]
+
+#: Natural angular frequency [rad/s] and damping ratio of each oscillator; zeros if there are none.
+OSCILLATORS = structure(heave=2, roll=2, pitch=2, yaw=2)
+#: Value, rate and force of each: heave velocity [m/s], angles [rad].
+OSCILLATIONS = structure(heave=3, roll=3, pitch=3, yaw=3)
 
 
 class Responses(NamedTuple):
@@ -96,23 +102,23 @@ def wave_responses(phase: Array, table: Array, north: float, east: float, dt: fl
 
 
 @helper(borrows=True)
-def transitions(p: Array, dt: float) -> Transitions:
+def transitions(p: Any, dt: float) -> Transitions:
     """Transition matrices of the oscillators over a step.
 
     Parameters
     ----------
-    p : (8,) array
-        Natural angular frequency [rad/s] and damping ratio of each; zeros if there are none.
+    p : record
+        The `OSCILLATORS`.
     dt : float
         Length of the step [s].
     """
-    if p[0] == 0.0:
+    if p.heave[0] == 0.0:
         return _STILL
     return Transitions(
-        heave=oscillation(dt, p[0], p[1]),
-        roll=oscillation(dt, p[2], p[3]),
-        pitch=oscillation(dt, p[4], p[5]),
-        yaw=oscillation(dt, p[6], p[7]),
+        heave=oscillation(dt, p.heave[0], p.heave[1]),
+        roll=oscillation(dt, p.roll[0], p.roll[1]),
+        pitch=oscillation(dt, p.pitch[0], p.pitch[1]),
+        yaw=oscillation(dt, p.yaw[0], p.yaw[1]),
     )
 
 
@@ -135,16 +141,16 @@ def _oscillate(x: Array, p: Array, force: float, dt: float, transition: Oscillat
 
 @helper(borrows=True)
 def answers(
-    x: Array, p: Array, waves: Responses, cp: float, sp: float, phase: Array, table: Array, dt: float, by: Transitions
+    x: Any, p: Any, waves: Responses, cp: float, sp: float, phase: Array, table: Array, dt: float, by: Transitions
 ) -> Responses:
     """The responses of the oscillators to the waves at the vessel.
 
     Parameters
     ----------
-    x : (12,) array
-        Value, rate and force of each oscillator; updated.
-    p : (8,) array
-        See `transitions`.
+    x : record
+        The `OSCILLATIONS`; updated.
+    p : record
+        The `OSCILLATORS`.
     waves : Responses
         Those of `wave_responses`, which drive heave, roll and pitch.
     cp, sp : float
@@ -165,8 +171,8 @@ def answers(
     for i in range(phase.shape[1]):
         first += table[YAW, i] * phase[0, i]
         second += table[YAW + 1, i] * phase[0, i]
-    heave = _oscillate(x[0:3], p[0:2], waves.down, dt, by.heave)
-    roll = _oscillate(x[3:6], p[2:4], waves.roll_north * sp - waves.roll_east * cp, dt, by.roll)
-    pitch = _oscillate(x[6:9], p[4:6], waves.pitch_north * cp + waves.pitch_east * sp, dt, by.pitch)
-    _oscillate(x[9:12], p[6:8], first * (cp * cp - sp * sp) - second * 2.0 * cp * sp, dt, by.yaw)
+    heave = _oscillate(x.heave, p.heave, waves.down, dt, by.heave)
+    roll = _oscillate(x.roll, p.roll, waves.roll_north * sp - waves.roll_east * cp, dt, by.roll)
+    pitch = _oscillate(x.pitch, p.pitch, waves.pitch_north * cp + waves.pitch_east * sp, dt, by.pitch)
+    _oscillate(x.yaw, p.yaw, first * (cp * cp - sp * sp) - second * 2.0 * cp * sp, dt, by.yaw)
     return Responses(waves.north, waves.east, heave, roll * sp, -roll * cp, pitch * cp, pitch * sp)

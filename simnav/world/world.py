@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simnav.geometry.rotation import wrap_angle
+from simnav.structures import filled, length
 from simnav.types import Array, ImuSamples, NavigationStates, TapStates
 from simnav.world import motion
 from simnav.world.current import Current, eddies
@@ -25,7 +26,6 @@ from simnav.world.wind import AirFlow
 __all__ = ["World"]
 
 _ON = np.ones(1, np.bool_)
-_TRACK = np.array([motion.NORTH, motion.EAST, motion.PSI, motion.U])
 
 #: Lookahead distance for the return to the track: smallest distance [m], and time at the present speed [s].
 LEAST_LOOKAHEAD, LOOKAHEAD_TIME = 30.0, 20.0
@@ -79,40 +79,39 @@ class World:
         self.rate = float(rate)
         self._follower: Follower | None = None
         self._voyage = start, vessel, manoeuvres, current, air
-        p = np.zeros(motion.PARAMETERS)
-        p[motion.DT] = 1.0 / rate
-        p[motion.TAU_U], p[motion.TAU_R] = vessel.speed_time_constant, vessel.turn_time_constant
-        p[motion.TAU_G], p[motion.TURN_RATE] = vessel.climb_time_constant, vessel.turn_rate
-        p[motion.HEEL], p[motion.DIVES] = vessel.heel, float(vessel.dives)
+        self._p = filled(
+            motion.PARAMETERS, step=1.0 / rate, speed_time=vessel.speed_time_constant,
+            turn_time=vessel.turn_time_constant, climb_time=vessel.climb_time_constant, turn_rate=vessel.turn_rate,
+            heel=vessel.heel, dives=vessel.dives,
+        )  # fmt: skip
+        p = self._p.view(motion.PARAMETERS)
         if current is not None and current.speed > 0.0:
-            p[motion.CURRENT_N] = current.speed * np.cos(current.direction)
-            p[motion.CURRENT_E] = current.speed * np.sin(current.direction)
-            p[motion.SHEAR] = current.shear / current.speed  # the variable part decreases with depth like the mean
+            p["current_north"] = current.speed * np.cos(current.direction)
+            p["current_east"] = current.speed * np.sin(current.direction)
+            p["shear"] = current.shear / current.speed  # the variable part decreases with depth like the mean
         if sea is not None:
-            p[motion.LONGEST] = sea.longest_step
+            p["longest_phase"] = sea.longest_step
         if sea is not None and vessel.dives:
             # Waves decrease as exp(-k z); the wave number at the peak is used for all, to keep the motion smooth.
             known = depth if sea.response == "encounter" else None
-            p[motion.ATTENUATION] = wave_number(np.array([2.0 * np.pi / sea.peak_period]), known)[0]
-        x = np.zeros(motion.STATE)
-        x[motion.U] = x[motion.SPEED_COMMAND] = x[motion.SPEED_TARGET] = start.speed
-        x[motion.SPEED_SLEW] = np.inf
-        x[motion.PSI] = x[motion.PSI_REFERENCE] = wrap_angle(start.heading)
-        x[motion.RATE_LIMIT] = vessel.turn_rate
-        x[motion.GAMMA_LIMIT] = 0.26
-        x[motion.LATITUDE], x[motion.LONGITUDE], x[motion.HEIGHT] = start.latitude, start.longitude, start.altitude
-        x[motion.DEPTH_CALM] = x[motion.DEPTH_REFERENCE] = -start.altitude if vessel.dives else 0.0
-        self._x, self._p = x, p
-        self._index = np.zeros(4, dtype=np.int64)
+            p["attenuation"] = wave_number(np.array([2.0 * np.pi / sea.peak_period]), known)[0]
+        heading, down = wrap_angle(start.heading), -start.altitude if vessel.dives else 0.0
+        x = filled(
+            motion.STATE, speed=start.speed, commanded_speed=start.speed, target_speed=start.speed,
+            largest_speed_change=np.inf, heading=heading, target_heading=heading, largest_yaw_rate=vessel.turn_rate,
+            depth=down, target_depth=down, largest_path_angle=0.26,
+            position=[start.latitude, start.longitude, start.altitude],
+        )  # fmt: skip
+        self.use_state(x, np.zeros(length(motion.PROGRESS), np.int64))
         self._rows, self._points = table(manoeuvres)
         self._phase, self._waves = components(sea, seed, depth)
         self._eddies = eddies(current, seed)
         self.sizes = np.array([len(self._rows), len(self._points), self._phase.shape[1], len(self._eddies)])
         if sea is not None and sea.response == "encounter" and len(self._phase[0]):
-            p[motion.OSCILLATORS : motion.OSCILLATORS + 8] = np.ravel(sea.oscillators)
+            p["oscillators"] = np.ravel(sea.oscillators)
             north, east = start.speed * np.cos(start.heading), start.speed * np.sin(start.heading)
             at = steady(sea, self._phase, self._waves, north, east, start.heading)
-            x[motion.ANSWERS : motion.ANSWERS + 12] = at.ravel()
+            self._state["oscillations"] = at.ravel()
         if vessel.hull is not None:
             self._launch(vessel.hull, start.speed, air)
         motion.initialise(self._x, self._p, self._phase, self._waves, self._eddies)
@@ -121,25 +120,28 @@ class World:
         """Put the numbers of a hull and of the wind into the constants, and its state on a straight course."""
         h = hull.vector
         if air is not None:
-            h[dynamics.WIND : dynamics.WIND + 2] = air.mean
-            h[dynamics.GUST : dynamics.GUST + air.gusts.size] = air.gusts.ravel()
-        self._p[motion.HAS_HULL], self._p[motion.HULL_NUMBERS :] = 1.0, h
-        at = self._x[motion.HULL_STATE :]
-        at[dynamics.PROPELLER], at[dynamics.SPEED] = hull.propeller(speed), speed
+            numbers = h.view(dynamics.HULL)[0]
+            numbers.wind, numbers.gusts[: air.gusts.size] = air.mean, air.gusts.ravel()
+        p = self._p.view(motion.PARAMETERS)
+        p["has_hull"], p["hull"] = True, h
+        self._state["hull"] = filled(dynamics.SAIL, propeller=hull.propeller(speed), speed=speed)
+
+    @property
+    def _state(self) -> NDArray[Any]:
+        """The present state with its names, (1,) `simnav.world.motion.STATE`."""
+        return self._x.view(motion.STATE)
 
     @property
     def time(self) -> float:
         """Time since the start [s]."""
-        return int(self._index[0]) / self.rate
+        return int(self._index.view(motion.PROGRESS)["sample"][0]) / self.rate
 
     def state(self) -> NavigationStates:
         """The present state, as a series of one state."""
-        x = self._x
-        position = x[motion.LATITUDE : motion.HEIGHT + 1]
-        yaw = np.arctan2(x[motion.C + 3], x[motion.C])
-        attitude = np.array([x[motion.ROLL], x[motion.PITCH], yaw])
-        velocity = x[motion.V : motion.V + 3]
-        return NavigationStates(np.array([self.time]), position[None].copy(), velocity[None].copy(), attitude[None])
+        x = self._state
+        dcm = x["dcm"][0].reshape(3, 3)
+        attitude = np.stack([x["roll"], x["pitch"], np.arctan2(dcm[1, :1], dcm[0, :1])], axis=1)
+        return NavigationStates(np.array([self.time]), x["position"].copy(), x["velocity"].copy(), attitude)
 
     def steer_by(self, north: float, east: float, heading: float = 0.0) -> None:
         """Closed loop: set the errors of the estimated position and heading that the guidance uses from now on.
@@ -154,13 +156,13 @@ class World:
         heading : float
             Estimated minus true heading [rad].
         """
-        x = self._x
-        x[motion.ERROR_NORTH], x[motion.ERROR_EAST], x[motion.ERROR_HEADING] = north, east, heading
+        x = self._state
+        x["north_error"], x["east_error"], x["heading_error"] = north, east, heading
         if self._follower is None:
             self._follower = Follower(_planned(*self._voyage))
-        aside, speed = self._follower.aside(float(x[motion.NORTH]) + north, float(x[motion.EAST]) + east, self.time)
+        aside, speed = self._follower.aside(x["north"].item() + north, x["east"].item() + east, self.time)
         ahead = max(LEAST_LOOKAHEAD, LOOKAHEAD_TIME * speed)
-        x[motion.TO_TRACK] = -np.arctan(aside / ahead)
+        x["to_track"] = -np.arctan(aside / ahead)
 
     @classmethod
     def plan(
@@ -222,9 +224,7 @@ class World:
         track, position, dive = np.empty((seconds, 4)), np.empty((seconds, 3)), np.empty((seconds, 2))
         for i in range(seconds):
             motion.advance.unchecked(*arguments)
-            track[i] = self._x[_TRACK]
-            position[i] = self._x[motion.LATITUDE : motion.HEIGHT + 1]
-            dive[i] = self._x[motion.DIVE]
+            track[i], position[i], dive[i] = self.track, self._state["position"][0], self.dive
         return track, position, dive
 
     def share_state(self) -> dict[str, NDArray[Any]]:
@@ -245,14 +245,17 @@ class World:
     @property
     def track(self) -> Array:
         """(4,) array: north and east of the start [m], heading [rad], speed through the water [m/s]."""
-        track: Array = self._x[_TRACK]
-        return track
+        return self._values("north", "east", "heading", "speed")
 
     @property
     def dive(self) -> Array:
         """(2,) array: depth that is steered for [m], and largest path angle [rad]."""
-        dive: Array = self._x[motion.DIVE]
-        return dive
+        return self._values("target_depth", "largest_path_angle")
+
+    def _values(self, *names: str) -> Array:
+        """Numbers of the present state, by name."""
+        state = self._state
+        return np.array([state[name].item() for name in names])
 
     def advance(self, until: float, taps: Mapping[str, Array]) -> WorldBlock:
         """Advance to a time.
@@ -269,7 +272,7 @@ class World:
         WorldBlock
             The ideal IMU samples and the requested states.
         """
-        first = int(self._index[0])
+        first = int(self._index.view(motion.PROGRESS)["sample"][0])
         n = round(until * self.rate) - first
         if n < 0:
             raise ValueError(f"the world is at {self.time} s and does not go back to {until} s")

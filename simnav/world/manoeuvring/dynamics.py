@@ -27,10 +27,11 @@ Industrial Aerodynamics 51, 1994.
 from __future__ import annotations
 
 from math import atan2, cos, exp, sin, sqrt
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-from simnav.compiled import Array, helper, kernel
+from simnav.compiled import helper, kernel
 from simnav.kernel_types import Matrix, Vector
+from simnav.structures import structure
 
 __all__ = ["GUSTS", "HULL", "SAIL", "TERMS", "HullMotion", "Sailed", "integrate_hull", "propeller_for", "sail", "trial"]
 
@@ -39,25 +40,29 @@ TERMS = (
     "u", "u|u|", "uuu", "v", "v|v|", "vvv", "r", "r|r|", "rrr", "v|r|", "r|v|", "uv", "ur", "vr", "rr",
     "fading u", "fading v", "vv", "vvv/U", "vvr/U",
 )  # fmt: skip
-_N = 20
+_N = len(TERMS)
 #: Most harmonics of a gusty wind.
 GUSTS = 16
 
-# Indices in the vector of a hull: inverse of M by rows, K by rows, then the rest in the order of their use.
-K = 9
-REACH, CROSS, DECAY = K + 3 * _N, K + 3 * _N + 1, K + 3 * _N + 2
-T_NN, T_NU, N_LEAST, N_LAG = range(DECAY + 1, DECAY + 5)
-S_MOMENT, S_SPEED, S_DRIFT, S_SWAY, S_DRAG, S_MOST, S_LAG = range(N_LAG + 1, N_LAG + 8)
-#: Air density / 2 times the frontal and the lateral area, length, and the coefficients of Blendermann.
-A_FRONT, A_SIDE, A_LENGTH, C_SIDE, C_BOW, C_STERN, C_CROSS, A_CENTRE = range(S_LAG + 1, S_LAG + 9)
-#: Mean wind, north and east [m/s]; rows of gusts: angular frequency, phase, amplitude as a share of the mean.
-WIND = A_CENTRE + 1
-GUST = WIND + 2
-HULL = GUST + 3 * GUSTS
-
-# Indices in the state of the hull, which is a part of the state of `simnav.world.motion`.
-SWAY, PROPELLER, STEERING, RATE, RATE_CHANGE, SPEED, SPEED_CHANGE, ENGINE = range(8)
-SAIL = 8
+#: A hull: inverse of M by rows, K by rows; half the length on which the cross-flow drag acts, its coefficient, and the
+#: decay of the fading terms; t_nn, t_nu, highest rate astern and lag of the propeller; n_0, n_2, n_v, 1 / x, drag, most
+#: and lag of the steering. Of the wind: air density / 2 times the frontal and the lateral area, length over all, the
+#: coefficients of Blendermann; the mean wind, north and east [m/s]; and for each gust the angular frequency, the phase
+#: and the amplitude as a share of the mean.
+HULL = structure(
+    inverse_mass=9, forces=3 * _N, reach=float, cross_flow=float, decay=float,
+    thrust=float, thrust_loss=float, astern=float, propeller_lag=float,
+    moment=float, moment_of_speed=float, moment_of_drift=float, sway_per_moment=float, steering_drag=float,
+    most_steering=float, steering_lag=float,
+    frontal=float, lateral=float, length_over_all=float, across=float, bow=float, stern=float, cross_force=float,
+    centre=float, wind=2, gusts=3 * GUSTS,
+)  # fmt: skip
+#: The state of a hull, a part of the state of `simnav.world.motion`: sway velocity [m/s], propeller, steering; wanted
+#: yaw rate [rad/s] and speed [m/s] with their changes; and the integral of the control of the speed [m/s^2].
+SAIL = structure(
+    sway=float, propeller=float, steering=float, yaw_rate=float, yaw_rate_change=float, speed=float, speed_change=float,
+    engine=float,
+)  # fmt: skip
 #: Nodes and weights of the quadrature of Gauss and Legendre with six nodes, on [-1, 1].
 _NODE = (0.932469514203152, 0.6612093864662645, 0.2386191860831969)
 _WEIGHT = (0.17132449237917036, 0.3607615730481386, 0.46791393457269104)
@@ -110,12 +115,12 @@ class Sailed(NamedTuple):
 
 
 @helper(borrows=True)
-def _wind_force(h: Array, time: float, psi: float, north: float, east: float) -> Three:
+def _wind_force(h: Any, time: float, psi: float, north: float, east: float) -> Three:
     """Surge and sway force [N] and yaw moment [N m] of the wind on a hull that moves north and east over ground."""
-    gust = 1.0
+    gust, gusts = 1.0, h.gusts
     for i in range(GUSTS):
-        gust += h[GUST + 3 * i + 2] * cos(h[GUST + 3 * i] * time + h[GUST + 3 * i + 1])
-    a, b = h[WIND] * gust - north, h[WIND + 1] * gust - east
+        gust += gusts[3 * i + 2] * cos(gusts[3 * i] * time + gusts[3 * i + 1])
+    a, b = h.wind[0] * gust - north, h.wind[1] * gust - east
     c, s = cos(psi), sin(psi)
     ahead, aside = c * a + s * b, c * b - s * a
     square = ahead * ahead + aside * aside
@@ -125,73 +130,73 @@ def _wind_force(h: Array, time: float, psi: float, north: float, east: float) ->
     angle = atan2(-aside, -ahead)
     side = 1.0 if angle >= 0.0 else -1.0
     angle = abs(angle)
-    along = h[C_BOW] if ahead <= 0.0 else h[C_STERN]
-    ratio = along * h[A_FRONT] / (h[A_SIDE] * h[C_SIDE])
-    below = 1.0 - 0.5 * h[C_CROSS] * (1.0 - ratio) * sin(2.0 * angle) ** 2
-    x = -along * cos(angle) / below * square * h[A_FRONT]
-    y = h[C_SIDE] * sin(angle) / below * square * h[A_SIDE]
+    along = h.bow if ahead <= 0.0 else h.stern
+    ratio = along * h.frontal / (h.lateral * h.across)
+    below = 1.0 - 0.5 * h.cross_force * (1.0 - ratio) * sin(2.0 * angle) ** 2
+    x = -along * cos(angle) / below * square * h.frontal
+    y = h.across * sin(angle) / below * square * h.lateral
     # A wind from starboard pushes to port. Its moment has the lever of the centre of the lateral area, which moves
     # towards the bow for a wind from ahead.
-    lever = h[A_CENTRE] - 0.18 * (angle - 1.5707963267948966)
-    return x, -side * y, -side * y * lever * h[A_LENGTH]
+    lever = h.centre - 0.18 * (angle - 1.5707963267948966)
+    return x, -side * y, -side * y * lever * h.length_over_all
 
 
 @helper(borrows=True)
-def _hull_force(h: Array, u: float, v: float, r: float) -> Three:
+def _hull_force(h: Any, u: float, v: float, r: float) -> Three:
     """Hydrodynamic surge and sway force [N] and yaw moment [N m]."""
     speed = sqrt(u * u + v * v)
-    fading, lean = exp(-h[DECAY] * speed), v * v / (speed + 1e-9)
+    fading, lean = exp(-h.decay * speed), v * v / (speed + 1e-9)
     phi = (
         u, u * abs(u), u * u * u, v, v * abs(v), v * v * v, r, r * abs(r), r * r * r, v * abs(r), r * abs(v), u * v,
         u * r, v * r, r * r, fading * u, fading * v, v * v, lean * v, lean * r,
     )  # fmt: skip
     x = y = n = 0.0
+    forces = h.forces
     for i in range(_N):
-        x += h[K + i] * phi[i]
-        y += h[K + _N + i] * phi[i]
-        n += h[K + 2 * _N + i] * phi[i]
-    if h[CROSS] > 0.0:
-        reach = h[REACH]
+        x += forces[i] * phi[i]
+        y += forces[_N + i] * phi[i]
+        n += forces[2 * _N + i] * phi[i]
+    if h.cross_flow > 0.0:
+        reach = h.reach
         for i in range(3):
             place = reach * _NODE[i]
             fore, aft = v + place * r, v - place * r
             fore, aft = fore * abs(fore), aft * abs(aft)
-            y -= h[CROSS] * reach * _WEIGHT[i] * (fore + aft)
-            n -= h[CROSS] * reach * _WEIGHT[i] * place * (fore - aft)
+            y -= h.cross_flow * reach * _WEIGHT[i] * (fore + aft)
+            n -= h.cross_flow * reach * _WEIGHT[i] * place * (fore - aft)
     return x, y, n
 
 
 @helper(borrows=True)
-def _thrust(h: Array, n: float, u: float) -> float:
+def _thrust(h: Any, n: float, u: float) -> float:
     """Thrust of the propeller [N]."""
-    thrust: float = h[T_NN] * n * abs(n) + h[T_NU] * abs(n) * u
+    thrust: float = h.thrust * n * abs(n) + h.thrust_loss * abs(n) * u
     return thrust
 
 
 @helper(borrows=True)
-def _change(
-    h: Array, water: tuple[float, float], time: float, command: tuple[float, float], s: HullMotion
-) -> HullMotion:
+def _change(h: Any, water: tuple[float, float], time: float, command: tuple[float, float], s: HullMotion) -> HullMotion:
     """Rates of change of u, v, r, heading, propeller and steering."""
     u, v, r = s.surge, s.sway, s.yaw_rate
     psi, n, steer = s.heading, s.propeller, s.steering
     c, d = cos(psi), sin(psi)
     x, y, z = _hull_force(h, u, v, r)
-    if h[A_SIDE] > 0.0 and (h[WIND] != 0.0 or h[WIND + 1] != 0.0):
+    if h.lateral > 0.0 and (h.wind[0] != 0.0 or h.wind[1] != 0.0):
         wx, wy, wz = _wind_force(h, time, psi, water[0] + c * u - d * v, water[1] + d * u + c * v)
         x, y, z = x + wx, y + wy, z + wz
     square = u * u + v * v
-    moment = (h[S_MOMENT] + h[S_SPEED] * square + h[S_DRIFT] * v * v) * steer
-    x += _thrust(h, n, u) - h[S_DRAG] * square * steer * steer
-    y += moment * h[S_SWAY]
+    moment = (h.moment + h.moment_of_speed * square + h.moment_of_drift * v * v) * steer
+    x += _thrust(h, n, u) - h.steering_drag * square * steer * steer
+    y += moment * h.sway_per_moment
     z += moment
+    inverse = h.inverse_mass
     return HullMotion(
-        h[0] * x + h[1] * y + h[2] * z,
-        h[3] * x + h[4] * y + h[5] * z,
-        h[6] * x + h[7] * y + h[8] * z,
+        inverse[0] * x + inverse[1] * y + inverse[2] * z,
+        inverse[3] * x + inverse[4] * y + inverse[5] * z,
+        inverse[6] * x + inverse[7] * y + inverse[8] * z,
         r,
-        (command[0] - n) / h[N_LAG],
-        (command[1] - steer) / h[S_LAG],
+        (command[0] - n) / h.propeller_lag,
+        (command[1] - steer) / h.steering_lag,
     )
 
 
@@ -208,30 +213,30 @@ def _ahead(s: HullMotion, change: HullMotion, dt: float) -> HullMotion:
 
 
 @helper(borrows=True)
-def propeller_for(h: Array, thrust: float, u: float) -> float:
+def propeller_for(h: Any, thrust: float, u: float) -> float:
     """Propeller rate that gives a thrust [N] at a speed [m/s], within its limits.
 
     It is a root of t_nn n |n| + t_nu |n| u = T: the larger one ahead, where there is one, and else the one astern.
     """
-    half, share = 0.5 * h[T_NU] * u / h[T_NN], thrust / h[T_NN]
+    half, share = 0.5 * h.thrust_loss * u / h.thrust, thrust / h.thrust
     if half * half + share >= 0.0:
         n = sqrt(half * half + share) - half
     else:
         n = -half - sqrt(half * half - share)
-    rate: float = min(max(n, h[N_LEAST]), 1.0)
+    rate: float = min(max(n, h.astern), 1.0)
     return rate
 
 
 @helper(borrows=True)
 def integrate_hull(
-    h: Array, s: HullMotion, command: tuple[float, float], water: tuple[float, float], time: float, dt: float
+    h: Any, s: HullMotion, command: tuple[float, float], water: tuple[float, float], time: float, dt: float
 ) -> HullMotion:
     """Integrate the equations over dt seconds under constant commands.
 
     Parameters
     ----------
-    h : (HULL,) array
-        The hull (`simnav.world.manoeuvring.hull.Hull.vector`).
+    h : record
+        A `HULL` (`simnav.world.manoeuvring.hull.Hull.vector`).
     s : HullMotion
         The state at the start.
     command : (float, float)
@@ -256,8 +261,8 @@ def integrate_hull(
 
 @helper(borrows=True)
 def sail(
-    h: Array,
-    x: Array,
+    h: Any,
+    x: Any,
     state: tuple[float, float, float],
     constants: tuple[float, float],
     water: tuple[float, float],
@@ -268,11 +273,10 @@ def sail(
 
     Parameters
     ----------
-    h : (HULL,) array
-        The hull (`simnav.world.manoeuvring.hull.Hull.vector`).
-    x : (SAIL,) array
-        Sway velocity [m/s], propeller, steering, wanted yaw rate [rad/s] and speed [m/s] with their changes, and the
-        integral of the control of the speed [m/s^2]; all but the wanted ones are updated.
+    h : record
+        A `HULL` (`simnav.world.manoeuvring.hull.Hull.vector`).
+    x : record
+        A `SAIL`; all but the wanted yaw rate and speed are updated.
     state : tuple of 3 floats
         Surge velocity through the water [m/s], yaw rate [rad/s], heading [rad].
     constants : (float, float)
@@ -288,32 +292,33 @@ def sail(
     """
     u, r, psi = state
     slow, quick = constants
-    v = x[SWAY]
+    v, inverse = x.sway, h.inverse_mass
     # Engine: proportional and integral control about the thrust of the wanted speed. The integral waits while the
     # engine is at its limit.
-    off = x[SPEED] - u
-    straight = _hull_force(h, x[SPEED], 0.0, 0.0)
-    n = propeller_for(h, (x[SPEED_CHANGE] + off / slow + x[ENGINE]) / h[0] - straight[0], u)
-    if (n < 1.0 or off < 0.0) and (n > h[N_LEAST] or off > 0.0):
-        x[ENGINE] += 0.25 * dt * off / (slow * slow)
+    off = x.speed - u
+    straight = _hull_force(h, x.speed, 0.0, 0.0)
+    n = propeller_for(h, (x.speed_change + off / slow + x.engine) / inverse[0] - straight[0], u)
+    if (n < 1.0 or off < 0.0) and (n > h.astern or off > 0.0):
+        x.engine += 0.25 * dt * off / (slow * slow)
     # Steering: what the yaw rate would do without it, and what is wanted.
-    idle = _change(h, water, time, (0.0, 0.0), HullMotion(u, v, r, psi, x[PROPELLER], 0.0))
-    turning = (h[7] * h[S_SWAY] + h[8]) * (h[S_MOMENT] + h[S_SPEED] * (u * u + v * v) + h[S_DRIFT] * v * v)
-    steer = (x[RATE_CHANGE] + (x[RATE] - r) / quick - idle.yaw_rate) / max(turning, 1e-9 * h[8])
-    command = (n, min(max(steer, -h[S_MOST]), h[S_MOST]))
-    s = integrate_hull(h, HullMotion(u, v, r, psi, x[PROPELLER], x[STEERING]), command, water, time, dt)
-    x[SWAY], x[PROPELLER], x[STEERING] = s.sway, s.propeller, s.steering
+    idle = _change(h, water, time, (0.0, 0.0), HullMotion(u, v, r, psi, x.propeller, 0.0))
+    moment = h.moment + h.moment_of_speed * (u * u + v * v) + h.moment_of_drift * v * v
+    turning = (inverse[7] * h.sway_per_moment + inverse[8]) * moment
+    steer = (x.yaw_rate_change + (x.yaw_rate - r) / quick - idle.yaw_rate) / max(turning, 1e-9 * inverse[8])
+    command = (n, min(max(steer, -h.most_steering), h.most_steering))
+    s = integrate_hull(h, HullMotion(u, v, r, psi, x.propeller, x.steering), command, water, time, dt)
+    x.sway, x.propeller, x.steering = s.sway, s.propeller, s.steering
     return Sailed(s.surge, (s.surge - u) / dt, s.yaw_rate, (s.yaw_rate - r) / dt, s.heading)
 
 
 @kernel
-def trial(h: Vector, states: Matrix, commands: Matrix, dt: float, water: Vector) -> None:
+def trial(hull: Vector, states: Matrix, commands: Matrix, dt: float, water: Vector) -> None:
     """Integrate a hull under given commands, without an autopilot.
 
     Parameters
     ----------
-    h : (HULL,) array
-        The hull.
+    hull : (n,) array
+        A `HULL`.
     states : (n + 1, 6) array
         Surge and sway velocity [m/s], yaw rate [rad/s], heading [rad], propeller, steering at n + 1 times. The first
         row is given; the others are overwritten.
@@ -324,6 +329,7 @@ def trial(h: Vector, states: Matrix, commands: Matrix, dt: float, water: Vector)
     water : (2,) array
         Velocity of the water, north and east [m/s].
     """
+    h = hull.view(HULL)[0]
     for k in range(commands.shape[0]):
         s = HullMotion(states[k, 0], states[k, 1], states[k, 2], states[k, 3], states[k, 4], states[k, 5])
         s = integrate_hull(h, s, (commands[k, 0], commands[k, 1]), (water[0], water[1]), k * dt, dt)

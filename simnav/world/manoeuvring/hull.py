@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from simnav.structures import filled
 from simnav.types import Array
 from simnav.world.manoeuvring import dynamics
 
@@ -143,10 +144,13 @@ class Superstructure:
     centre: float = 0.0
 
     @property
-    def vector(self) -> list[float]:
-        """The numbers of the kernel."""
-        areas = [0.5 * AIR * self.frontal, 0.5 * AIR * self.lateral, self.length]
-        return [*areas, self.across, self.bow, self.stern, self.cross_force, self.centre]
+    def numbers(self) -> dict[str, float]:
+        """The numbers of the kernel, by name (`simnav.world.manoeuvring.dynamics.HULL`)."""
+        return {
+            "frontal": 0.5 * AIR * self.frontal, "lateral": 0.5 * AIR * self.lateral, "length_over_all": self.length,
+            "across": self.across, "bow": self.bow, "stern": self.stern, "cross_force": self.cross_force,
+            "centre": self.centre,
+        }  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -224,20 +228,19 @@ class Hull:
 
     @property
     def vector(self) -> Array:
-        """(HULL,) array: the numbers of the kernels, without wind."""
-        h = np.zeros(dynamics.HULL)
-        h[:9] = np.linalg.inv(np.asarray(self.mass, dtype=np.float64)).ravel()
+        """The numbers of the kernels, without wind: a `simnav.world.manoeuvring.dynamics.HULL`."""
+        of_terms = np.zeros((3, len(dynamics.TERMS)))
         for row, forces in enumerate((self.surge, self.sway, self.yaw)):
             for term, value in forces.items():
-                h[dynamics.K + row * len(dynamics.TERMS) + dynamics.TERMS.index(term)] += value
-        h[dynamics.REACH], h[dynamics.CROSS], h[dynamics.DECAY] = 0.5 * self.length, self.cross_flow, self.decay
-        h[dynamics.T_NN : dynamics.S_LAG + 1] = [
-            self.thrust, self.thrust_loss, self.astern, self.propeller_lag, self.moment, self.moment_of_speed,
-            self.moment_of_drift, 1.0 / self.lever, self.steering_drag, self.most_steering, self.steering_lag,
-        ]  # fmt: skip
-        if self.superstructure is not None:
-            h[dynamics.A_FRONT : dynamics.A_CENTRE + 1] = self.superstructure.vector
-        return h
+                of_terms[row, dynamics.TERMS.index(term)] += value
+        names = set(dynamics.HULL.names or ())
+        given = {name: value for name, value in vars(self).items() if name in names}
+        above = {} if self.superstructure is None else self.superstructure.numbers
+        mass = np.asarray(self.mass, dtype=np.float64)
+        return filled(
+            dynamics.HULL, inverse_mass=np.linalg.inv(mass).ravel(), forces=of_terms.ravel(),
+            reach=0.5 * self.length, sway_per_moment=1.0 / self.lever, **given, **above,
+        )  # fmt: skip
 
     def propeller(self, speed: float) -> float:
         """Propeller rate at a steady speed [m/s] on a straight course in calm weather, as a share of the highest."""
@@ -246,7 +249,7 @@ class Hull:
             + (value * speed * np.exp(-self.decay * abs(speed)) if term == "fading u" else 0.0)
             for term, value in self.surge.items()
         )
-        return float(dynamics.propeller_for.function(self.vector, -resistance, speed))
+        return float(dynamics.propeller_for.function(self.vector.view(dynamics.HULL)[0], -resistance, speed))
 
     @property
     def top_speed(self) -> float:

@@ -145,12 +145,12 @@ def test_added_mass_of_spheroids_is_that_of_the_tables():
 
 @pytest.mark.parametrize("kind", VESSELS)
 def test_the_propeller_gives_the_thrust_that_is_asked_for(kind: str):
-    h, u = VESSELS[kind].hull.vector, 0.5 * VESSELS[kind].hull.top_speed
+    h, u = VESSELS[kind].hull.vector.view(dynamics.HULL)[0], 0.5 * VESSELS[kind].hull.top_speed
     for n in (1.0, 0.7, -0.3):
-        thrust = h[dynamics.T_NN] * n * abs(n) + h[dynamics.T_NU] * abs(n) * u
+        thrust = h.thrust * n * abs(n) + h.thrust_loss * abs(n) * u
         assert dynamics.propeller_for.function(h, thrust, u) == pytest.approx(n)
     assert dynamics.propeller_for.function(h, 1e9, u) == 1.0
-    assert dynamics.propeller_for.function(h, -1e9, u) == h[dynamics.N_LEAST]
+    assert dynamics.propeller_for.function(h, -1e9, u) == h.astern
 
 
 def test_coriolis_forces_do_no_work():
@@ -178,7 +178,7 @@ def wind_force(speed: float, direction: float) -> np.ndarray:
     tower = Superstructure(4.0, 10.0, 8.0, across=0.9, bow=0.5, stern=0.6, cross_force=0.4, centre=0.05)
     hull = Hull(np.eye(3), {}, {}, {}, length=8.0, thrust=1.0, most_steering=1.0, moment=1.0, superstructure=tower)
     h = hull.vector
-    h[dynamics.WIND : dynamics.WIND + 2] = AirFlow(Wind(speed=speed, direction=direction, gustiness=0.0), 1).mean
+    h.view(dynamics.HULL)["wind"] = AirFlow(Wind(speed=speed, direction=direction, gustiness=0.0), 1).mean
     states = np.zeros((2, 6))
     dynamics.trial(h, states, np.zeros((1, 2)), 1e-9, np.zeros(2))
     return states[1, :3] / 1e-9
