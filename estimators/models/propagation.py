@@ -147,8 +147,7 @@ def motion_of(numbers: Array) -> Motion:
 @helper
 def time_of(state: Motion) -> float:
     """Time of a state [s]."""
-    time: float = state.clock.view(CLOCK)[0].time
-    return time
+    return float(state.clock.view(CLOCK)[0].time)
 
 
 @helper
