@@ -234,6 +234,13 @@ class Kernel(Generic[Parameters, Returned]):
             config.CACHE_DIR, config.SLP_VECTORIZE = previous
         return compiled
 
+    @cached_property
+    def _takes_records(self) -> bool:
+        """Whether an argument is a record or a named tuple."""
+        hints = [hint for hint in self.function.__annotations__.values() if hint is not None]
+        resolved = hints_of(self.function).values() if any(isinstance(h, str) for h in hints) else hints
+        return any(isinstance(h, type) and (hasattr(h, "numba_type") or issubclass(h, tuple)) for h in resolved)
+
     @property
     def unchecked(self) -> Callable[Parameters, Returned]:
         """The compiled function without the check of its arguments, which takes a microsecond for twenty arrays.
@@ -256,6 +263,10 @@ class Kernel(Generic[Parameters, Returned]):
         def __call__(self, *args: Any) -> Any:
             if not self.typed:  # a helper is compiled within its callers; alone it would be at the first call,
                 return self.function(*args)  # in every process anew, and a confined one cannot write what it compiles
+            if self._takes_records:  # Numba would keep each of them for good where it checks its type
+                for record in (a for a in args if not getattr(a, "compiled", True)):
+                    _ = record._numba_type_  # it says why compiled functions cannot take it
+                return self.unchecked(*args)
             return (self._dispatcher or self.compile())(*args)
 
 
