@@ -264,7 +264,7 @@ class Kernel(Generic[Parameters, Returned]):
             if not self.typed:  # a helper is compiled within its callers; alone it would be at the first call,
                 return self.function(*args)  # in every process anew, and a confined one cannot write what it compiles
             if self._takes_records:  # Numba would keep each of them for good where it checks its type
-                for record in (a for a in args if not getattr(a, "compiled", True)):
+                for record in (a for a in args if hasattr(type(a), "numba_fields") and not a.compiled):
                     _ = record._numba_type_  # it says why compiled functions cannot take it
                 return self.unchecked(*args)
             return (self._dispatcher or self.compile())(*args)
