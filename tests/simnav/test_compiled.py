@@ -8,6 +8,7 @@ import shutil
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import get_args, get_origin
 
@@ -202,6 +203,25 @@ def test_prune_keeps_what_is_in_use(tmp_path: Path, monkeypatch: pytest.MonkeyPa
 @compiled.kernel
 def at_module_level(x: float) -> float:
     return x + 1.0
+
+
+@compiled.helper
+def twice(function: Callable[[float], float], x: float) -> float:
+    return function(function(x))
+
+
+@compiled.kernel
+def two_more(x: float) -> float:
+    return float(twice(at_module_level, x))
+
+
+def test_a_helper_takes_a_kernel_and_is_not_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The caller is kept, with the kernel in its fingerprint."""
+    monkeypatch.setenv("SIMNAV_CACHE_DIR", str(tmp_path))
+    assert two_more(3.0) == twice(at_module_level, 3.0) == 5.0
+    assert at_module_level in two_more.tree()
+    assert two_more.cached()
+    assert not twice.cached()
 
 
 def test_a_kernel_in_a_closure_and_its_pickle() -> None:
