@@ -237,9 +237,8 @@ class Kernel(Generic[Parameters, Returned]):
     @cached_property
     def _takes_records(self) -> bool:
         """Whether an argument is a record or a named tuple."""
-        hints = [hint for hint in self.function.__annotations__.values() if hint is not None]
-        resolved = hints_of(self.function).values() if any(isinstance(h, str) for h in hints) else hints
-        return any(isinstance(h, type) and (hasattr(h, "numba_type") or issubclass(h, tuple)) for h in resolved)
+        hints = hints_of(self.function).values()
+        return any(isinstance(h, type) and (hasattr(h, "numba_type") or issubclass(h, tuple)) for h in hints)
 
     @property
     def unchecked(self) -> Callable[Parameters, Returned]:

@@ -24,10 +24,11 @@ from simnav.compiled import kernel
 from simnav.estimators.algebra.direct_update import normalised_square
 from simnav.estimators.models.filtering import Prediction, Readings
 from simnav.estimators.networks.file import Network
+from simnav.estimators.networks.groups import GROUPS, group_of
 from simnav.estimators.networks.recurrent import advance, fitting, flat
 from simnav.kernel_types import Vector
 from simnav.structures import filled, length, structure
-from simnav.types import KINDS, Array, Instruments
+from simnav.types import Array, Instruments
 
 from .noise import NoiseAdaptation
 from .prediction import standardised
@@ -36,9 +37,6 @@ from .rules import copied
 __all__ = ["INPUTS", "MEMORY", "RECIPE", "VERSION", "LearnedNoise", "learned_noise", "set_by_network", "shipped"]
 
 RECIPE, VERSION = "noise-network", 1
-#: Groups of instruments, by role. The network sees how large the innovations of each group are.
-_GROUPS = {"fix": 0, "velocity": 1, "heading": 2}
-GROUPS = 4
 #: The inputs: three standardised components, size of the innovation, certainty of the prediction, time since the last
 #: reading, group of the instrument, and the mean size of the innovations of each group.
 NUMBER_OF_INPUTS = 6 + 2 * GROUPS
@@ -163,6 +161,5 @@ class LearnedNoise(NoiseAdaptation):
     def reset(self, instruments: Instruments) -> None:
         """Begin a run."""
         super().reset(instruments)
-        roles = [KINDS[sheet.kind].role for sheet in instruments.values()]
-        for settings, role in zip(self.rule_settings, roles, strict=True):
-            settings[:_WEIGHTS].view(SETTINGS)[0].group = _GROUPS.get(role, GROUPS - 1)
+        for settings, sheet in zip(self.rule_settings, instruments.values(), strict=True):
+            settings[:_WEIGHTS].view(SETTINGS)[0].group = group_of(sheet.kind)

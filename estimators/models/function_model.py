@@ -23,7 +23,7 @@ from .filtering import AidTable, Dynamics, ModelFunctions, Prediction, ReadingsO
 
 __all__ = ["FunctionModel"]
 
-_NOTHING, _NONE = np.empty(0), np.empty((0, 0))
+_NOTHING = np.empty(0)
 
 
 class FunctionModel(ErrorModel):

@@ -36,7 +36,6 @@ __all__ = [
     "BLOCK",
     "BLOCK_NUMBERS",
     "CLOCK",
-    "CLOCK_NUMBERS",
     "HELD_ATTITUDE",
     "HELD_VELOCITY",
     "IMU_NOISE",
@@ -80,8 +79,8 @@ IMU_NOISE = structure(
     gyroscope=float, accelerometer=float, gyroscope_decay=float, gyroscope_walk=float, accelerometer_decay=float,
     accelerometer_walk=float, scale=float, misalignment=float, interval=float,
 )  # fmt: skip
-#: Numbers of a block and of a clock.
-BLOCK_NUMBERS, CLOCK_NUMBERS = numbers_of(ERROR_BLOCK), numbers_of(CLOCK)
+#: Numbers of a block.
+BLOCK_NUMBERS = numbers_of(ERROR_BLOCK)
 #: Columns of the matrices of a block: the 15 states, and one of zeros, so that they are a multiple of eight.
 WIDTH = 16
 

@@ -101,7 +101,7 @@ class FaultIsolation:
             if self._asking is not None:  # the last epoch ended before the result of the test
                 factors.motion_weight[:] = 1.0
             self._fresh, self._asking = True, None
-            self._rejected = self._rejected_before(factors)
+            self._rejected = self._rejected_before(factors) if self._is_fix else set()
             return False
         if not self._is_fix:
             return True

@@ -21,8 +21,9 @@ import numpy as np
 
 from simnav.compiled import kernel
 from simnav.estimators.networks.file import Network
+from simnav.estimators.networks.groups import GROUPS, group_of
 from simnav.kernel_types import IntegerVector, Matrix, Vector
-from simnav.types import KINDS, Array, Instruments
+from simnav.types import Array, Instruments
 
 from .base import Factors
 from .robust_weighting import RobustWeighting
@@ -30,8 +31,6 @@ from .robust_weighting import RobustWeighting
 __all__ = ["INPUTS", "RECIPE", "VERSION", "LearnedWeights", "inputs_of", "shapes_of", "shipped"]
 
 RECIPE, VERSION = "factor-network", 1
-_GROUPS = {"fix": 0, "velocity": 1, "heading": 2}
-GROUPS = 4
 #: The inputs of the network, in order.
 INPUTS = (
     "component_0", "component_1", "component_2", "size", "size_of_mean", "along_mean", "mean_size", "size_before",
@@ -148,7 +147,7 @@ class LearnedWeights(RobustWeighting):
 
     def reset(self, instruments: Instruments) -> None:
         """Begin a run."""
-        self._group = {n: _GROUPS.get(KINDS[s.kind].role, GROUPS - 1) for n, s in instruments.items()}
+        self._group = {name: group_of(sheet.kind) for name, sheet in instruments.items()}
         self._known = {name for name, sheet in instruments.items() if sheet.kind in self.network.kinds}
 
     def choose(self, factors: Factors) -> bool:

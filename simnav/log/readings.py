@@ -382,8 +382,8 @@ def _of_vector(
             elif len(set(units)) > 1:
                 changes.append((table, "units", [units[j] for j in np.argmax(np.abs(matrix), axis=1)]))
             what = f"{name!r} has {names} in {shown(new)}" + (f", in {unit}" if unit else "")
-            yield Reading(name, (name,), with_series(name, value=times * value), number, what,
-                           tuple(changes))  # fmt: skip
+            changed = with_series(name, value=times * value)
+            yield Reading(name, (name,), changed, number, what, tuple(changes))
 
 
 def _of_heading(name: str, table: str, where: LogInstrumentSpec, series: Series) -> Iterator[Reading]:

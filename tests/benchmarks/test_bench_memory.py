@@ -39,7 +39,7 @@ from tests.cases.sorts_of_rows import first_of_each_solver
 #: Seconds of the open sea, by whether the row is slow.
 PIECES = {False: (120, 600), True: (30, 120)}
 #: Without ``--benchmark-enable``: enough for windows, and for the innovations that adaptive rows keep, to fill.
-SHORT = (150, 190)
+SHORT = (90, 130)
 ROWS = [name for name in names() if not describe(name).reference]
 
 
