@@ -12,6 +12,7 @@ from functools import partial
 from typing import Any
 
 import numpy as np
+from scipy.special import ndtri
 
 from simnav.leaderboard.ranking.statistics import STAGES, separate_in_stages, share
 from simnav.leaderboard.ranking.troubles import trouble_of
@@ -77,6 +78,24 @@ def boards(track: str, *, gain: float = 0.0, worse: float = 0.0, number: int = B
     return ends
 
 
+def needed(track: str, gain: float, power: float = 0.8) -> dict[str, float]:
+    """Seeds that a row needs to be told from each of `ROWS` - 1 others, by kind of trouble.
+
+    The test is the best that there can be: normal errors, one-sided, and only pairs with the better row, at
+    5 % in all. The scatter is that of the difference of two real rows, the median of all pairs.
+    """
+    every = real_errors(track)
+    reach = float(ndtri(1.0 - 0.05 / (ROWS - 1)) + ndtri(power))
+    found = {}
+    for group in _groups(track):
+        errors = every[group].mean(axis=0)
+        first, second = np.triu_indices(errors.shape[1], 1)
+        scatter = float(np.median((errors[:, first] - errors[:, second]).std(axis=0, ddof=1)))
+        kind = trouble_of(sorted(h.id for h in headers() if h.track == track)[group[0]])
+        found[kind] = (reach * scatter / math.log1p(-gain)) ** 2
+    return found
+
+
 def parts() -> Mapping[str, Callable[[], Any]]:
     """What is measured, by name."""
     found: dict[str, Callable[[], Any]] = {}
@@ -84,6 +103,7 @@ def parts() -> Mapping[str, Callable[[], Any]]:
         found[f"{track}-equal"] = partial(boards, track, number=2 * BOARDS)
         found[f"{track}-worse"] = partial(boards, track, worse=0.2)
         found |= {f"{track}-{gain:g}": partial(boards, track, gain=gain) for gain in GAINS}
+        found[f"{track}-needed"] = partial(needed, track, 0.1)
     return found
 
 
@@ -103,3 +123,5 @@ def rows(found: Mapping[str, Any]) -> Iterator[tuple[str, str, str, bool]]:
                 f"{100.0 * one['found'] / BOARDS:.0f} %, told from half of them {100.0 * one['told'] / BOARDS:.0f} %"
             )
             yield f"{track}, one row {100.0 * gain:.0f} % better: alone in the set", figure, "", True
+        seeds = ", ".join(f"{title} {n:.0f}" for title, n in found[f"{track}-needed"].items())
+        yield f"{track}, seeds that the best possible test needs for 10 %", seeds, "", True
