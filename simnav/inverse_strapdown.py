@@ -85,16 +85,17 @@ def samples_structure(**rows: int) -> np.dtype[Any]:
     Parameters
     ----------
     **rows : int
-        Further rows by name: their number. They come first.
+        Further rows by name: their number.
     """
     one, three, nine = _ROW, (3, _ROW), (3, 3, _ROW)
     more = {name: (number, _ROW) if number > 1 else one for name, number in rows.items()}
-    return structure(  # Numba would warn of a structure that begins like another one
-        **more, interval=one, velocity=three, dcm=nine, position=three,
-        sine=one, cosine=one, height=one, radius=one, per_north=one, north=one,
-        earth_north=one, earth_down=one, transport=three, gravity=one, per_east=one, zeta=three,
-        square=one, a=one, b=one, c=one, twice_sine=three, change=three, phi=three, alpha=three,
-        cofactors=nine, inverse=one,
+    # What is computed later comes first: a loop then writes below what it reads. Where it writes above, and reads the
+    # end of an interval, the compiler fears that a value is read that was just written, and uses short vectors.
+    return structure(
+        inverse=one, cofactors=nine, alpha=three, phi=three, change=three, twice_sine=three, c=one, b=one, a=one,
+        square=one, zeta=three, per_east=one, gravity=one, transport=three, earth_down=one, earth_north=one,
+        north=one, per_north=one, radius=one, height=one, cosine=one, sine=one, position=three, dcm=nine, **more,
+        velocity=three, interval=one,
     )  # fmt: skip
 
 
@@ -303,14 +304,14 @@ def put_matrix(rows: Array, k: int, m: SmallMatrix) -> None:
 def _coefficients(block: Any, n: int) -> None:
     """The coefficients a, b and c of n rotations, by the squares of their angles."""
     square, a, b, c = block.square, block.a, block.b, block.c
-    large = 0
-    for k in range(n):
+    large, m = 0, np.uint64(n)
+    for k in range(m):
         angle2 = square[k]
         a[k], b[k] = small_rotation_coefficients(angle2)
         c[k] = 1.0 / 6.0 - angle2 * (1.0 / 120.0)
         large += not angle2 < 1e-3
     if large > 0:
-        for k in range(n):
+        for k in range(m):
             angle2 = square[k]
             if not angle2 < 1e-3:
                 a[k], b[k] = rotation_coefficients(angle2)
@@ -327,35 +328,36 @@ def _locate(block: Any, n: int) -> None:
     computed steps are the next guess. Each guess is right for one more interval at least, and the first one is right
     for nearly all blocks: an error of the latitude of 1e-12 rad changes no bit of a step.
     """
-    interval, velocity, position = block.interval, block.velocity, block.position
+    m, interval, velocity, position = np.uint64(n), block.interval, block.velocity, block.position
+    after, end = velocity[:, 1:], position[:, 1:]
     sine, middle_height, per_north, to_north = block.sine, block.height, block.per_north, block.north
     latitude, height, north = position[0, 0], position[2, 0], 0.0
     s = sin(latitude)
     meridian, _ = radii_scalar(s)
     x = 1.0 - ECCENTRICITY_SQUARED * s * s
     slope = 3.0 * ECCENTRICITY_SQUARED * s * cos(latitude) / x * meridian / (meridian + height)
-    for k in range(n):
+    for k in range(m):
         dt = interval[k]
-        m0, m2 = 0.5 * (velocity[0, k] + velocity[0, k + 1]), 0.5 * (velocity[2, k] + velocity[2, k + 1])
+        m0, m2 = 0.5 * (velocity[0, k] + after[0, k]), 0.5 * (velocity[2, k] + after[2, k])
         middle_height[k] = height - 0.5 * dt * m2
         height += -dt * m2
-        position[2, k + 1] = height
+        end[2, k] = height
         to_north[k] = dt * m0
         per_north[k] = north + 0.5 * dt * m0
         north += dt * m0
-    for k in range(n):
+    for k in range(m):
         per_north[k] = 1.0 / (meridian + slope * per_north[k] + middle_height[k])
     for _ in range(n + 1):
         latitude = position[0, 0]
-        for k in range(n):
-            middle = middle_latitude(latitude, 0.5 * (velocity[0, k] + velocity[0, k + 1]), interval[k])
+        for k in range(m):
+            middle = middle_latitude(latitude, 0.5 * (velocity[0, k] + after[0, k]), interval[k])
             sine[k], block.cosine[k] = sin(middle), cos(middle)
             latitude += to_north[k] * per_north[k]
-            position[0, k + 1] = latitude
+            end[0, k] = latitude
         wrong = 0
-        for k in range(n):
+        for k in range(m):
             per_north[k], block.radius[k] = per_north_scalar(sine[k], middle_height[k])
-            wrong += position[0, k] + to_north[k] * per_north[k] != position[0, k + 1]
+            wrong += position[0, k] + to_north[k] * per_north[k] != end[0, k]
         if wrong == 0:
             break
 
@@ -378,10 +380,13 @@ def ideal_samples(block: Any, n: int, memory: Array, rate: Array, force: Array) 
     """
     interval, velocity, dcm, position = block.interval, block.velocity, block.dcm, block.position
     transport, zeta, phi, alpha = block.transport, block.zeta, block.phi, block.alpha
+    # A view begins at the end of the first interval, and indices are unsigned: the compiler then knows that none counts
+    # from the end of a row, and uses vector instructions.
+    m, after, turned, end, new = np.uint64(n), velocity[:, 1:], dcm[:, :, 1:], position[:, 1:], alpha[:, 1:]
     _locate(block, n)
-    for k in range(n):
+    for k in range(m):
         dt = interval[k]
-        m0, m1 = 0.5 * (velocity[0, k] + velocity[0, k + 1]), 0.5 * (velocity[1, k] + velocity[1, k + 1])
+        m0, m1 = 0.5 * (velocity[0, k] + after[0, k]), 0.5 * (velocity[1, k] + after[1, k])
         rates = rates_in_the_middle(
             block.sine[k], block.cosine[k], block.height[k], block.radius[k], block.per_north[k], m0, m1
         )
@@ -395,12 +400,12 @@ def ideal_samples(block: Any, n: int, memory: Array, rate: Array, force: Array) 
         block.square[k] = _square(z)
     _coefficients(block, n)
     large = 0
-    for k in range(n):
+    for k in range(m):
         c, z = matrix_at(dcm, k), three_at(zeta, k)
-        x = _twice_sine(c, matrix_at(dcm, k + 1), z, block.a[k], block.b[k])
+        x = _twice_sine(c, matrix_at(turned, k), z, block.a[k], block.b[k])
         put_three(block.twice_sine, k, x)
         earth = block.earth_north[k], block.earth_down[k]
-        v, w = three_at(velocity, k), three_at(velocity, k + 1)
+        v, w = three_at(velocity, k), three_at(after, k)
         change = _velocity_change(c, v, w, z, earth, three_at(transport, k), block.gravity[k], interval[k])
         put_three(block.change, k, change)
         square = 0.25 * _square(x)
@@ -408,29 +413,29 @@ def ideal_samples(block: Any, n: int, memory: Array, rate: Array, force: Array) 
         put_three(phi, k, (0.5 * ratio * x[0], 0.5 * ratio * x[1], 0.5 * ratio * x[2]))
         large += not square < 1e-3
     if large > 0:
-        for k in range(n):
+        for k in range(m):
             x = three_at(block.twice_sine, k)
             ratio = _ratio(0.25 * _square(x))
             put_three(phi, k, (0.5 * ratio * x[0], 0.5 * ratio * x[1], 0.5 * ratio * x[2]))
     a = memory[0], memory[1], memory[2]
     put_three(alpha, 0, a)
-    for k in range(n):
+    for k in range(m):
         a = _solved((a[0] * TWELFTH, a[1] * TWELFTH, a[2] * TWELFTH), three_at(phi, k))
-        put_three(alpha, k + 1, a)
-        east = 0.5 * (velocity[1, k] + velocity[1, k + 1])
-        position[1, k + 1] = position[1, k] + interval[k] * east * block.per_east[k]
+        put_three(new, k, a)
+        east = 0.5 * (velocity[1, k] + after[1, k])
+        end[1, k] = position[1, k] + interval[k] * east * block.per_east[k]
     memory[0], memory[1], memory[2] = a
-    for k in range(n):
+    for k in range(m):
         block.square[k] = _square(three_at(phi, k))
     _coefficients(block, n)
-    for k in range(n):
+    for k in range(m):
         h = alpha[0, k] * TWELFTH, alpha[1, k] * TWELFTH, alpha[2, k] * TWELFTH
-        m, inverse = _cofactors(three_at(phi, k), h, block.square[k], block.b[k], block.c[k])
-        put_matrix(block.cofactors, k, m)
+        cofactors, inverse = _cofactors(three_at(phi, k), h, block.square[k], block.b[k], block.c[k])
+        put_matrix(block.cofactors, k, cofactors)
         block.inverse[k] = inverse
     nu = memory[3], memory[4], memory[5]
-    for k in range(n):
-        a = three_at(alpha, k + 1)
+    for k in range(m):
+        a = three_at(new, k)
         nu = _nu(three_at(block.change, k), nu, a, matrix_at(block.cofactors, k), block.inverse[k])
         inverse = 1.0 / interval[k]
         rate[k, 0], rate[k, 1], rate[k, 2] = a[0] * inverse, a[1] * inverse, a[2] * inverse

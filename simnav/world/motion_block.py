@@ -130,18 +130,18 @@ def matrix(cr: float, sr: float, ct: float, st: float, ch: float, sh: float) -> 
 @helper(borrows=True)
 def orient(block: Any, n: int) -> None:
     """The direction cosine matrices at the ends of n intervals."""
-    large = 0
-    for k in range(n):
-        roll, pitch = block.roll[k + 1], block.pitch[k + 1]
-        cr, sr = _small_cosine_sine(roll)
-        ct, st = _small_cosine_sine(pitch)
-        put_matrix(block.dcm, k + 1, matrix(cr, sr, ct, st, block.cos_bow[k], block.sin_bow[k]))
-        large += (abs(roll) > 0.3) | (abs(pitch) > 0.3)
+    roll, pitch, dcm, large = block.roll[1:], block.pitch[1:], block.dcm[:, :, 1:], 0
+    m = np.uint64(n)  # as in `simnav.inverse_strapdown`
+    for k in range(m):
+        cr, sr = _small_cosine_sine(roll[k])
+        ct, st = _small_cosine_sine(pitch[k])
+        put_matrix(dcm, k, matrix(cr, sr, ct, st, block.cos_bow[k], block.sin_bow[k]))
+        large += (abs(roll[k]) > 0.3) | (abs(pitch[k]) > 0.3)
     if large > 0:
-        for k in range(n):
-            cr, sr = cosine_sine(block.roll[k + 1])
-            ct, st = cosine_sine(block.pitch[k + 1])
-            put_matrix(block.dcm, k + 1, matrix(cr, sr, ct, st, block.cos_bow[k], block.sin_bow[k]))
+        for k in range(m):
+            cr, sr = cosine_sine(roll[k])
+            ct, st = cosine_sine(pitch[k])
+            put_matrix(dcm, k, matrix(cr, sr, ct, st, block.cos_bow[k], block.sin_bow[k]))
 
 
 @helper(borrows=True)
