@@ -32,7 +32,7 @@ from simnav.types import Array
 from simnav.world.start import HIGHEST_LATITUDE, POLAR
 from simnav.world.trajectory import SampledTrajectory, Voyage
 
-__all__ = ["GivenTrack", "Limits", "Poses", "metres_per_unit", "smooth_track"]
+__all__ = ["Limits", "Poses", "SmoothTrack", "metres_per_unit", "smooth_track"]
 
 #: How far the truth may be from a given pose [m]; it decides which IMU rates are refused.
 _EXACT = 5e-4
@@ -156,7 +156,7 @@ def smooth_track(poses: Poses, departure: float = 0.0) -> Curve:
     return curve
 
 
-class GivenTrack(SampledTrajectory):
+class SmoothTrack(SampledTrajectory):
     """The trajectory through given poses (see the module).
 
     Parameters
