@@ -22,7 +22,7 @@ def scale(noise: Matrix, f0: float, f1: float, f2: float, product: Matrix) -> No
 
 @kernel
 def bound(estimate: Matrix, nominal: Matrix, low: float, high: float, bounded: Matrix) -> None:
-    """Fill in the nominal covariance with the variances of an estimate, from ``low`` to ``high`` times the nominal ones."""
+    """Fill in the nominal covariance with the variances of an estimate, ``low`` to ``high`` times the nominal ones."""
     for i in range(nominal.shape[0]):
         bounded[i, i] = sqrt(min(max(estimate[i, i] / nominal[i, i], low), high))
     for i in range(nominal.shape[0]):
