@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 from simnav.environment.sample_counts import most_samples
 from simnav.estimator import UnsuitableScenario
 from simnav.scenario import Scenario
+from simnav.structures import length
 from simnav.types import Array, InitialState, Instruments
 
-from .bank import MEMORY_COLUMNS, Steps, observe, take
+from .bank import KEPT, Steps, observe, take
 from .features import observation_size
 from .reference import Linear, ReferenceFilter
 from .rewards import REWARDS, StepResult
@@ -147,7 +148,7 @@ class Filters:
         self.task, self.layout, self._reward = task, layout, REWARDS[reward]
         p = len(layout.names)
         self.covariance, self.delta = np.zeros((b, n, n)), np.zeros((b, n))
-        self.memory = np.zeros((b, p, MEMORY_COLUMNS))
+        self.memory = np.zeros((b, p, length(KEPT)))
         self.decision = Decision(b, p, layout.most)
         self.observation = np.zeros((b, layout.size), np.float32)
         self.rewards, self.period = np.zeros(b), np.ones((b, p))
@@ -188,7 +189,7 @@ class Filters:
             Steps(active, first, last), linear, self.layout.place, decision.scale, decision.process_scale,
             self.covariance, self.delta,
         )  # fmt: skip
-        self.memory[active, :, 5] = decision.setting[active]
+        self.memory.view(KEPT)["setting"][active, :, 0] = decision.setting[active]
 
     def reward(
         self,
