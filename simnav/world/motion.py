@@ -36,7 +36,7 @@ from simnav.world.motion_block import (
     tap_at,
     wrapped,
 )
-from simnav.world.sea import ROWS
+from simnav.world.sea import PHASES, ROWS
 from simnav.world.seaway import OSCILLATIONS, OSCILLATORS, Responses, Transitions, answers, transitions, wave_responses
 
 __all__ = [
@@ -83,8 +83,6 @@ PARAMETERS = structure(
 )  # fmt: skip
 #: What a world consists of: numbers of manoeuvres, points, waves and eddies.
 SIZES = structure(manoeuvres=int, points=int, waves=int, eddies=int)
-#: Rows of the phases of waves.
-PHASES = 3
 #: Length of the array that holds a block of the motion.
 _WORK = length(MOTION)
 
