@@ -410,15 +410,15 @@ class SteppedRuns:
         time = np.arange(first + 1, first + n + 1) / rate
         variates = self._grown("variates", (2, n, 3), np.float64)
         both = (imu.gyroscope, imu.accelerometer)
-        triads: list[Any] = [t.ahead(variates[b, i, :n], float(time[-1])) for i, t in enumerate(both)]
+        triads = [t.ahead(variates[b, i, :n], float(time[-1])) for i, t in enumerate(both)]
         self._put("clock", b, np.array([first, rate], np.float64))
-        for k, name in ((0, "instability"), (2, "walk")):
-            table = np.zeros((2, max(len(t[k]) for t in triads), 3))
-            for i in range(2):
-                table[i, : len(triads[i][k])] = triads[i][k]
+        for name, held in zip(("instability", "walk"), zip(*triads, strict=True), strict=True):
+            table = np.zeros((2, max(len(t.rows) for t in held), 3))
+            for i, t in enumerate(held):
+                table[i, : len(t.rows)] = t.rows
             self._put(name, b, table)
-            self._put(name + "_rows", b, np.array([len(t[k]) for t in triads], np.int64))
-            self._put(name + "_first", b, np.array([t[k + 1] for t in triads], np.int64))
+            self._put(name + "_rows", b, np.array([len(t.rows) for t in held], np.int64))
+            self._put(name + "_first", b, np.array([t.first for t in held], np.int64))
         found = [layer.ahead_imu(time) for layer in simulator.layers if layer.operation == DISTURBS_IMU]
         active = np.stack([f[0] for f in found]) if found else np.zeros((0, n), np.bool_)
         errors = np.stack([f[1] for f in found]) if found else np.zeros((0, n, 6))
