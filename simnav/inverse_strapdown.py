@@ -4,14 +4,14 @@ The equations and their symbols are those of `simnav.strapdown`. There are two f
 `sample_from_motion` computes one sample, and `ideal_samples` a block of up to `BLOCK` samples. Both consist of the same
 parts, which are short kernels. Only three things depend on the sample before: the latitude, and the angle and velocity
 increments, by the corrections for coning and sculling. All else is computed for each sample by itself. So the block
-form has the parts in loops of their own, over rows of one array, and the compiler uses vector instructions. Each sample
-keeps the order of its operations. The loops over increments depend on the sample before, and are short.
+form has the parts in loops of their own, over the rows of a record, and the compiler uses vector instructions. Each
+sample keeps the order of its operations. The loops over increments depend on the sample before, and are short.
 """
 
 from __future__ import annotations
 
 from math import cos, sin, sqrt
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -26,25 +26,23 @@ from simnav.geometry.rotation import (
 )
 from simnav.kernel_types import Matrix, Stack, Vector
 from simnav.strapdown import TWELFTH, Triple, local_rates, middle_latitude, per_north_scalar, rates_in_the_middle
+from simnav.structures import filled, structure
 from simnav.types import Array, ImuSamples
 
 __all__ = [
-    "AXES",
     "BLOCK",
-    "BLOCK_COLUMNS",
-    "EARTH",
-    "INTERVAL",
-    "PER_EAST",
-    "PER_NORTH",
-    "POSITION",
-    "SAMPLE_ROWS",
-    "VELOCITY",
+    "SAMPLES",
     "IdealSample",
     "SmallMatrix",
     "ideal_samples",
     "increments",
+    "matrix_at",
+    "put_matrix",
+    "put_three",
     "sample_from_motion",
+    "samples_structure",
     "small_matrix",
+    "three_at",
 ]
 
 
@@ -68,25 +66,41 @@ def small_matrix(c: Array) -> SmallMatrix:
     return SmallMatrix(c[0, 0], c[0, 1], c[0, 2], c[1, 0], c[1, 1], c[1, 2], c[2, 0], c[2, 1], c[2, 2])
 
 
-#: Most samples of a block. Its array is small enough for the fastest memory of a processor.
+#: Most samples of a block. Its record is small enough for the fastest memory of a processor.
 BLOCK = 64
-#: Columns of the array of a block: a row has one value for each sample, or for each end of a sample interval.
-BLOCK_COLUMNS = BLOCK + 8
-# Its rows. Length of the interval; at each end velocity, direction cosine matrix and position.
-INTERVAL, VELOCITY, AXES, POSITION = 0, 1, 4, 13
-# In the middle: sine and cosine of the latitude, height, radius in the prime vertical, d(latitude)/d(north); distance
-# to the north in the interval.
-SINE, COSINE, HEIGHT, RADIUS, PER_NORTH, STEP = 16, 17, 18, 19, 20, 21
-# Earth rate north and down, transport rate, gravity, d(longitude)/d(east), zeta; square of an angle, and three
-# coefficients of its rotation.
-EARTH, TRANSPORT, GRAVITY, PER_EAST, ZETA, SQUARE, COEFFICIENTS = 22, 24, 27, 28, 29, 32, 33
-# Axis of the rotation times twice the sine of its angle; C' u of the velocity change u; phi.
-AXIS, CHANGE, PHI = 36, 39, 42
-# At each end: angle increment of the interval before.
-ALPHA = 45
-# The matrix of nu: nine cofactors, and the inverse of the determinant.
-COFACTORS, INVERSE = 48, 57
-SAMPLE_ROWS = 58
+#: Length of a row: it has one value for each sample, or for each end of a sample interval.
+_ROW = BLOCK + 8
+
+
+def samples_structure(**rows: int) -> np.dtype[Any]:
+    """The structure of a block of samples.
+
+    It holds, at each end of an interval: velocity, direction cosine matrix and position; the length of the interval.
+    In the middle of the interval: sine and cosine of the latitude, height, radius in the prime vertical,
+    d(latitude)/d(north) and d(longitude)/d(east), Earth rate, transport rate and gravity; the distance to the north.
+    Of a rotation x: the square of its angle, a = sin|x|/|x|, b = (1 - cos|x|)/|x|^2 and c = (1 - a)/|x|^2. Zeta; twice
+    the sine of the angle of the body rotation times its axis, and phi; C' u of the velocity change u; alpha, at the end
+    of its interval; cofactors of the matrix of nu, and the inverse of its determinant.
+
+    Parameters
+    ----------
+    **rows : int
+        Further rows by name: their number.
+    """
+    one, three, nine = _ROW, (3, _ROW), (3, 3, _ROW)
+    more = {name: (number, _ROW) if number > 1 else one for name, number in rows.items()}
+    # What is computed later comes first: a loop then writes below what it reads. Where it writes above, and reads the
+    # end of an interval, the compiler fears that a value is read that was just written, and uses short vectors.
+    return structure(
+        inverse=one, cofactors=nine, alpha=three, phi=three, change=three, twice_sine=three, c=one, b=one, a=one,
+        square=one, zeta=three, per_east=one, gravity=one, transport=three, earth_down=one, earth_north=one,
+        north=one, per_north=one, radius=one, height=one, cosine=one, sine=one, position=three, dcm=nine, **more,
+        velocity=three, interval=one,
+    )  # fmt: skip
+
+
+#: A block of samples.
+SAMPLES = samples_structure()
 
 
 @helper(borrows=True)
@@ -258,38 +272,54 @@ def sample_from_motion(
 
 
 @helper(borrows=True)
-def _three(block: Array, row: int, k: int) -> Triple:
-    return block[row, k], block[row + 1, k], block[row + 2, k]
+def three_at(rows: Array, k: int) -> Triple:
+    """A vector of sample k."""
+    return rows[0, k], rows[1, k], rows[2, k]
 
 
 @helper(borrows=True)
-def _matrix_at(block: Array, row: int, k: int) -> SmallMatrix:
+def put_three(rows: Array, k: int, x: Triple) -> None:
+    """Store a vector of sample k."""
+    rows[0, k], rows[1, k], rows[2, k] = x
+
+
+@helper(borrows=True)
+def matrix_at(rows: Array, k: int) -> SmallMatrix:
+    """A matrix of sample k."""
     return SmallMatrix(
-        block[row, k], block[row + 1, k], block[row + 2, k], block[row + 3, k], block[row + 4, k], block[row + 5, k],
-        block[row + 6, k], block[row + 7, k], block[row + 8, k],
+        rows[0, 0, k], rows[0, 1, k], rows[0, 2, k], rows[1, 0, k], rows[1, 1, k], rows[1, 2, k], rows[2, 0, k],
+        rows[2, 1, k], rows[2, 2, k],
     )  # fmt: skip
 
 
 @helper(borrows=True)
-def _coefficients(block: Array, n: int) -> None:
-    """The coefficients of n rotations by the squares of their angles, and (1 - sin(x)/x)/x^2 of each."""
-    large = 0
-    for k in range(n):
-        angle2 = block[SQUARE, k]
-        block[COEFFICIENTS, k], block[COEFFICIENTS + 1, k] = small_rotation_coefficients(angle2)
-        block[COEFFICIENTS + 2, k] = 1.0 / 6.0 - angle2 * (1.0 / 120.0)
-        large += not angle2 < 1e-3
-    if large > 0:
-        for k in range(n):
-            angle2 = block[SQUARE, k]
-            if not angle2 < 1e-3:
-                sa, b = rotation_coefficients(angle2)
-                block[COEFFICIENTS, k], block[COEFFICIENTS + 1, k] = sa, b
-                block[COEFFICIENTS + 2, k] = (1.0 - sa) / angle2
+def put_matrix(rows: Array, k: int, m: SmallMatrix) -> None:
+    """Store a matrix of sample k."""
+    rows[0, 0, k], rows[0, 1, k], rows[0, 2, k] = m.c00, m.c01, m.c02
+    rows[1, 0, k], rows[1, 1, k], rows[1, 2, k] = m.c10, m.c11, m.c12
+    rows[2, 0, k], rows[2, 1, k], rows[2, 2, k] = m.c20, m.c21, m.c22
 
 
 @helper(borrows=True)
-def _locate(block: Array, n: int) -> None:
+def _coefficients(block: Any, n: int) -> None:
+    """The coefficients a, b and c of n rotations, by the squares of their angles."""
+    square, a, b, c = block.square, block.a, block.b, block.c
+    large, m = 0, np.uint64(n)
+    for k in range(m):
+        angle2 = square[k]
+        a[k], b[k] = small_rotation_coefficients(angle2)
+        c[k] = 1.0 / 6.0 - angle2 * (1.0 / 120.0)
+        large += not angle2 < 1e-3
+    if large > 0:
+        for k in range(m):
+            angle2 = square[k]
+            if not angle2 < 1e-3:
+                a[k], b[k] = rotation_coefficients(angle2)
+                c[k] = (1.0 - a[k]) / angle2
+
+
+@helper(borrows=True)
+def _locate(block: Any, n: int) -> None:
     """Latitudes and heights at the ends of n intervals, and what follows from those in their middle.
 
     The latitude in the middle decides the step to the next latitude, by a sine, a root and two divisions. To wait for
@@ -298,49 +328,49 @@ def _locate(block: Array, n: int) -> None:
     computed steps are the next guess. Each guess is right for one more interval at least, and the first one is right
     for nearly all blocks: an error of the latitude of 1e-12 rad changes no bit of a step.
     """
-    height, north = block[POSITION + 2, 0], 0.0
-    s = sin(block[POSITION, 0])
+    m, interval, velocity, position = np.uint64(n), block.interval, block.velocity, block.position
+    after, end = velocity[:, 1:], position[:, 1:]
+    sine, middle_height, per_north, to_north = block.sine, block.height, block.per_north, block.north
+    latitude, height, north = position[0, 0], position[2, 0], 0.0
+    s = sin(latitude)
     meridian, _ = radii_scalar(s)
     x = 1.0 - ECCENTRICITY_SQUARED * s * s
-    slope = 3.0 * ECCENTRICITY_SQUARED * s * cos(block[POSITION, 0]) / x * meridian / (meridian + height)
-    for k in range(n):
-        dt = block[INTERVAL, k]
-        m0, m2 = (
-            0.5 * (block[VELOCITY, k] + block[VELOCITY, k + 1]),
-            0.5 * (block[VELOCITY + 2, k] + block[VELOCITY + 2, k + 1]),
-        )
-        block[HEIGHT, k] = height - 0.5 * dt * m2
+    slope = 3.0 * ECCENTRICITY_SQUARED * s * cos(latitude) / x * meridian / (meridian + height)
+    for k in range(m):
+        dt = interval[k]
+        m0, m2 = 0.5 * (velocity[0, k] + after[0, k]), 0.5 * (velocity[2, k] + after[2, k])
+        middle_height[k] = height - 0.5 * dt * m2
         height += -dt * m2
-        block[POSITION + 2, k + 1] = height
-        block[STEP, k] = dt * m0
-        block[PER_NORTH, k] = north + 0.5 * dt * m0
+        end[2, k] = height
+        to_north[k] = dt * m0
+        per_north[k] = north + 0.5 * dt * m0
         north += dt * m0
-    for k in range(n):
-        block[PER_NORTH, k] = 1.0 / (meridian + slope * block[PER_NORTH, k] + block[HEIGHT, k])
+    for k in range(m):
+        per_north[k] = 1.0 / (meridian + slope * per_north[k] + middle_height[k])
     for _ in range(n + 1):
-        latitude = block[POSITION, 0]
-        for k in range(n):
-            middle = middle_latitude(latitude, 0.5 * (block[VELOCITY, k] + block[VELOCITY, k + 1]), block[INTERVAL, k])
-            block[SINE, k], block[COSINE, k] = sin(middle), cos(middle)
-            latitude += block[STEP, k] * block[PER_NORTH, k]
-            block[POSITION, k + 1] = latitude
+        latitude = position[0, 0]
+        for k in range(m):
+            middle = middle_latitude(latitude, 0.5 * (velocity[0, k] + after[0, k]), interval[k])
+            sine[k], block.cosine[k] = sin(middle), cos(middle)
+            latitude += to_north[k] * per_north[k]
+            end[0, k] = latitude
         wrong = 0
-        for k in range(n):
-            block[PER_NORTH, k], block[RADIUS, k] = per_north_scalar(block[SINE, k], block[HEIGHT, k])
-            wrong += block[POSITION, k] + block[STEP, k] * block[PER_NORTH, k] != block[POSITION, k + 1]
+        for k in range(m):
+            per_north[k], block.radius[k] = per_north_scalar(sine[k], middle_height[k])
+            wrong += position[0, k] + to_north[k] * per_north[k] != end[0, k]
         if wrong == 0:
             break
 
 
 @helper(borrows=True)
-def ideal_samples(block: Array, n: int, memory: Array, rate: Array, force: Array) -> None:
+def ideal_samples(block: Any, n: int, memory: Array, rate: Array, force: Array) -> None:
     """The samples of ideal instruments over n intervals: `sample_from_motion` for a block.
 
     Parameters
     ----------
-    block : (SAMPLE_ROWS or more, BLOCK_COLUMNS) array
-        Given are the n intervals, velocities and direction cosine matrices at their n + 1 ends, and the position at the
-        start. The positions at the other ends and all other rows are overwritten.
+    block : record
+        A `samples_structure`. Given are the n intervals, velocities and direction cosine matrices at their n + 1 ends,
+        and the position at the start. The positions at the other ends and all other rows are overwritten.
     n : int
         Number of intervals, at most `BLOCK`.
     memory : (6,) array
@@ -348,74 +378,66 @@ def ideal_samples(block: Array, n: int, memory: Array, rate: Array, force: Array
     rate, force : (n, 3) arrays
         Overwritten: mean angular rates [rad/s] and mean specific forces [m/s^2], body axes.
     """
+    interval, velocity, dcm, position = block.interval, block.velocity, block.dcm, block.position
+    transport, zeta, phi, alpha = block.transport, block.zeta, block.phi, block.alpha
+    # A view begins at the end of the first interval, and indices are unsigned: the compiler then knows that none counts
+    # from the end of a row, and uses vector instructions.
+    m, after, turned, end, new = np.uint64(n), velocity[:, 1:], dcm[:, :, 1:], position[:, 1:], alpha[:, 1:]
     _locate(block, n)
-    for k in range(n):
-        dt = block[INTERVAL, k]
-        m0, m1 = (
-            0.5 * (block[VELOCITY, k] + block[VELOCITY, k + 1]),
-            0.5 * (block[VELOCITY + 1, k] + block[VELOCITY + 1, k + 1]),
-        )
+    for k in range(m):
+        dt = interval[k]
+        m0, m1 = 0.5 * (velocity[0, k] + after[0, k]), 0.5 * (velocity[1, k] + after[1, k])
         rates = rates_in_the_middle(
-            block[SINE, k], block[COSINE, k], block[HEIGHT, k], block[RADIUS, k], block[PER_NORTH, k], m0, m1
+            block.sine[k], block.cosine[k], block.height[k], block.radius[k], block.per_north[k], m0, m1
         )
         e0, e2 = rates.earth_north, rates.earth_down
         k0, k1, k2 = rates.transport_north, rates.transport_east, rates.transport_down
-        z0, z1, z2 = (e0 + k0) * dt, k1 * dt, (e2 + k2) * dt
-        block[EARTH, k], block[EARTH + 1, k] = e0, e2
-        block[GRAVITY, k], block[PER_EAST, k] = rates.gravity, rates.per_east
-        block[TRANSPORT, k], block[TRANSPORT + 1, k], block[TRANSPORT + 2, k] = k0, k1, k2
-        block[ZETA, k], block[ZETA + 1, k], block[ZETA + 2, k] = z0, z1, z2
-        block[SQUARE, k] = _square((z0, z1, z2))
+        z = (e0 + k0) * dt, k1 * dt, (e2 + k2) * dt
+        block.earth_north[k], block.earth_down[k] = e0, e2
+        block.gravity[k], block.per_east[k] = rates.gravity, rates.per_east
+        put_three(transport, k, (k0, k1, k2))
+        put_three(zeta, k, z)
+        block.square[k] = _square(z)
     _coefficients(block, n)
     large = 0
-    for k in range(n):
-        c, z = _matrix_at(block, AXES, k), _three(block, ZETA, k)
-        x0, x1, x2 = _twice_sine(
-            c, _matrix_at(block, AXES, k + 1), z, block[COEFFICIENTS, k], block[COEFFICIENTS + 1, k]
-        )
-        change = _velocity_change(
-            c, _three(block, VELOCITY, k), _three(block, VELOCITY, k + 1), z, (block[EARTH, k], block[EARTH + 1, k]),
-            _three(block, TRANSPORT, k), block[GRAVITY, k], block[INTERVAL, k],
-        )  # fmt: skip
-        block[AXIS, k], block[AXIS + 1, k], block[AXIS + 2, k] = x0, x1, x2
-        block[CHANGE, k], block[CHANGE + 1, k], block[CHANGE + 2, k] = change
-        square = 0.25 * _square((x0, x1, x2))
+    for k in range(m):
+        c, z = matrix_at(dcm, k), three_at(zeta, k)
+        x = _twice_sine(c, matrix_at(turned, k), z, block.a[k], block.b[k])
+        put_three(block.twice_sine, k, x)
+        earth = block.earth_north[k], block.earth_down[k]
+        v, w = three_at(velocity, k), three_at(after, k)
+        change = _velocity_change(c, v, w, z, earth, three_at(transport, k), block.gravity[k], interval[k])
+        put_three(block.change, k, change)
+        square = 0.25 * _square(x)
         ratio = _small_ratio(square)
-        r0, r1, r2 = 0.5 * ratio * x0, 0.5 * ratio * x1, 0.5 * ratio * x2
-        block[PHI, k], block[PHI + 1, k], block[PHI + 2, k] = r0, r1, r2
+        put_three(phi, k, (0.5 * ratio * x[0], 0.5 * ratio * x[1], 0.5 * ratio * x[2]))
         large += not square < 1e-3
     if large > 0:
-        for k in range(n):
-            x0, x1, x2 = _three(block, AXIS, k)
-            ratio = _ratio(0.25 * _square((x0, x1, x2)))
-            block[PHI, k], block[PHI + 1, k], block[PHI + 2, k] = 0.5 * ratio * x0, 0.5 * ratio * x1, 0.5 * ratio * x2
+        for k in range(m):
+            x = three_at(block.twice_sine, k)
+            ratio = _ratio(0.25 * _square(x))
+            put_three(phi, k, (0.5 * ratio * x[0], 0.5 * ratio * x[1], 0.5 * ratio * x[2]))
     a = memory[0], memory[1], memory[2]
-    block[ALPHA, 0], block[ALPHA + 1, 0], block[ALPHA + 2, 0] = a
-    for k in range(n):
-        a = _solved((a[0] * TWELFTH, a[1] * TWELFTH, a[2] * TWELFTH), _three(block, PHI, k))
-        block[ALPHA, k + 1], block[ALPHA + 1, k + 1], block[ALPHA + 2, k + 1] = a
-        east = 0.5 * (block[VELOCITY + 1, k] + block[VELOCITY + 1, k + 1])
-        block[POSITION + 1, k + 1] = block[POSITION + 1, k] + block[INTERVAL, k] * east * block[PER_EAST, k]
+    put_three(alpha, 0, a)
+    for k in range(m):
+        a = _solved((a[0] * TWELFTH, a[1] * TWELFTH, a[2] * TWELFTH), three_at(phi, k))
+        put_three(new, k, a)
+        east = 0.5 * (velocity[1, k] + after[1, k])
+        end[1, k] = position[1, k] + interval[k] * east * block.per_east[k]
     memory[0], memory[1], memory[2] = a
-    for k in range(n):
-        block[SQUARE, k] = _square(_three(block, PHI, k))
+    for k in range(m):
+        block.square[k] = _square(three_at(phi, k))
     _coefficients(block, n)
-    for k in range(n):
-        h = block[ALPHA, k] * TWELFTH, block[ALPHA + 1, k] * TWELFTH, block[ALPHA + 2, k] * TWELFTH
-        m, inverse = _cofactors(
-            _three(block, PHI, k), h, block[SQUARE, k], block[COEFFICIENTS + 1, k], block[COEFFICIENTS + 2, k]
-        )
-        (
-            block[COFACTORS, k], block[COFACTORS + 1, k], block[COFACTORS + 2, k], block[COFACTORS + 3, k],
-            block[COFACTORS + 4, k], block[COFACTORS + 5, k], block[COFACTORS + 6, k], block[COFACTORS + 7, k],
-            block[COFACTORS + 8, k],
-        ) = m  # fmt: skip
-        block[INVERSE, k] = inverse
+    for k in range(m):
+        h = alpha[0, k] * TWELFTH, alpha[1, k] * TWELFTH, alpha[2, k] * TWELFTH
+        cofactors, inverse = _cofactors(three_at(phi, k), h, block.square[k], block.b[k], block.c[k])
+        put_matrix(block.cofactors, k, cofactors)
+        block.inverse[k] = inverse
     nu = memory[3], memory[4], memory[5]
-    for k in range(n):
-        a = _three(block, ALPHA, k + 1)
-        nu = _nu(_three(block, CHANGE, k), nu, a, _matrix_at(block, COFACTORS, k), block[INVERSE, k])
-        inverse = 1.0 / block[INTERVAL, k]
+    for k in range(m):
+        a = three_at(new, k)
+        nu = _nu(three_at(block.change, k), nu, a, matrix_at(block.cofactors, k), block.inverse[k])
+        inverse = 1.0 / interval[k]
         rate[k, 0], rate[k, 1], rate[k, 2] = a[0] * inverse, a[1] * inverse, a[2] * inverse
         force[k, 0], force[k, 1], force[k, 2] = nu[0] * inverse, nu[1] * inverse, nu[2] * inverse
     memory[3], memory[4], memory[5] = nu
@@ -430,6 +452,7 @@ def _increments(
     position: Matrix,
     angular_rate: Matrix,
     specific_force: Matrix,
+    work: Vector,
 ) -> None:
     """The samples of ideal instruments between k + 1 states; see `increments`.
 
@@ -445,22 +468,24 @@ def _increments(
         Geodetic positions. The first one is given; the others are overwritten by the integral of the mechanization.
     angular_rate, specific_force : (k, 3) arrays
         Overwritten: means over the intervals [rad/s], [m/s^2].
+    work : (w,) array
+        Room for `SAMPLES`; overwritten.
     """
-    block = np.empty((SAMPLE_ROWS, BLOCK_COLUMNS))
+    block = work.view(SAMPLES)[0]
     for start in range(0, time.size - 1, BLOCK):
         n = min(BLOCK, time.size - 1 - start)
         for k in range(n + 1):
             for i in range(3):
-                block[VELOCITY + i, k] = velocity[start + k, i]
+                block.velocity[i, k] = velocity[start + k, i]
                 for j in range(3):
-                    block[AXES + 3 * i + j, k] = dcm[start + k, i, j]
+                    block.dcm[i, j, k] = dcm[start + k, i, j]
         for i in range(3):
-            block[POSITION + i, 0] = position[start, i]
+            block.position[i, 0] = position[start, i]
         for k in range(n):
-            block[INTERVAL, k] = time[start + k + 1] - time[start + k]
+            block.interval[k] = time[start + k + 1] - time[start + k]
         ideal_samples(block, n, memory, angular_rate[start : start + n], specific_force[start : start + n])
         for k in range(1, n + 1):
-            position[start + k] = _three(block, POSITION, k)
+            position[start + k] = three_at(block.position, k)
 
 
 def increments(
@@ -510,5 +535,6 @@ def increments(
         positions,
         rate,
         force,
+        filled(SAMPLES),
     )
     return ImuSamples(time[1:], interval, rate, force), positions

@@ -23,13 +23,13 @@ from numpy.typing import NDArray
 __all__ = ["filled", "length", "structure"]
 
 
-def structure(**fields: type | int) -> np.dtype[Any]:
+def structure(**fields: type | int | tuple[int, ...]) -> np.dtype[Any]:
     """The data type of a structure.
 
     Parameters
     ----------
-    **fields : type or int
-        By name: ``float``, ``int``, or the length of an array of float64.
+    **fields : type, int or tuple of int
+        By name: ``float``, ``int``, or the length or the shape of an array of float64.
 
     Examples
     --------
@@ -37,8 +37,7 @@ def structure(**fields: type | int) -> np.dtype[Any]:
     ('count', 'limits')
     """
     named: list[Any] = [
-        (name, np.float64, (kind,)) if isinstance(kind, int) else (name, np.dtype(kind))
-        for name, kind in fields.items()
+        (name, np.dtype(kind)) if isinstance(kind, type) else (name, np.float64, kind) for name, kind in fields.items()
     ]
     return np.dtype((np.record, named))
 
@@ -48,7 +47,7 @@ def length(kind: np.dtype[Any]) -> int:
     return kind.itemsize // 8
 
 
-def filled(kind: np.dtype[Any], **values: Any) -> NDArray[np.float64]:
+def filled(kind: np.dtype[Any], /, **values: Any) -> NDArray[np.float64]:
     """An array that holds a structure with these values; what is not named is zero.
 
     Examples

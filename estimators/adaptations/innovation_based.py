@@ -16,7 +16,8 @@ from simnav.types import Array
 
 from .base import Innovation
 from .noise import EstimatedNoise, Scope
-from .rules import bound, copied
+from .rules import copied
+from .scaled_noise import bound
 
 __all__ = ["FixedWindow", "InnovationBased", "adaptive_window", "innovation_noise"]
 

@@ -15,7 +15,7 @@ from simnav.types import KINDS, Array, Instruments
 from .base import Adaptation, Innovation
 from .choice import Choice, choose_noise
 from .prediction import PredictionTest
-from .rules import bound, scale
+from .scaled_noise import bound, scale
 
 __all__ = ["EstimatedNoise", "NoiseAdaptation", "Posterior", "Scope", "WeightedNoise", "scaled"]
 

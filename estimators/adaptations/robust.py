@@ -14,7 +14,8 @@ from simnav.types import Array
 from .base import Innovation
 from .noise import WeightedNoise, scaled
 from .prediction import standardised
-from .rules import copied, scale
+from .rules import copied
+from .scaled_noise import scale
 
 __all__ = ["EquivalentWeights", "HuberWeights", "Igg3Weights", "huber", "huber_noise", "igg3", "igg3_noise"]
 

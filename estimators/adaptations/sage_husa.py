@@ -12,7 +12,8 @@ from simnav.types import Array
 
 from .base import Innovation
 from .noise import EstimatedNoise, Scope
-from .rules import bound, copied
+from .rules import copied
+from .scaled_noise import bound
 
 __all__ = ["SageHusa", "sage_husa_noise"]
 

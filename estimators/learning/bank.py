@@ -16,14 +16,16 @@ from simnav.compiled import Array, helper, kernel
 from simnav.estimators.algebra.cholesky import factorise, solve_factor
 from simnav.estimators.algebra.joseph import joseph_update, project
 from simnav.kernel_types import FlagVector, IntegerVector, Matrix, Stack, Vector
+from simnav.structures import structure
 
 from .features import LIMIT, MEMORY, PER_INSTRUMENT, PER_MEASUREMENT, WHITE
 from .reference import Linear
 
-__all__ = ["MEMORY_COLUMNS", "Steps", "observe", "set_scales", "take"]
+__all__ = ["KEPT", "Steps", "observe", "set_scales", "take"]
 
-#: Of each instrument: four fading means, time of the last measurement, logarithm of the scale over the largest.
-MEMORY_COLUMNS = 6
+#: What a filter remembers of an instrument: fading means of the surprise and of the innovations over their sigmas, time
+#: of the last measurement [s], logarithm of the scale over the largest.
+KEPT = structure(surprise=float, innovation=3, heard=float, setting=float)
 
 
 class Steps(NamedTuple):
@@ -103,7 +105,7 @@ def observe(
         Place of each instrument in the observation, -1 for none; nominal time between two measurements of each place
         [s]; largest number of measurements of a step in the observation.
     filters : (b, n, n), (b, n) and (b, p, 6) arrays
-        Covariances, distances to the plain filter, and memory of the instruments, which is updated.
+        Covariances, distances to the plain filter, and the `KEPT` of the instruments, which is updated.
     observation : (b, o) float32 array
         Overwritten for the filters that are active.
     """
@@ -159,12 +161,13 @@ def observe(
                 base = at * width + PER_INSTRUMENT + PER_MEASUREMENT * counts[at]
                 seen = counts[at] < most
                 counts[at] += 1
-                elapsed = max(time[e] - memory[b, at, 4], 0.0)
+                kept = memory[b, at].view(KEPT)[0]
+                elapsed = max(time[e] - kept.heard, 0.0)
                 gain = 1.0 - exp(-elapsed / MEMORY)
-                memory[b, at, 4] = time[e]
+                kept.heard = time[e]
                 for i in range(m):
                     x = white[i] / sqrt(spread[i, i])
-                    memory[b, at, 1 + i] += gain * (_clipped(x) - memory[b, at, 1 + i])
+                    kept.innovation[i] += gain * (_clipped(x) - kept.innovation[i])
                     if seen:
                         row[base + 1 + i] = _clipped(x / WHITE)
                 factorise(spread, m, 0.0, pivot)
@@ -173,20 +176,23 @@ def observe(
                 for i in range(m):
                     nis += white[i] * white[i]
                 surprise = log1p(sqrt(nis / m))
-                memory[b, at, 0] += gain * (surprise - memory[b, at, 0])
+                kept.surprise += gain * (surprise - kept.surprise)
                 if seen:
                     row[base] = _clipped(surprise)
             for i in range(n):
                 ahead[i] -= correction[e, i]
         for at in range(places):
             base = at * width
-            for i in range(4):
-                row[base + i] = _clipped(memory[b, at, i])
-            x = memory[b, at, 1] ** 2 + memory[b, at, 2] ** 2 + memory[b, at, 3] ** 2
+            kept = memory[b, at].view(KEPT)[0]
+            mean = kept.innovation
+            row[base] = _clipped(kept.surprise)
+            for i in range(3):
+                row[base + 1 + i] = _clipped(mean[i])
+            x = mean[0] ** 2 + mean[1] ** 2 + mean[2] ** 2
             row[base + 4] = log1p(sqrt(x))
-            row[base + 5] = _clipped(log1p(max(end[b] - memory[b, at, 4], 0.0) / period[b, at]))
+            row[base + 5] = _clipped(log1p(max(end[b] - kept.heard, 0.0) / period[b, at]))
             row[base + 6] = _clipped(counts[at] / most)
-            row[base + 7] = memory[b, at, 5]
+            row[base + 7] = kept.setting
         base = places * width
         row[base] = _clipped(0.5 * log10(max(P[0, 0] + P[1, 1], 1e-18)))
         for i in range(context.shape[1]):

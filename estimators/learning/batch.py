@@ -59,9 +59,16 @@ class VoyagesVectorEnv(VectorEnv[Numbers, Numbers, NDArray[Any]]):
     """
 
     def __init__(
-        self, task: str, num_envs: int, observation_space: spaces.Box, action_space: spaces.Space[Any],
-        autoreset_mode: AutoresetMode | str, independent_seeds: bool, voyages: int | None, render_mode: str | None,
-    ):  # fmt: skip
+        self,
+        task: str,
+        num_envs: int,
+        observation_space: spaces.Box,
+        action_space: spaces.Space[Any],
+        autoreset_mode: AutoresetMode | str,
+        independent_seeds: bool,
+        voyages: int | None,
+        render_mode: str | None,
+    ):
         if isinstance(num_envs, bool) or not isinstance(num_envs, int) or num_envs < 1:
             raise ValueError(f"num_envs is a positive integer, not {num_envs!r}")
         if render_mode is not None:

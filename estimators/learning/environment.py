@@ -68,9 +68,15 @@ class TaskOptions:
     """
 
     def __init__(
-        self, scenario: Scenario | str | Path, task: str, reward: str | None, instruments: str,
-        steps: int | None, voyages: int | None, reveal_truth: bool,
-    ):  # fmt: skip
+        self,
+        scenario: Scenario | str | Path,
+        task: str,
+        reward: str | None,
+        instruments: str,
+        steps: int | None,
+        voyages: int | None,
+        reveal_truth: bool,
+    ):
         if task not in TASKS:
             raise ValueError(f"task is one of {', '.join(TASKS)}, not {task!r}")
         check_counts(steps=steps, voyages=voyages)

@@ -10,12 +10,13 @@ from numpy.typing import NDArray
 from simnav.environment.sample_counts import most_samples
 from simnav.estimator import UnsuitableScenario
 from simnav.scenario import Scenario
+from simnav.structures import length
 from simnav.types import Array, InitialState, Instruments
 
-from .bank import MEMORY_COLUMNS, Steps, observe, take
+from .bank import KEPT, Steps, observe, take
 from .features import observation_size
 from .reference import Linear, ReferenceFilter
-from .rewards import REWARDS, reward
+from .rewards import REWARDS, StepResult
 from .tasks import Decision, Task
 
 __all__ = ["Filters", "Layout", "checked_actions", "layout_of", "layout_of_scenario"]
@@ -144,10 +145,10 @@ class Filters:
     """
 
     def __init__(self, task: Task, layout: Layout, reward: str, b: int, n: int):
-        self.task, self.layout, self._code = task, layout, REWARDS[reward]
+        self.task, self.layout, self._reward = task, layout, REWARDS[reward]
         p = len(layout.names)
         self.covariance, self.delta = np.zeros((b, n, n)), np.zeros((b, n))
-        self.memory = np.zeros((b, p, MEMORY_COLUMNS))
+        self.memory = np.zeros((b, p, length(KEPT)))
         self.decision = Decision(b, p, layout.most)
         self.observation = np.zeros((b, layout.size), np.float32)
         self.rewards, self.period = np.zeros(b), np.ones((b, p))
@@ -188,7 +189,7 @@ class Filters:
             Steps(active, first, last), linear, self.layout.place, decision.scale, decision.process_scale,
             self.covariance, self.delta,
         )  # fmt: skip
-        self.memory[active, :, 5] = decision.setting[active]
+        self.memory.view(KEPT)["setting"][active, :, 0] = decision.setting[active]
 
     def reward(
         self,
@@ -200,12 +201,21 @@ class Filters:
         oracle: Array,
         faulty: NDArray[np.bool_],
     ) -> Array:
-        """(b,) array: what the step was worth; the arguments as of `simnav.estimators.learning.rewards.reward`."""
+        """(b,) array: what the step was worth; the arguments as of `simnav.estimators.learning.rewards.StepResult`."""
         decision = self.decision
-        reward.unchecked(
-            self._code, Steps(active, first, last), linear, faulty, (error, oracle),
-            (self.layout.place, decision.scale, decision.correction), (self.covariance, self.delta), self.rewards,
-        )  # fmt: skip
+        result = StepResult(
+            steps=Steps(active, first, last),
+            linear=linear,
+            faulty=faulty,
+            error=error,
+            oracle=oracle,
+            place=self.layout.place,
+            scale=decision.scale,
+            correction=decision.correction,
+            covariance=self.covariance,
+            delta=self.delta,
+        )
+        self._reward.unchecked(result, self.rewards)
         return self.rewards.copy()
 
 

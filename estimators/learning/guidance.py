@@ -48,13 +48,14 @@ from simnav.estimator import Estimator, make
 from simnav.scenario import Scenario, load
 from simnav.simulation.simulator import Simulator
 from simnav.simulation.steps import SteppedRuns
+from simnav.structures import filled, length
 from simnav.types import KINDS, Array
 from simnav.world import KinematicVessel, motion
 
 from .environment import check_counts, run_seed
 from .features import LIMIT, Numbers
 from .filters import checked_actions
-from .guidance_kernels import ASIDE, LARGEST_TURN, SIZE, Commands, judge, look, steer
+from .guidance_kernels import ASIDE, BERTH, LARGEST_TURN, SIZE, TALLY, Commands, Route, judge, look, steer
 from .navigators import Navigators
 from .routes import Routes
 
@@ -111,9 +112,15 @@ class GuidanceOptions:
     """
 
     def __init__(
-        self, scenario: Scenario | str | Path, route: str, half_width: float, navigator: Estimator | str | None,
-        steps: int | None, voyages: int | None, reveal_truth: bool,
-    ):  # fmt: skip
+        self,
+        scenario: Scenario | str | Path,
+        route: str,
+        half_width: float,
+        navigator: Estimator | str | None,
+        steps: int | None,
+        voyages: int | None,
+        reveal_truth: bool,
+    ):
         scenario = load(scenario) if isinstance(scenario, (str, Path)) else scenario
         if scenario.recorded:
             raise ValueError(f"scenario {scenario.id} is a recorded log: its vessel cannot be steered")
@@ -168,7 +175,7 @@ class GuidedVoyages:
         self._routes = Routes(n)
         self._at, self._true_at, self._ahead = (np.zeros(n, np.int64) for _ in range(3))
         self._steps, self._dt = np.zeros(n, np.int64), np.zeros(n)
-        self._notes, self._start, self._tally = np.zeros((n, 3)), np.zeros((n, 2)), np.zeros((n, 4))
+        self._notes, self._start, self._tally = np.zeros((n, 3)), np.zeros((n, 2)), np.zeros((n, length(TALLY)))
         self._fix = np.zeros((n, 1), np.bool_)
         self._commands = Commands(*(np.zeros(n) for _ in range(4)))
         self.aside, self._rewards, self._aground = np.zeros(n), np.zeros(n), np.zeros(n, np.bool_)
@@ -194,7 +201,7 @@ class GuidedVoyages:
         self._dt[b] = source.step
         epochs = int(source.duration / source.step + 1e-6)
         self._steps[b] = min(o.steps or epochs, epochs)
-        self._notes[b], self._tally[b] = 0.0, (0.0, 0.0, 0.0, inf)
+        self._notes[b], self._tally[b] = 0.0, filled(TALLY, clearance=inf)
         spread = self.navigators.spread[b]
         self._start[b] = spread[0] + spread[2], spread[3]
         return {"seed": seed, "start": source.start, "instruments": source.instruments}
@@ -231,9 +238,10 @@ class GuidedVoyages:
         self.navigators.update(active)
         last = runs.step >= self._steps
         paces = self._dt, self._commands.planned, np.ascontiguousarray(state["speed"])
+        route = Route(o.half_width if o.route == "channel" else inf, BERTH if o.route == "dock" else 0.0)
         judge.unchecked(
             (active, last), paces, runs.truth, tracks,
-            (ROUTES.index(o.route), o.half_width), self._true_at, self._tally,
+            route, self._true_at, self._tally,
             (self.aside, self._rewards, self._aground),
         )  # fmt: skip
         self.look(active)
@@ -241,9 +249,9 @@ class GuidedVoyages:
 
     def scores(self, b: int) -> GuidanceScores:
         """What a voyage was worth so far."""
-        _, squares, fuel, clearance = self._tally[b].tolist()
-        n = int(self.runs.step[b])
-        return GuidanceScores((squares / n) ** 0.5, clearance, fuel / n, bool(self._aground[b]))
+        own, n = self._tally[b].view(TALLY)[0], int(self.runs.step[b])
+        offset, fuel = (own.squares.item() / n) ** 0.5, own.fuel.item() / n
+        return GuidanceScores(offset, own.clearance.item(), fuel, bool(self._aground[b]))
 
 
 class GuidanceEnv(ChartedEnv[Numbers, Numbers]):

@@ -16,10 +16,25 @@ from simnav.compiled import Array, helper, kernel
 from simnav.geometry.rotation import wrap_scalar
 from simnav.kernel_types import FlagMatrix, FlagVector, IntegerVector, Matrix, Stack, Vector
 from simnav.sensors.stepwise import Delivered
+from simnav.structures import structure
 
 from .features import GUIDANCE, LIMIT, SPEED, TURN_RATE
 
-__all__ = ["AGROUND", "ASIDE", "BERTH", "FUEL", "LARGEST_TURN", "SIZE", "Commands", "Tracks", "judge", "look", "steer"]
+__all__ = [
+    "AGROUND",
+    "ASIDE",
+    "BERTH",
+    "FUEL",
+    "LARGEST_TURN",
+    "SIZE",
+    "TALLY",
+    "Commands",
+    "Route",
+    "Tracks",
+    "judge",
+    "look",
+    "steer",
+]
 
 #: Unit of the distance from the track [m], and largest change of heading [rad].
 ASIDE, LARGEST_TURN = 20.0, radians(60.0)
@@ -29,6 +44,25 @@ FUEL, AGROUND, BERTH = 0.2, 100.0, 100.0
 SIZE = len(GUIDANCE)
 #: Points of the track that are looked at before and after the last one.
 BEHIND, AHEAD = 20, 120
+
+
+#: Of a voyage: distance along the track [m], sum of the squared distances from it [m^2], fuel, smallest clearance [m].
+TALLY = structure(along=float, squares=float, fuel=float, clearance=float)
+
+
+class Route(NamedTuple):
+    """What is wanted of a voyage beside to follow its track.
+
+    Attributes
+    ----------
+    half_width : float
+        Half the width of the channel [m]; inf without one.
+    berth : float
+        Reward of an end at rest in the berth; 0 without one.
+    """
+
+    half_width: float
+    berth: float
 
 
 class Tracks(NamedTuple):
@@ -140,7 +174,7 @@ def judge(
     paces: tuple[Vector, Vector, Vector],
     truth: Matrix,
     tracks: Tracks,
-    task: tuple[int, float],
+    route: Route,
     at: IntegerVector,
     tally: Matrix,
     outcome: tuple[Vector, Vector, FlagVector],
@@ -157,12 +191,12 @@ def judge(
         True position, velocity, roll, pitch and yaw.
     tracks : Tracks
         The planned tracks.
-    task : (int, float)
-        0 track, 1 channel, 2 dock; half the width of the channel [m].
+    route : Route
+        The route.
     at : (b,) int array
         Index of the track's point nearest to the true position; updated.
     tally : (b, 4) array
-        Distance along the track, sum of the squared distances from it, fuel, smallest clearance; updated.
+        The `TALLY` of each voyage; updated.
     outcome : three (b,) arrays
         Overwritten with the distance to starboard of the track [m], the reward, and whether the vessel touched the
         side.
@@ -170,35 +204,33 @@ def judge(
     active, last = which
     step, planned, speed = paces
     length, geodetic = tracks.length, tracks.geodetic
-    code, half_width = task
     aside, rewards, aground = outcome
     for b in range(active.size):
         rewards[b], aground[b] = 0.0, False
         if not active[b]:
             continue
-        r, t = tracks.of[b], tally[b]
+        r, t = tracks.of[b], tally[b].view(TALLY)[0]
         at[b], off, far = _place(
             truth[b, 0], truth[b, 1], at[b], length[r], geodetic[r], tracks.course[r], tracks.along[r]
         )
         usual = max(planned[b], 0.1)
-        progress = min((far - t[0]) / (usual * step[b]), 1.0)
+        progress = min((far - t.along) / (usual * step[b]), 1.0)
         burnt = speed[b] / usual
         burnt = burnt * burnt * burnt
-        t[0] = far
-        t[1] += off * off
-        t[2] += burnt
+        t.along = far
+        t.squares += off * off
+        t.fuel += burnt
         aside[b] = off
         value = step[b] * (progress - min(abs(off) / ASIDE, 10.0) - FUEL * burnt)
-        if code == 1:
-            t[3] = min(t[3], half_width - abs(off))
-            if t[3] <= 0.0:
-                aground[b] = True
-                value -= AGROUND
-        elif code == 2 and last[b]:
+        t.clearance = min(t.clearance, route.half_width - abs(off))
+        if t.clearance <= 0.0:
+            aground[b] = True
+            value -= AGROUND
+        if route.berth > 0.0 and last[b]:
             end = geodetic[r, length[r] - 1]
             left = hypot((truth[b, 0] - end[0]) * end[2], wrap_scalar(truth[b, 1] - end[1]) * end[3]) / 10.0
             fast = hypot(truth[b, 3], truth[b, 4]) / 0.5
-            value += BERTH * exp(-left * left - fast * fast)
+            value += route.berth * exp(-left * left - fast * fast)
         rewards[b] = value
 
 

@@ -214,7 +214,7 @@ def twin_of(scenario: Scenario, recording: Recording, found: Identification) -> 
         "title": f"Twin of {scenario.name}: its track and the errors of its instruments",
         "description": f"Simulated voyages along the track of {recording.note or scenario.id}, by simnav log twin.",
         "duration_s": float(np.floor(track[-1, 0] / recording.instruments.step + 1e-9) * recording.instruments.step),
-        "vessel": {"kind": "given_poses", "file": "", **_LIMITS},
+        "vessel": {"kind": "pose_track", "file": "", **_LIMITS},
         "instruments": instruments,
     }
     return Twin(table, track, from_reference)

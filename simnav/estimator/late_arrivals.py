@@ -141,9 +141,12 @@ class LateArrivals:
     """
 
     def __init__(
-        self, instruments: Instruments, manner: Manner, truth: TrueTimes | None = None,
+        self,
+        instruments: Instruments,
+        manner: Manner,
+        truth: TrueTimes | None = None,
         shared: Sequence[object] = (),
-    ):  # fmt: skip
+    ):
         self.manner = manner
         self._truth = {key: list(times) for key, times in (truth or {}).items()}
         self._knows = bool(truth)

@@ -418,11 +418,11 @@ def _force_along_course(s: Streams) -> Residual | None:
     """Without roll and pitch: acceleration along the course, speed times turn across it, and gravity."""
     time, n, span = s.grid, len(s.grid), max(2.0, 2.0 * s.spacing)
     own = _imu(s).forces(time - 0.5 * span, time + 0.5 * span)
-    way = s.velocities(time)
-    speed = np.hypot(way[:, 0], way[:, 1])
+    velocity = s.velocities(time)
+    speed = np.hypot(velocity[:, 0], velocity[:, 1])
     change = (s.velocities(time + 0.5 * span) - s.velocities(time - 0.5 * span)) / span
     moving = speed > 3.0 * COURSE_FROM
-    c, e = way[:, 0] / np.where(moving, speed, np.nan), way[:, 1] / np.where(moving, speed, np.nan)
+    c, e = velocity[:, 0] / np.where(moving, speed, np.nan), velocity[:, 1] / np.where(moving, speed, np.nan)
     place = s.position.value[0]
     wanted = np.stack([c * change[:, 0] + e * change[:, 1], c * change[:, 1] - e * change[:, 0],
                        change[:, 2] - float(gravity(place[0], place[2]))], axis=-1)  # fmt: skip
@@ -448,9 +448,9 @@ def _turn_of_heading(s: Streams, name: str) -> Residual | None:
 
 def _courses(s: Streams, time: Array) -> Array:
     """(n,) courses from the positions alone [rad]; not a number where the vessel is slow."""
-    way = s.moved(time, max(4.0, 3.0 * s.spacing))
-    slow = ~(np.hypot(way[:, 0], way[:, 1]) > COURSE_FROM)
-    return np.where(slow, np.nan, np.arctan2(way[:, 1], way[:, 0]))
+    moved = s.moved(time, max(4.0, 3.0 * s.spacing))
+    slow = ~(np.hypot(moved[:, 0], moved[:, 1]) > COURSE_FROM)
+    return np.where(slow, np.nan, np.arctan2(moved[:, 1], moved[:, 0]))
 
 
 def _turn_of_course(s: Streams) -> Residual | None:
@@ -473,8 +473,8 @@ def _velocity_and_positions(s: Streams) -> Residual | None:
     time, span = s.grid, max(2.0, 2.0 * s.spacing)
     steps = [s.given_velocities(time + k * 0.25 * span) for k in (-2, -1, 0, 1, 2)]
     mean = (steps[0] + 4.0 * steps[1] + 2.0 * steps[2] + 4.0 * steps[3] + steps[4]) / 12.0  # Simpson's rule
-    way = s.moved(time, span)
-    return _residual(mean - way, 2.0 * _SPEED, (np.nan_to_num(mean)[:, :, None], _SCALE))
+    moved = s.moved(time, span)
+    return _residual(mean - moved, 2.0 * _SPEED, (np.nan_to_num(mean)[:, :, None], _SCALE))
 
 
 def _picked(series: Series, begin: float) -> tuple[Array, Array]:
@@ -521,10 +521,10 @@ def _body_velocity(s: Streams, name: str) -> Residual | None:
 def _velocity(s: Streams, name: str) -> Residual | None:
     """Velocities over the ground of an instrument and of the reference."""
     time, value = _picked(s.instruments[name][1], s.begin)
-    way = s.velocities(time)
+    velocity = s.velocities(time)
     turned = _rotated(s, time)
     arm = () if turned is None else ((np.nan_to_num(turned[0]) @ _skews(turned[1]), _ANTENNA),)
-    return _residual(value - way, 2.0 * _SPEED, (_constant(len(time), 3), _DVL_BIAS), *arm)
+    return _residual(value - velocity, 2.0 * _SPEED, (_constant(len(time), 3), _DVL_BIAS), *arm)
 
 
 def _fix(s: Streams, name: str) -> Residual | None:
@@ -552,10 +552,10 @@ def _heading(s: Streams, name: str) -> Residual | None:
 def _water_speed(s: Streams, name: str) -> Residual | None:
     """A speed log and the forward speed of the reference, which differ by the current."""
     time, value = _picked(s.instruments[name][1], s.begin)
-    pose, way = s.pose(time), s.velocities(time)
+    pose, velocity = s.pose(time), s.velocities(time)
     if pose is None:
         return None
-    ahead = way[:, 0] * np.cos(pose[:, 2]) + way[:, 1] * np.sin(pose[:, 2])
+    ahead = velocity[:, 0] * np.cos(pose[:, 2]) + velocity[:, 1] * np.sin(pose[:, 2])
     return _residual(value - ahead[:, None], 2.0 * _SPEED, (_constant(len(time), 1), 0.7),
                      (value[:, :, None], 0.1))  # fmt: skip
 

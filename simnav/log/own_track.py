@@ -1,7 +1,7 @@
 """Vessels on a recorded track: poses from a table (CSV), and the positions of a ship from an AIS archive.
 
 They are the truth of a simulated run; the instruments are simulated on them. The smooth trajectory is in
-`simnav.world.given_track`. A recorded run, whose measurements come from files, has a ``[log]`` instead
+`simnav.world.smooth_track`. A recorded run, whose measurements come from files, has a ``[log]`` instead
 (`simnav.log.spec`).
 """
 
@@ -24,19 +24,19 @@ from simnav.log.table import LogError, LogWarning, Table, utc_seconds
 from simnav.log.units import LOG_UNITS
 from simnav.spec import NonNegative, quantity
 from simnav.types import Array
-from simnav.world.given_track import GivenTrack, Poses
-from simnav.world.given_waypoints import GivenVessel
+from simnav.world.smooth_track import Poses, SmoothTrack
 from simnav.world.trajectory import Voyage
 from simnav.world.vessel import register_vessel
+from simnav.world.waypoint_track import TrackVessel
 
-__all__ = ["AisTrack", "GivenPoses"]
+__all__ = ["AisTrack", "PoseTrack"]
 
 #: The columns that are looked for where a scenario names none; the unit ends the name.
 _HEIGHT = ("height_m", "altitude_m", "depth_m")
 _HEADING = ("heading_deg", "yaw_deg")
 
 
-class _TrackFile(GivenVessel):
+class _TrackFile(TrackVessel):
     """Base of the vessels whose track comes from a file.
 
     Attributes
@@ -46,7 +46,7 @@ class _TrackFile(GivenVessel):
     skip : float
         Time from the first pose to the start of the run [s].
     departure : float
-        See `simnav.world.given_track.smooth_track`.
+        See `simnav.world.smooth_track.smooth_track`.
     """
 
     files: ClassVar[tuple[str, ...]] = ("file",)
@@ -57,10 +57,10 @@ class _TrackFile(GivenVessel):
         "m", 0.0, description="how far the trajectory may depart from the poses, RMS along an axis; 0: not at all"
     )
 
-    def trajectory(self, voyage: Voyage) -> GivenTrack:
+    def trajectory(self, voyage: Voyage) -> SmoothTrack:
         """See `simnav.world.Vessel.trajectory`."""
         poses = self.poses()
-        return GivenTrack(poses, voyage, self.limits(), departure=self.departure, skip=self.skip)
+        return SmoothTrack(poses, voyage, self.limits(), departure=self.departure, skip=self.skip)
 
     def poses(self) -> Poses:
         """The poses of the file.
@@ -80,7 +80,7 @@ class _TrackFile(GivenVessel):
 
 
 @register_vessel
-class GivenPoses(_TrackFile):
+class PoseTrack(_TrackFile):
     """A vessel on the poses of a table: times, positions, and attitudes if there are some.
 
     Where no columns are named, the table has ``time_s``, ``latitude_deg`` and ``longitude_deg``. It may also have
@@ -100,7 +100,7 @@ class GivenPoses(_TrackFile):
         See `simnav.log.files.FileSpec`.
     """
 
-    kind: Literal["given_poses"] = "given_poses"
+    kind: Literal["pose_track"] = "pose_track"
     time: Column = Field("time_s", description="column of the time")
     time_unit: str = Field("s", description="its unit, or `iso` for dates")
     position: tuple[Column, ...] = Field((), description="columns of latitude, longitude and height")

@@ -353,8 +353,12 @@ def _units_of(channel: ChannelSpec | LogInstrumentSpec, count: int) -> tuple[str
 
 
 def _of_vector(
-    name: str, table: str, channel: ChannelSpec | LogInstrumentSpec, series: Series, body: bool,
-) -> Iterator[Reading]:  # fmt: skip
+    name: str,
+    table: str,
+    channel: ChannelSpec | LogInstrumentSpec,
+    series: Series,
+    body: bool,
+) -> Iterator[Reading]:
     """Axes, signs and units of three components."""
     mounting = dcm_from_rpy(np.asarray(channel.mounting)) if body else np.eye(3)
     units = _units_of(channel, 3)
@@ -420,9 +424,9 @@ def _as_course(name: str, series: Series, s: Streams) -> Iterator[Reading]:
     """The course over the ground in place of a heading: they part by leeway and current."""
     if s.attitude is None:
         return
-    way = s.moved(series.time, max(2.0, 2.0 * s.spacing))
-    moving = np.hypot(way[:, 0], way[:, 1]) > COURSE_FROM
-    apart = wrap_angle(s.attitudes(series.time)[:, 2] - np.arctan2(way[:, 1], way[:, 0]))
+    moved = s.moved(series.time, max(2.0, 2.0 * s.spacing))
+    moving = np.hypot(moved[:, 0], moved[:, 1]) > COURSE_FROM
+    apart = wrap_angle(s.attitudes(series.time)[:, 2] - np.arctan2(moved[:, 1], moved[:, 0]))
     value = wrap_angle(series.value + np.where(moving & np.isfinite(apart), apart, 0.0)[:, None])
     what = f"{name!r} is the course over the ground, and no heading"
     yield Reading(name, (name,), with_series(name, value=value), 1.0, what, (), apart="reference.position")

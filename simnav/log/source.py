@@ -392,10 +392,10 @@ def _start(
     velocity = np.where(np.isfinite(velocity), velocity, derived)
     if not np.isfinite(attitude[2]):
         ahead = reference.velocity_ahead(np.array([begin]), _MOVING)[0]
-        way = velocity if np.hypot(velocity[0], velocity[1]) >= _LEAST_SPEED else ahead
-        speed = float(np.hypot(way[0], way[1]))
+        forward = velocity if np.hypot(velocity[0], velocity[1]) >= _LEAST_SPEED else ahead
+        speed = float(np.hypot(forward[0], forward[1]))
         if speed >= _LEAST_SPEED:
-            attitude[2] = math.atan2(way[1], way[0])
+            attitude[2] = math.atan2(forward[1], forward[0])
             made.append("heading (course over ground)")
         elif heading is not None:
             attitude[2] = heading[0]

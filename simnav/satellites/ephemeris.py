@@ -9,9 +9,10 @@ import numpy as np
 
 from simnav.compiled import Array, Flags, Integers, helper, kernel
 from simnav.kernel_types import IntegerVector, Matrix, Stack, Vector
-from simnav.satellites.orbit import ELEMENTS, satellite_scalar
+from simnav.satellites.orbit import ELEMENTS, EPHEMERIS, satellite_scalar
 from simnav.satellites.time_scales import GpsTime
 from simnav.spec import SpecError
+from simnav.structures import structure
 
 __all__ = ["VALIDITY", "Ephemerides", "SatelliteStates", "is_geostationary", "nearest"]
 
@@ -20,7 +21,8 @@ __all__ = ["VALIDITY", "Ephemerides", "SatelliteStates", "is_geostationary", "ne
 #: RTKLIB (MAXDTOE); BeiDou's is half of a geostationary fit's growth to a metre.
 VALIDITY = {"G": 7200.0, "E": 14400.0, "C": 7200.0}
 
-_TOE = ELEMENTS.index("toe")
+#: Position and velocity of a satellite in the Earth-fixed frame [m], [m/s], its clock [s] and the drift of it [s/s].
+_STATE = structure(position=3, velocity=3, clock=float, drift=float)
 #: BeiDou's geostationary satellites (*BeiDou Open Service Signal-in-Space ICD*, B1I 3.0, table 4-1).
 _GEOSTATIONARY = (*(f"C{n:02d}" for n in range(1, 6)), *(f"C{n}" for n in range(59, 64)))
 
@@ -84,6 +86,12 @@ class Ephemerides:
     def __len__(self) -> int:
         return len(self.satellite)
 
+    @property
+    def _toe(self) -> Array:
+        """(m,) array: reference times of the messages [s]."""
+        toe: Array = self.numbers.view(EPHEMERIS)["toe"][:, 0]
+        return toe
+
     def satellites(self, systems: str = "GEC") -> tuple[str, ...]:
         """Names of the satellites of the given systems that have a message, sorted by system and number."""
         there = {s for s in self.satellite if s[0] in systems}
@@ -109,7 +117,7 @@ class Ephemerides:
         first = begin.since(self.week)
         found = tuple(s for s in self.satellites(systems) if self._covers(s, first, first + duration))
         if not found:
-            toe = self.numbers[[s[0] in systems for s in self.satellite], _TOE]
+            toe = self._toe[[s[0] in systems for s in self.satellite]]
             if not len(toe):
                 raise SpecError(f"{self.source} has no ephemeris of the systems {', '.join(systems)}")
             days = f"{min(toe) / 86400.0:.2f} to {max(toe) / 86400.0:.2f}"
@@ -125,7 +133,7 @@ class Ephemerides:
         if not self.healthy[rows].all():
             return False
         reach, edge = VALIDITY[satellite[0]], first
-        for toe in self.numbers[rows, _TOE]:
+        for toe in self._toe[rows]:
             if toe - reach > edge:
                 return False
             edge = max(edge, toe + reach)
@@ -136,7 +144,7 @@ class Ephemerides:
     def rows(self, satellite: str) -> Integers:
         """Indices of the messages of one satellite, by reference time."""
         rows = np.array([i for i, s in enumerate(self.satellite) if s == satellite], dtype=np.int64)
-        return rows[np.argsort(self.numbers[rows, _TOE], kind="stable")]
+        return rows[np.argsort(self._toe[rows], kind="stable")]
 
     def table(self, satellites: Sequence[str]) -> tuple[Array, Integers, Array]:
         """The messages of some satellites as arrays for kernels.
@@ -179,9 +187,10 @@ class Ephemerides:
             For each time and satellite; NaN where no message is valid.
         """
         time = np.ascontiguousarray(time, dtype=np.float64)
-        out = np.empty((len(time), len(satellites), 8))
-        _states(*self.table(satellites), time, out)
-        return SatelliteStates(out[..., 0:3], out[..., 3:6], out[..., 6], out[..., 7])
+        out = np.empty((len(time), len(satellites), 1), _STATE)
+        _states(*self.table(satellites), time, out.view(np.float64))
+        at = out[..., 0]
+        return SatelliteStates(at["position"], at["velocity"], at["clock"], at["drift"])
 
 
 @helper
@@ -189,7 +198,7 @@ def nearest(numbers: Array, first: int, last: int, reach: float, time: float) ->
     """Index of the message in [first, last) with the nearest reference time; -1 if that is more than ``reach`` away."""
     best, least = -1, reach
     for k in range(first, last):
-        away = abs(time - numbers[k, 0])
+        away = abs(time - numbers[k].view(EPHEMERIS)[0].toe)
         if away < least or (best < 0 and away == least):
             best, least = k, away
     return best
@@ -197,14 +206,14 @@ def nearest(numbers: Array, first: int, last: int, reach: float, time: float) ->
 
 @kernel
 def _states(numbers: Matrix, begin: IntegerVector, reach: Vector, time: Vector, out: Stack) -> None:
-    """Overwrite the (n, c, 8) ``out`` with `satellite_scalar` of each time and satellite."""
+    """Overwrite the (n, c, 8) ``out``, a `_STATE` each, with `satellite_scalar` of each time and satellite."""
     for i in range(out.shape[0]):
         for j in range(out.shape[1]):
             k = nearest(numbers, begin[j], begin[j + 1], reach[j], time[i])
             if k < 0:
                 out[i, j, :] = float("nan")
             else:
-                at = satellite_scalar(numbers[k], time[i])
-                out[i, j, 0], out[i, j, 1], out[i, j, 2] = at.x, at.y, at.z
-                out[i, j, 3], out[i, j, 4], out[i, j, 5] = at.vx, at.vy, at.vz
-                out[i, j, 6], out[i, j, 7] = at.clock, at.drift
+                at, state = satellite_scalar(numbers[k], time[i]), out[i, j].view(_STATE)[0]
+                state.position[0], state.position[1], state.position[2] = at.x, at.y, at.z
+                state.velocity[0], state.velocity[1], state.velocity[2] = at.vx, at.vy, at.vz
+                state.clock, state.drift = at.clock, at.drift

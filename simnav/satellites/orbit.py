@@ -24,8 +24,9 @@ from math import atan2, cos, pi, sin, sqrt
 from typing import NamedTuple
 
 from simnav.compiled import Array, helper
+from simnav.structures import structure
 
-__all__ = ["ELEMENTS", "SPEED_OF_LIGHT", "SatelliteState", "satellite_scalar"]
+__all__ = ["ELEMENTS", "EPHEMERIS", "SPEED_OF_LIGHT", "SatelliteState", "satellite_scalar"]
 
 #: Speed of light in vacuum [m/s].
 SPEED_OF_LIGHT = 299792458.0
@@ -38,6 +39,8 @@ ELEMENTS = (
     "toe", "toc", "a0", "a1", "a2", "root_a", "eccentricity", "i0", "node0", "perigee", "anomaly0", "motion",
     "node_rate", "i_rate", "crc", "crs", "cuc", "cus", "cic", "cis", "toe_of_week", "mu", "earth_rate", "geostationary",
 )  # fmt: skip
+#: An ephemeris.
+EPHEMERIS = structure(**dict.fromkeys(ELEMENTS, float))
 _TILT = -5.0 / 180.0 * pi
 
 
@@ -71,7 +74,7 @@ def satellite_scalar(q: Array, time: float) -> SatelliteState:
     Parameters
     ----------
     q : (24,) array
-        Numbers of the ephemeris, in the order of `ELEMENTS`.
+        The `EPHEMERIS`.
     time : float
         GPS time in seconds since the beginning of the week to which ``q`` refers [s].
 
@@ -79,15 +82,12 @@ def satellite_scalar(q: Array, time: float) -> SatelliteState:
     -------
     SatelliteState
     """
-    toe, toc, a0, a1, a2 = q[0], q[1], q[2], q[3], q[4]
-    root_a, e, i0, node0, perigee, anomaly0 = q[5], q[6], q[7], q[8], q[9], q[10]
-    motion, node_rate, i_rate = q[11], q[12], q[13]
-    crc, crs, cuc, cus, cic, cis = q[14], q[15], q[16], q[17], q[18], q[19]
-    toe_of_week, mu, earth_rate = q[20], q[21], q[22]
-    t = time - toe
+    p = q.view(EPHEMERIS)[0]
+    root_a, e, mu, earth_rate = p.root_a, p.eccentricity, p.mu, p.earth_rate
+    t = time - p.toe
     a = root_a * root_a
-    n = sqrt(mu / (a * a * a)) + motion
-    mean = anomaly0 + n * t
+    n = sqrt(mu / (a * a * a)) + p.motion
+    mean = p.anomaly0 + n * t
     E = mean
     for _ in range(30):
         step = (E - e * sin(E) - mean) / (1.0 - e * cos(E))
@@ -98,20 +98,20 @@ def satellite_scalar(q: Array, time: float) -> SatelliteState:
     part = 1.0 - e * cos_E
     E_rate = n / part
     root = sqrt(1.0 - e * e)
-    phi = atan2(root * sin_E, cos_E - e) + perigee
+    phi = atan2(root * sin_E, cos_E - e) + p.perigee
     phi_rate = root * E_rate / part
     s2, c2 = sin(2.0 * phi), cos(2.0 * phi)
-    u = phi + cus * s2 + cuc * c2
-    r = a * part + crs * s2 + crc * c2
-    i = i0 + i_rate * t + cis * s2 + cic * c2
-    u_rate = phi_rate * (1.0 + 2.0 * (cus * c2 - cuc * s2))
-    r_rate = a * e * sin_E * E_rate + 2.0 * phi_rate * (crs * c2 - crc * s2)
-    i_change = i_rate + 2.0 * phi_rate * (cis * c2 - cic * s2)
+    u = phi + p.cus * s2 + p.cuc * c2
+    r = a * part + p.crs * s2 + p.crc * c2
+    i = p.i0 + p.i_rate * t + p.cis * s2 + p.cic * c2
+    u_rate = phi_rate * (1.0 + 2.0 * (p.cus * c2 - p.cuc * s2))
+    r_rate = a * e * sin_E * E_rate + 2.0 * phi_rate * (p.crs * c2 - p.crc * s2)
+    i_change = p.i_rate + 2.0 * phi_rate * (p.cis * c2 - p.cic * s2)
     sin_u, cos_u = sin(u), cos(u)
     px, py = r * cos_u, r * sin_u
     px_rate, py_rate = r_rate * cos_u - py * u_rate, r_rate * sin_u + px * u_rate
-    turning = node_rate if q[23] > 0.0 else node_rate - earth_rate
-    node = node0 + turning * t - earth_rate * toe_of_week
+    turning = p.node_rate if p.geostationary > 0.0 else p.node_rate - earth_rate
+    node = p.node0 + turning * t - earth_rate * p.toe_of_week
     sin_o, cos_o, sin_i, cos_i = sin(node), cos(node), sin(i), cos(i)
     x = px * cos_o - py * cos_i * sin_o
     y = px * sin_o + py * cos_i * cos_o
@@ -120,15 +120,15 @@ def satellite_scalar(q: Array, time: float) -> SatelliteState:
     vx = px_rate * cos_o - level_rate * sin_o - y * turning
     vy = px_rate * sin_o + level_rate * cos_o + x * turning
     vz = py_rate * sin_i + level * i_change
-    if q[23] > 0.0:
+    if p.geostationary > 0.0:
         # R_z(omega_E t) R_x(-5 degrees)
         ct, st = cos(_TILT), sin(_TILT)
         y, z, vy, vz = ct * y + st * z, ct * z - st * y, ct * vy + st * vz, ct * vz - st * vy
         ce, se = cos(earth_rate * t), sin(earth_rate * t)
         x, y, vx, vy = ce * x + se * y, ce * y - se * x, ce * vx + se * vy, ce * vy - se * vx
         vx, vy = vx + earth_rate * y, vy - earth_rate * x
-    since = time - toc
+    since = time - p.toc
     relativity = -2.0 * sqrt(mu) * root_a * e / (SPEED_OF_LIGHT * SPEED_OF_LIGHT)
-    clock = a0 + since * (a1 + since * a2) + relativity * sin_E
-    drift = a1 + 2.0 * since * a2 + relativity * cos_E * E_rate
+    clock = p.a0 + since * (p.a1 + since * p.a2) + relativity * sin_E
+    drift = p.a1 + 2.0 * since * p.a2 + relativity * cos_E * E_rate
     return SatelliteState(x, y, z, vx, vy, vz, clock, drift)

@@ -15,7 +15,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from math import asin, atan2, cos, sin, sqrt
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -33,11 +33,18 @@ from simnav.satellites.atmosphere import (
 from simnav.satellites.ephemeris import Ephemerides, nearest
 from simnav.satellites.orbit import SPEED_OF_LIGHT, satellite_scalar
 from simnav.satellites.time_scales import gps_time
+from simnav.structures import filled, structure
 
 __all__ = ["Sight", "Sky"]
 
-#: Columns of what a kernel writes about a satellite.
-_COLUMNS = 15
+#: What is known of a satellite, see `Sight`.
+_SIGHTING = structure(
+    position=3, velocity=3, range=float, range_rate=float, elevation=float, azimuth=float, clock=float, drift=float,
+    ionosphere=float, troposphere=float, mapping=float,
+)  # fmt: skip
+#: The begin of a run: seconds since the begin of the week to which the ephemerides refer, second of the day, day of the
+#: year.
+_BEGIN = structure(second_of_week=float, second_of_day=float, day_of_year=float)
 _TYPICAL_DELAY = 0.08  # of a signal [s]
 
 
@@ -115,17 +122,23 @@ class Sky:
             Of the antenna: latitude, longitude [rad], height [m]; north-east-down [m/s].
         """
         time, position, velocity = (np.ascontiguousarray(a, dtype=np.float64) for a in (time, position, velocity))
-        out = np.empty((len(time), len(self.satellites), _COLUMNS))
-        begin = np.array([self._begin, self._second_of_day, self._day_of_year])
-        _look(_Sky(*self._table, self._klobuchar, begin), time, position, velocity, out)
+        out = np.empty((len(time), len(self.satellites), 1), _SIGHTING)
+        begin = filled(
+            _BEGIN,
+            second_of_week=self._begin,
+            second_of_day=self._second_of_day,
+            day_of_year=self._day_of_year,
+        )
+        _look(_Sky(*self._table, self._klobuchar, begin), time, position, velocity, out.view(np.float64))
+        seen = out[..., 0]
         if not self._has_ionosphere:
-            out[..., 12] = np.where(np.isnan(out[..., 12]), np.nan, 0.0)
-        return Sight(out[..., 0:3], out[..., 3:6], *(out[..., k] for k in range(6, _COLUMNS)))
+            seen["ionosphere"] = np.where(np.isnan(seen["ionosphere"]), np.nan, 0.0)
+        return Sight(**{name: seen[name] for name in _SIGHTING.names or ()})
 
 
 @helper
-def _apparent(q: Array, time: float, antenna: tuple[float, float, float], out: Array) -> float:
-    """Write apparent position, velocity without the change of the delay, and clock into a row; return tau [s].
+def _apparent(q: Array, time: float, antenna: tuple[float, float, float], out: Any) -> float:
+    """Write apparent position, velocity without the change of the delay, and clock into a `_SIGHTING`; return tau [s].
 
     The delay is found along a straight orbit first. Its error is then under a picosecond, so one more evaluation of the
     orbit is exact to rounding.
@@ -140,10 +153,11 @@ def _apparent(q: Array, time: float, antenna: tuple[float, float, float], out: A
         tau = sqrt(dx * dx + dy * dy + dz * dz) / SPEED_OF_LIGHT
     at = satellite_scalar(q, time - tau)
     s, c = sin(ROTATION_RATE * tau), cos(ROTATION_RATE * tau)
-    out[0], out[1], out[2] = c * at.x + s * at.y, c * at.y - s * at.x, at.z
-    out[3], out[4], out[5] = c * at.vx + s * at.vy, c * at.vy - s * at.vx, at.vz
-    out[10], out[11] = at.clock, at.drift
-    dx, dy, dz = out[0] - antenna[0], out[1] - antenna[1], out[2] - antenna[2]
+    place, v = out.position, out.velocity
+    place[0], place[1], place[2] = c * at.x + s * at.y, c * at.y - s * at.x, at.z
+    v[0], v[1], v[2] = c * at.vx + s * at.vy, c * at.vy - s * at.vx, at.vz
+    out.clock, out.drift = at.clock, at.drift
+    dx, dy, dz = place[0] - antenna[0], place[1] - antenna[1], place[2] - antenna[2]
     return sqrt(dx * dx + dy * dy + dz * dz) / SPEED_OF_LIGHT
 
 
@@ -157,7 +171,7 @@ class _Sky(NamedTuple):
     klobuchar : (8,) array
         Klobuchar's coefficients.
     begin : (3,) array
-        Of the begin of the run: seconds since the begin of the table's week, second of the day, day of the year.
+        A `_BEGIN`.
     """
 
     numbers: Matrix
@@ -175,8 +189,8 @@ def _look(
     velocity: Matrix,
     out: Stack,
 ) -> None:
-    """Overwrite ``out`` with the columns of `Sight`, in its order, for n times and c satellites."""
-    numbers, first, begin = sky.numbers, sky.first, sky.begin
+    """Overwrite the (n, c, 15) ``out``, a `_SIGHTING` each, for n times and c satellites."""
+    numbers, first, begin = sky.numbers, sky.first, sky.begin.view(_BEGIN)[0]
     for i in range(out.shape[0]):
         latitude, longitude, height = position[i, 0], position[i, 1], position[i, 2]
         antenna = ecef_from_geodetic_scalar(latitude, longitude, height)
@@ -184,36 +198,37 @@ def _look(
         n, e, d = velocity[i, 0], velocity[i, 1], velocity[i, 2]
         vx, vy, vz = -sa * co * n - so * e - ca * co * d, -sa * so * n + co * e - ca * so * d, ca * n - sa * d
         dry, wet = zenith_delay_scalar(latitude, height, HUMIDITY)
-        second = begin[1] + time[i]
-        mapping = mapping_coefficients(begin[2] + time[i] / 86400.0, latitude)
+        second = begin.second_of_day + time[i]
+        mapping = mapping_coefficients(begin.day_of_year + time[i] / 86400.0, latitude)
         for j in range(out.shape[1]):
-            row = out[i, j]
-            k = nearest(numbers, first[j], first[j + 1], sky.reach[j], begin[0] + time[i])
+            k = nearest(numbers, first[j], first[j + 1], sky.reach[j], begin.second_of_week + time[i])
             if k < 0:
-                row[:] = float("nan")
+                out[i, j] = float("nan")
                 continue
-            tau = _apparent(numbers[k], begin[0] + time[i], antenna, row)
+            row = out[i, j].view(_SIGHTING)[0]
+            at, v = row.position, row.velocity
+            tau = _apparent(numbers[k], begin.second_of_week + time[i], antenna, row)
             distance = tau * SPEED_OF_LIGHT
-            ux, uy, uz = (row[0] - antenna[0]) / distance, (row[1] - antenna[1]) / distance, 0.0
-            uz = (row[2] - antenna[2]) / distance
+            ux, uy, uz = (at[0] - antenna[0]) / distance, (at[1] - antenna[1]) / distance, 0.0
+            uz = (at[2] - antenna[2]) / distance
             # d/dt of R(omega tau) s(t - tau), with the rate of tau from its projection on the line of sight
-            wx, wy = ROTATION_RATE * row[1], -ROTATION_RATE * row[0]
-            along = ux * (row[3] - vx) + uy * (row[4] - vy) + uz * (row[5] - vz)
-            change = ux * (row[3] - wx) + uy * (row[4] - wy) + uz * row[5]
+            wx, wy = ROTATION_RATE * at[1], -ROTATION_RATE * at[0]
+            along = ux * (v[0] - vx) + uy * (v[1] - vy) + uz * (v[2] - vz)
+            change = ux * (v[0] - wx) + uy * (v[1] - wy) + uz * v[2]
             rate = along / (SPEED_OF_LIGHT + change)
-            row[3] += rate * (wx - row[3])
-            row[4] += rate * (wy - row[4])
-            row[5] -= rate * row[5]
-            row[6], row[7] = distance, rate * SPEED_OF_LIGHT
+            v[0] += rate * (wx - v[0])
+            v[1] += rate * (wy - v[1])
+            v[2] -= rate * v[2]
+            row.range, row.range_rate = distance, rate * SPEED_OF_LIGHT
             north = -sa * co * ux - sa * so * uy + ca * uz
             east = -so * ux + co * uy
             up = ca * co * ux + ca * so * uy + sa * uz
             elevation = asin(min(max(up, -1.0), 1.0))
             azimuth = atan2(east, north)
-            row[8], row[9] = elevation, azimuth
+            row.elevation, row.azimuth = elevation, azimuth
             if elevation > 0.0:
-                row[12] = ionosphere_scalar(sky.klobuchar, second, latitude, longitude, azimuth, elevation)
+                row.ionosphere = ionosphere_scalar(sky.klobuchar, second, latitude, longitude, azimuth, elevation)
                 dry_mapping, wet_mapping = mapping_scalar(mapping, height, elevation)
-                row[13], row[14] = dry * dry_mapping + wet * wet_mapping, wet_mapping
+                row.troposphere, row.mapping = dry * dry_mapping + wet * wet_mapping, wet_mapping
             else:
-                row[12], row[13], row[14] = float("nan"), float("nan"), float("nan")
+                row.ionosphere, row.troposphere, row.mapping = float("nan"), float("nan"), float("nan")

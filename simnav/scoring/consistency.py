@@ -205,9 +205,12 @@ def _register_nees(group: str, title: str, part: str = "") -> None:
 
 def _register_coverage(percent: int, part: str = "") -> None:
     @register_score(
-        f"coverage_{percent}{part}", title=f"Coverage of the {percent} % horizontal ellipse{_PARTS[part]}", unit="-",
-        better="nominal", uses_covariance=True,
-    )  # fmt: skip
+        f"coverage_{percent}{part}",
+        title=f"Coverage of the {percent} % horizontal ellipse{_PARTS[part]}",
+        unit="-",
+        better="nominal",
+        uses_covariance=True,
+    )
     def share(given: ScoringInput) -> float:
         found = given.shared(nees_of_groups).get("horizontal")
         if found is None:

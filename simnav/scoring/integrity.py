@@ -225,9 +225,11 @@ def _register_limit(limit: float) -> None:
 
 def _register_accuracy(radius: float) -> None:
     @register_score(
-        f"within_{radius:g}_m", title=f"Share of epochs with an error of {radius:g} m or less", unit="-",
+        f"within_{radius:g}_m",
+        title=f"Share of epochs with an error of {radius:g} m or less",
+        unit="-",
         better="higher",
-    )  # fmt: skip
+    )
     def within(given: ScoringInput) -> float:
         known = np.isfinite(given.recording.data.truth.position[:, :2]).all(axis=1).sum()
         return float((given.horizontal <= radius).sum() / known) if known and len(given.error) else float("nan")

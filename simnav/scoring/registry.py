@@ -111,9 +111,14 @@ class Score:
     __qualname__: str
 
     def __init__(
-        self, function: Callable[[ScoringInput], float], name: str, title: str, unit: str, better: Better | None,
+        self,
+        function: Callable[[ScoringInput], float],
+        name: str,
+        title: str,
+        unit: str,
+        better: Better | None,
         uses_covariance: bool,
-    ):  # fmt: skip
+    ):
         update_wrapper(self, function)
         self.function = function
         self.name, self.title, self.unit, self.better = name, title, unit, better

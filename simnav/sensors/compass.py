@@ -52,7 +52,7 @@ class _MagneticCompass(CompiledInstrument):
     def __init__(self, spec: MagneticCompass, name: str, seed: int):
         super().__init__(spec, name, seed)
         self.deviation = self.drawn("deviation", np.full(2, spec.deviation)) + spec.fixed_deviation
-        self.parameters.own[:2], self.parameters.own[2] = self.deviation, float(self.deviation.any())
+        self.parameters.deviation, self.parameters.has_deviation = self.deviation, self.deviation.any()
 
 
 @register_instrument(Kind("true heading", "heading", HEADING_COMPONENT, HEADING), example={"sigma_deg": 0.5})
@@ -87,4 +87,4 @@ class _Gyrocompass(CompiledInstrument):
 
     def __init__(self, spec: Gyrocompass, name: str, seed: int):
         super().__init__(spec, name, seed)
-        self.parameters.own[0] = float(spec.speed_error)
+        self.parameters.has_speed_error = spec.speed_error

@@ -91,9 +91,9 @@ class _Dvl(CompiledInstrument):
         super().__init__(spec, name, seed)
         turn = self.drawn("misalignment", np.asarray(spec.misalignment)) + spec.fixed_misalignment
         self.misalignment = turn
-        self.parameters.own[:] = ((1.0 + self.scale) * dcm_from_rotation_vector(turn).T).ravel()
-        self.parameters.speed_variance[0] = spec.speed_noise**2
-        self.parameters.altitude[:] = spec.minimum_altitude, spec.maximum_altitude
+        self.parameters.axes = (1.0 + self.scale) * dcm_from_rotation_vector(turn).T
+        self.parameters.speed_variance = spec.speed_noise**2
+        self.parameters.lowest, self.parameters.highest = spec.minimum_altitude, spec.maximum_altitude
 
     def enter(self, surroundings: Surroundings) -> None:
         """See `Instrument.enter`. The kernel knows a flat bottom; any other bottom is asked here."""
@@ -101,7 +101,7 @@ class _Dvl(CompiledInstrument):
         bottom = surroundings.get("bottom")
         self.in_kernel = bottom is None or isinstance(bottom, FlatBottom)
         if isinstance(bottom, FlatBottom):
-            self.parameters.water_depth[0] = bottom.water_depth
+            self.parameters.water_depth = bottom.water_depth
 
     def reading(self, tap: TapStates) -> tuple[Array, Array, NDArray[np.bool_] | None]:
         """See `Instrument.reading`."""
@@ -109,6 +109,6 @@ class _Dvl(CompiledInstrument):
         if not self.in_kernel:
             place = displace(tap.position, self.lever_displacement(tap))
             altitude = place[:, 2] + self.surroundings["bottom"].depth(place, tap.time)
-            lowest, highest = self.parameters.altitude.tolist()
+            lowest, highest = self.parameters.lowest.item(), self.parameters.highest.item()
             there = (lowest <= altitude) & (altitude <= highest)
         return value, sigma, there

@@ -18,9 +18,10 @@ from simnav.kernel_types import IntegerVector, Matrix, Stack, Vector
 from simnav.kinds import Component, Datasheet, NavigationPoint, NavigationPoints
 from simnav.satellites.signal_errors import amplification, noise_factor, range_error
 from simnav.sensors.single_reading import single_reading
+from simnav.structures import length, structure
 from simnav.types import Array
 
-__all__ = ["DENSITY_RATIO", "SIDE", "observe", "observe_all", "reading_sigma"]
+__all__ = ["SEEN", "SIDE", "observe", "observe_all", "reading_sigma"]
 
 #: The side information of a reading: apparent position and velocity of the satellite in the Earth-fixed frame of the
 #: time of reception, its direction from the antenna, C/N0 [dB-Hz], the delays that the models predict, and the wet
@@ -39,40 +40,49 @@ SIDE = (
     Component("troposphere", "m"),
     Component("mapping", ""),
 )
-ELEVATION, DENSITY_RATIO, IONOSPHERE, TROPOSPHERE, MAPPING = 6, 8, 9, 10, 11
+#: The same as kernels know it.
+SEEN = structure(
+    satellite=3, satellite_velocity=3, elevation=float, azimuth=float, density_ratio=float, ionosphere=float,
+    troposphere=float, mapping=float,
+)  # fmt: skip
+#: What all satellites have in common at a state: the lever arm and its swing in north, east and down, the place in the
+#: Earth-fixed frame, and sine and cosine of latitude and longitude.
+_ANTENNA = structure(
+    arm=3, swing=3, place=3, sin_latitude=float, cos_latitude=float, sin_longitude=float, cos_longitude=float
+)
+_ANTENNA_NUMBERS = length(_ANTENNA)
+_DENSITY_RATIO = [c.name for c in SIDE].index("density_ratio")
 _CLOCK = np.eye(2)
 
 
 @helper
 def _antenna(position: Array, dcm: Array, rate: Array, arm: Array, antenna: Array) -> None:
-    """Overwrite what all satellites have in common at a state; arguments as of `NavigationPoint`.
-
-    ``antenna`` (13,) becomes the lever arm and its swing in north, east and down, the place in the Earth-fixed frame,
-    and sine and cosine of latitude and longitude.
-    """
+    """Overwrite the `_ANTENNA` of a state; arguments as of `NavigationPoint`."""
+    own = antenna.view(_ANTENNA)[0]
+    lever, swing, place = own.arm, own.swing, own.place
     w0 = rate[1] * arm[2] - rate[2] * arm[1]
     w1 = rate[2] * arm[0] - rate[0] * arm[2]
     w2 = rate[0] * arm[1] - rate[1] * arm[0]
     for k in range(3):
-        antenna[k] = dcm[k, 0] * arm[0] + dcm[k, 1] * arm[1] + dcm[k, 2] * arm[2]
-        antenna[3 + k] = dcm[k, 0] * w0 + dcm[k, 1] * w1 + dcm[k, 2] * w2
-    latitude, longitude, height = displace_scalar(
-        position[0], position[1], position[2], antenna[0], antenna[1], antenna[2]
-    )
-    antenna[6], antenna[7], antenna[8] = ecef_from_geodetic_scalar(latitude, longitude, height)
-    antenna[9], antenna[10] = np.sin(latitude), np.cos(latitude)
-    antenna[11], antenna[12] = np.sin(longitude), np.cos(longitude)
+        lever[k] = dcm[k, 0] * arm[0] + dcm[k, 1] * arm[1] + dcm[k, 2] * arm[2]
+        swing[k] = dcm[k, 0] * w0 + dcm[k, 1] * w1 + dcm[k, 2] * w2
+    latitude, longitude, height = displace_scalar(position[0], position[1], position[2], lever[0], lever[1], lever[2])
+    place[0], place[1], place[2] = ecef_from_geodetic_scalar(latitude, longitude, height)
+    own.sin_latitude, own.cos_latitude = np.sin(latitude), np.cos(latitude)
+    own.sin_longitude, own.cos_longitude = np.sin(longitude), np.cos(longitude)
 
 
 @helper
 def _predict(antenna: Array, velocity: Array, side: Array, reading: Array, jacobian: Array) -> None:
     """Overwrite range, rate of the range, and their (2, 9) Jacobian; the antenna is that of `_antenna`."""
-    a, swing, u, v = antenna[:3], antenna[3:6], np.empty(3), np.empty(3)
-    sa, ca, so, co = antenna[9], antenna[10], antenna[11], antenna[12]
-    x, y, z = side[0] - antenna[6], side[1] - antenna[7], side[2] - antenna[8]
+    own, seen = antenna.view(_ANTENNA)[0], side.view(SEEN)[0]
+    a, swing, place, u, v = own.arm, own.swing, own.place, np.empty(3), np.empty(3)
+    sa, ca, so, co = own.sin_latitude, own.cos_latitude, own.sin_longitude, own.cos_longitude
+    satellite, moving = seen.satellite, seen.satellite_velocity
+    x, y, z = satellite[0] - place[0], satellite[1] - place[1], satellite[2] - place[2]
     distance = np.sqrt(x * x + y * y + z * z)
     u[0], u[1], u[2] = -sa * co * x - sa * so * y + ca * z, -so * x + co * y, -ca * co * x - ca * so * y - sa * z
-    x, y, z = side[3], side[4], side[5]
+    x, y, z = moving[0], moving[1], moving[2]
     v[0], v[1], v[2] = -sa * co * x - sa * so * y + ca * z, -so * x + co * y, -ca * co * x - ca * so * y - sa * z
     along = 0.0
     for k in range(3):
@@ -167,7 +177,7 @@ def _predict_all(
     """
     position, dcm, rate = states.position, states.dcm, states.rate
     clock, ionosphere = blocks.clock, blocks.ionosphere
-    antenna = np.empty(13)
+    antenna = np.empty(_ANTENNA_NUMBERS)
     for i in range(len(position)):
         # Satellites at one state follow each other.
         if i == 0 or not (
@@ -179,14 +189,15 @@ def _predict_all(
         ):
             _antenna(position[i], dcm[i], rate[i], arm, antenna)
         _predict(antenna, states.velocity[i], side[i], reading[i], jacobians.navigation[i])
-        c, mapping = channel[i], side[i, MAPPING]
+        seen, c = side[i].view(SEEN)[0], channel[i]
+        mapping = seen.mapping
         reading[i, 1] += clock[i, 1]
         x = reading[i, 0] + clock[i, 0]
-        x += side[i, TROPOSPHERE] + mapping * blocks.troposphere[i, 0] + sigma[i] * blocks.signals[i, c]
+        x += seen.troposphere + mapping * blocks.troposphere[i, 0] + sigma[i] * blocks.signals[i, c]
         jacobians.troposphere[i, 0, 0], jacobians.signals[i, 0, c] = mapping, sigma[i]
         if ionosphere.shape[1] > 0:
-            x += side[i, IONOSPHERE] * (1.0 + ionosphere[i, 0])
-            jacobians.ionosphere[i, 0, 0] = side[i, IONOSPHERE]
+            x += seen.ionosphere * (1.0 + ionosphere[i, 0])
+            jacobians.ionosphere[i, 0, 0] = seen.ionosphere
         reading[i, 0] = x
 
 
@@ -198,14 +209,15 @@ def observe(point: NavigationPoint, sheet: Datasheet) -> tuple[Array, dict[str, 
 def observe_all(points: NavigationPoints, sheet: Datasheet) -> tuple[Array, dict[str, Array]]:
     """The same for n readings (`simnav.kinds.Observations`)."""
     _, position, velocity, dcm, rate, blocks, channel, side = points
-    n, (sigma, frequencies) = len(position), _figures(sheet, side[:, ELEVATION])
+    side = ready(side)
+    n, (sigma, frequencies) = len(position), _figures(sheet, side.view(SEEN)["elevation"][:, 0])
     reading, navigation, signals = np.empty((n, 2)), np.empty((n, 2, 9)), np.zeros((n, 2, len(sheet.channels)))
     troposphere, ionosphere = np.zeros((n, 2, 1)), np.zeros((n, 2, 1))
     delay = blocks["ionosphere"] if frequencies == 1 else np.empty((n, 0))
     states = _States(ready(position), ready(velocity), ready(dcm), ready(rate))
     receiver = _Blocks(ready(blocks["clock"]), ready(blocks["troposphere"]), ready(blocks["signals"]), ready(delay))
     jacobians = _Jacobians(navigation, troposphere, signals, ionosphere)
-    _predict_all(states, sheet.lever_arm, ready(side), channel, sigma, receiver, reading, jacobians)
+    _predict_all(states, sheet.lever_arm, side, channel, sigma, receiver, reading, jacobians)
     by_block = {
         "navigation": navigation, "clock": np.broadcast_to(_CLOCK, (n, 2, 2)), "troposphere": troposphere,
         "signals": signals,
@@ -227,9 +239,9 @@ def reading_sigma(side: Array, sheet: Datasheet) -> Array:
     """The white noise of readings, from their C/N0 (`simnav.kinds.ReadingSigma`)."""
     amplified = amplification(int(sheet.details["frequencies"]))
     if side.ndim == 1:  # the same in less time
-        factor = float(noise_factor(side[DENSITY_RATIO]))
+        factor = float(noise_factor(side[_DENSITY_RATIO]))
         pseudorange, rate = sheet.sigma.tolist()
         return np.array([pseudorange * factor * amplified, rate * factor])
-    sigma: Array = sheet.sigma * noise_factor(side[..., DENSITY_RATIO])[..., None]
+    sigma: Array = sheet.sigma * noise_factor(side[..., _DENSITY_RATIO])[..., None]
     sigma[..., 0] *= amplified
     return sigma

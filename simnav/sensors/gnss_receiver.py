@@ -17,12 +17,13 @@ import numpy as np
 from pydantic import Field
 
 from simnav import kinds
+from simnav.compiled import ready
 from simnav.kinds import Kind, geodetic_components, speed_components
 from simnav.recording import AidStream
 from simnav.satellites.point_solution import PointSolution, Ranges, monitored, solve
 from simnav.satellites.signal_errors import amplification, noise_factor, range_error
 from simnav.sensors.derived import DerivedInstrument
-from simnav.sensors.gnss_observation import DENSITY_RATIO, ELEVATION, IONOSPHERE, MAPPING, TROPOSPHERE
+from simnav.sensors.gnss_observation import SEEN
 from simnav.sensors.instrument import ZERO, AidSpec, Instrument, SigmaTriple, register_instrument
 from simnav.spec import Vector, quantity
 from simnav.types import Array, Datasheet
@@ -166,17 +167,16 @@ def corrected_ranges(source: AidStream, rows: slice, sheet: Datasheet, *, withou
     if without_faults:
         value = value - source.fault_error[rows]
     frequencies, details = int(sheet.details["frequencies"]), sheet.details
-    sigma = sheet.sigma * noise_factor(side[:, DENSITY_RATIO])[:, None]
-    lasting = range_error(
-        side[:, ELEVATION], details["signal_error"], details["multipath"] * amplification(frequencies)
-    )
+    seen = ready(side).view(SEEN)[:, 0]
+    sigma = sheet.sigma * noise_factor(seen["density_ratio"])[:, None]
+    lasting = range_error(seen["elevation"], details["signal_error"], details["multipath"] * amplification(frequencies))
     variance = (sigma[:, 0] * amplification(frequencies)) ** 2 + lasting**2
-    delay, blocks = side[:, TROPOSPHERE].copy(), {block.name: block.sigma for block in sheet.blocks}
+    delay, blocks = seen["troposphere"].copy(), {block.name: block.sigma for block in sheet.blocks}
     covariance = np.diag(variance + _LEAST_SIGMA[0] ** 2)
-    common = [side[:, MAPPING] * blocks["troposphere"]]
+    common = [seen["mapping"] * blocks["troposphere"]]
     if frequencies == 1:
-        delay += side[:, IONOSPHERE]
-        common.append(side[:, IONOSPHERE] * blocks["ionosphere"])
+        delay += seen["ionosphere"]
+        common.append(seen["ionosphere"] * blocks["ionosphere"])
     for error in common:
         covariance += np.outer(error, error)
     rate_sigma = np.hypot(sigma[:, 1], _LEAST_SIGMA[1])

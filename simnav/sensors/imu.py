@@ -399,17 +399,22 @@ class _Triad:
         self._noise = NormalVariates(stream(seed, "instrument", "imu", name, "random_walk"))
         self._variates = np.zeros((_CHUNK, 3))
 
-    def ahead(self, variates: Array, until: float) -> tuple[Array, int, Array, int]:
-        """Fill the (n, 3) variates of `sense`; return both bias tables, each with the number of its first row."""
+    def ahead(self, variates: Array, until: float) -> tuple[HeldTable, HeldTable]:
+        """Fill the (n, 3) variates of `sense`; return the tables of the in-run bias and of the random walk."""
         if self.density > 0.0:
             self._noise.fill(variates)
-        return *self.instability.table(until), *self.walk.table(until)
+        return self._tables(until)
+
+    def _tables(self, until: float) -> tuple[HeldTable, HeldTable]:
+        return (
+            HeldTable(*self.instability.table(until), self.instability.per_second),
+            HeldTable(*self.walk.table(until), self.walk.per_second),
+        )
 
     def sense(self, ideal: Array, time: Array, interval: Array, out: Array) -> None:
         until = float(time[-1])
         triad = TriadErrors(self.matrix, self.bias, self.density, self.range, self.step)
-        in_run = HeldTable(*self.instability.table(until), self.instability.per_second)
-        walk = HeldTable(*self.walk.table(until), self.walk.per_second)
+        in_run, walk = self._tables(until)
         for a in range(0, len(time), _CHUNK):
             part = slice(a, a + _CHUNK)
             if self.density > 0.0:

@@ -7,7 +7,7 @@ agree bit for bit.
 from __future__ import annotations
 
 from math import atan2, cos, sin, sqrt
-from typing import ClassVar, NamedTuple
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,8 @@ from simnav.compiled import helper, kernel
 from simnav.geometry.earth import ECCENTRICITY_SQUARED, ROTATION_RATE, SEMI_MAJOR_AXIS, displace_scalar
 from simnav.kernel_types import FlagVector, Matrix, Vector
 from simnav.sensors.instrument import AidSpec, Instrument
+from simnav.structures import length, structure
+from simnav.true_state import TRUE_STATE
 from simnav.types import Array, TapStates
 
 __all__ = [
@@ -24,13 +26,12 @@ __all__ = [
     "DEPTH",
     "GYROCOMPASS",
     "HORIZONTAL_POSITION",
+    "INSTRUMENT",
     "NUMBERS",
     "POSITION",
     "VELOCITY",
     "WATER_SPEED",
     "CompiledInstrument",
-    "InstrumentNumbers",
-    "instrument_numbers",
     "noise_scalar",
     "observe_one",
     "observe_rows",
@@ -39,87 +40,17 @@ __all__ = [
 #: Codes of the observed quantities.
 POSITION, HORIZONTAL_POSITION, VELOCITY, BODY_VELOCITY, WATER_SPEED, COMPASS, GYROCOMPASS, DEPTH = range(8)
 
-#: Length of the array that holds `InstrumentNumbers`.
-NUMBERS = 24
-
-
-class InstrumentNumbers(NamedTuple):
-    """The parameters of an instrument: parts of one array.
-
-    Attributes
-    ----------
-    scale : (1,) array
-        Scale-factor error [-].
-    lever_arm, has_lever_arm : (3,), (1,) array
-        Lever arm [m], and 1 if it is not zero.
-    own : (9,) array
-        What depends on the kind: for a DVL its matrix by rows; for a compass the two coefficients of its deviation
-        [rad], and 1 if they are not zero; for a gyrocompass 1 if it has a speed error.
-    water_depth : (1,) array
-        NaN: unknown [m].
-    altitude : (2,) array
-        Smallest and largest one with bottom lock [m].
-    sigma, variance : (3,) array
-        Of the white noise, by component.
-    speed_variance : (1,) array
-        Square of the speed-dependent noise.
-    """
-
-    scale: Array
-    lever_arm: Array
-    has_lever_arm: Array
-    own: Array
-    water_depth: Array
-    altitude: Array
-    sigma: Array
-    variance: Array
-    speed_variance: Array
-
-
-@helper
-def instrument_numbers(q: Array) -> InstrumentNumbers:
-    """The parts of an array of `NUMBERS` numbers."""
-    return InstrumentNumbers(
-        scale=q[0:1],
-        lever_arm=q[1:4],
-        has_lever_arm=q[4:5],
-        own=q[5:14],
-        water_depth=q[14:15],
-        altitude=q[15:17],
-        sigma=q[17:20],
-        variance=q[20:23],
-        speed_variance=q[23:24],
-    )
-
-
-class TrueState(NamedTuple):
-    """The true state at which an instrument measures: parts of one array of 15 numbers.
-
-    Attributes
-    ----------
-    position : (3,) array
-        Latitude, longitude [rad], height [m].
-    velocity : (3,) array
-        North, east, down [m/s].
-    attitude : (3,) array
-        Roll, pitch, yaw [rad].
-    angular_rate : (3,) array
-        In body axes [rad/s].
-    water : (3,) array
-        Velocity of the water, north, east, down [m/s].
-    """
-
-    position: Array
-    velocity: Array
-    attitude: Array
-    angular_rate: Array
-    water: Array
-
-
-@helper
-def true_state(tap: Array) -> TrueState:
-    """The parts of an array of 15 numbers."""
-    return TrueState(tap[0:3], tap[3:6], tap[6:9], tap[9:12], tap[12:15])
+#: The parameters of an instrument. Scale-factor error [-]; lever arm [m], and 1 if it is not zero. For a DVL the matrix
+#: from body axes to its own; for a compass the two coefficients of its deviation [rad], and 1 if they are not zero; for
+#: a gyrocompass 1 if it has a speed error. Depth of the water, NaN if it is unknown, smallest and largest altitude with
+#: bottom lock [m]. Standard deviation and variance of the white noise by component, and the square of the
+#: speed-dependent noise.
+INSTRUMENT = structure(
+    scale=float, lever_arm=3, has_lever_arm=int, axes=(3, 3), deviation=2, has_deviation=int, has_speed_error=int,
+    water_depth=float, lowest=float, highest=float, sigma=3, variance=3, speed_variance=float,
+)  # fmt: skip
+#: Length of an array that holds it.
+NUMBERS = length(INSTRUMENT)
 
 
 @helper
@@ -148,10 +79,10 @@ def observe_one(code: int, q: Array, tap: Array, value: Array) -> bool:
     ----------
     code : int
         Code of the observed quantity (the constants of this module).
-    q : (24,) array
-        Parameters of the instrument, see `InstrumentNumbers`.
+    q : (n,) array
+        The `INSTRUMENT`.
     tap : (15,) array
-        True state, see `TrueState`.
+        True state (`simnav.true_state.TRUE_STATE`).
     value : (d,) array
         The reading, overwritten.
 
@@ -160,11 +91,11 @@ def observe_one(code: int, q: Array, tap: Array, value: Array) -> bool:
     bool
         True if the instrument delivers a measurement at this state.
     """
-    own, at = instrument_numbers(q), true_state(tap)
+    own, at = q.view(INSTRUMENT)[0], tap.view(TRUE_STATE)[0]
     position, velocity, water = at.position, at.velocity, at.water
     roll, pitch, yaw = at.attitude[0], at.attitude[1], at.attitude[2]
-    arm, rate, water_depth = own.lever_arm, at.angular_rate, own.water_depth[0]
-    has_lever_arm = own.has_lever_arm[0] > 0.0
+    arm, rate, water_depth = own.lever_arm, at.angular_rate, own.water_depth
+    has_lever_arm = own.has_lever_arm > 0
     n, e, d = 0.0, 0.0, 0.0
     if has_lever_arm and (code <= HORIZONTAL_POSITION or code == DEPTH or water_depth == water_depth):
         n, e, d = _to_ned(roll, pitch, yaw, arm[0], arm[1], arm[2])
@@ -188,20 +119,20 @@ def observe_one(code: int, q: Array, tap: Array, value: Array) -> bool:
         if has_lever_arm:
             x, y, z = x + wx, y + wy, z + wz
         for j in range(3):
-            value[j] = x * own.own[3 * j] + y * own.own[3 * j + 1] + z * own.own[3 * j + 2]
+            value[j] = x * own.axes[j, 0] + y * own.axes[j, 1] + z * own.axes[j, 2]
     elif code == WATER_SPEED:
         north, east, down = velocity[0] - water[0], velocity[1] - water[1], velocity[2] - water[2]
         x, _, _ = _to_body(roll, pitch, yaw, north, east, down)
         if has_lever_arm:
             x += wx
-        value[0] = (1.0 + own.scale[0]) * x
+        value[0] = (1.0 + own.scale) * x
     elif code == COMPASS:
         value[0] = yaw
-        if own.own[2] > 0.0:
-            value[0] = yaw + own.own[0] * sin(yaw) + own.own[1] * cos(yaw)
+        if own.has_deviation:
+            value[0] = yaw + own.deviation[0] * sin(yaw) + own.deviation[1] * cos(yaw)
     elif code == GYROCOMPASS:
         value[0] = yaw
-        if own.own[0] > 0.0:
+        if own.has_speed_error:
             s = sin(position[0])
             x = 1.0 - ECCENTRICITY_SQUARED * (s * s)
             prime_vertical = SEMI_MAJOR_AXIS / sqrt(x)
@@ -212,12 +143,12 @@ def observe_one(code: int, q: Array, tap: Array, value: Array) -> bool:
         depth = -position[2]
         if has_lever_arm:
             depth = depth + d
-        value[0] = (1.0 + own.scale[0]) * depth
+        value[0] = (1.0 + own.scale) * depth
     if code == BODY_VELOCITY and water_depth == water_depth:
         altitude = water_depth + position[2]
         if has_lever_arm:
             altitude -= d
-        within: bool = own.altitude[0] <= altitude <= own.altitude[1]
+        within: bool = own.lowest <= altitude <= own.highest
         return within
     return True
 
@@ -225,12 +156,12 @@ def observe_one(code: int, q: Array, tap: Array, value: Array) -> bool:
 @helper
 def noise_scalar(q: Array, value: Array, j: int) -> float:
     """Standard deviation of the white noise of component j of a reading, from the reading without bias and noise."""
-    own = instrument_numbers(q)
-    if own.speed_variance[0] == 0.0:
+    own = q.view(INSTRUMENT)[0]
+    if own.speed_variance == 0.0:
         sigma: float = own.sigma[j]
         return sigma
     x, y, z = value[0], value[1], value[2]
-    return sqrt(own.variance[j] + own.speed_variance[0] * (x * x + y * y + z * z))
+    return sqrt(own.variance[j] + own.speed_variance * (x * x + y * y + z * z))
 
 
 @kernel
@@ -252,8 +183,8 @@ class CompiledInstrument(Instrument):
     ----------
     code : int
         Code of the observed quantity.
-    numbers : (24,) array
-        Parameters of the instrument; `parameters` has their names.
+    numbers : (n,) array
+        The `INSTRUMENT`; `parameters` is the record of it.
     in_kernel : bool
         Whether the kernel alone computes the readings. False: the instrument also asks its surroundings, and runs step
         by step call it in the block form.
@@ -266,14 +197,14 @@ class CompiledInstrument(Instrument):
         super().__init__(spec, name, seed)
         self.numbers, d = np.zeros(NUMBERS), len(self.sigma)
         own = self.parameters
-        own.scale[0], own.lever_arm[:], own.has_lever_arm[0] = self.scale, self.lever_arm, float(self.has_lever_arm)
-        own.water_depth[0] = np.nan
+        own.scale, own.lever_arm, own.has_lever_arm = self.scale, self.lever_arm, self.has_lever_arm
+        own.water_depth = np.nan
         own.sigma[:d], own.variance[:d] = self.sigma, self.sigma**2
 
     @property
-    def parameters(self) -> InstrumentNumbers:
-        """The parts of ``numbers``; what is written into them is written there."""
-        return instrument_numbers(self.numbers)
+    def parameters(self) -> Any:
+        """The record of ``numbers``; what is written into it is written there."""
+        return self.numbers.view(INSTRUMENT)[0]
 
     def _rows(self, tap: TapStates) -> tuple[Array, Array, NDArray[np.bool_]]:
         states = (tap.position, tap.velocity, tap.attitude, tap.angular_rate, tap.water_velocity)

@@ -7,7 +7,7 @@ run are drawn together. Such steps are a *batch*. The kernels compute what depen
 from __future__ import annotations
 
 from math import sqrt
-from typing import Annotated, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +18,8 @@ from simnav.kinds import add_error_scalar
 from simnav.sensors.faults.layer import ADDS, DROPS, HOLDS, STEPS_NOISE, ZEROES
 from simnav.sensors.imu import HeldTable, TriadErrors, triad_errors
 from simnav.sensors.observation import noise_scalar, observe_one
+from simnav.structures import structure
+from simnav.true_state import TRUE_STATE
 
 __all__ = [
     "BLOCKS",
@@ -25,6 +27,9 @@ __all__ = [
     "DUE",
     "HELD",
     "INERTIAL",
+    "LAYOUT",
+    "NOISE_STEP",
+    "OPERATION",
     "UNTOUCHED",
     "AidDraws",
     "BatchProgress",
@@ -40,37 +45,23 @@ __all__ = [
     "sort_out",
 ]
 
-#: Length of the array that holds a `HeldReading`.
-HELD = 8
+#: What a reading of an instrument is: the code of the observed quantity, the number of components, and the two numbers
+#: of `simnav.kinds.Kind.layout`.
+LAYOUT = structure(code=int, components=int, positions=int, cyclic=int)
+#: The action of a fault layer (`simnav.sensors.faults.layer.ADDS`, ...), its first bit, and 1 if each interval has a
+#: bit of its own.
+OPERATION = structure(action=int, first_bit=int, bit_each=int)
+#: The noise of a layer that steps it: the new sigma of an instrument, or the factor on its sigma if it is not 0.
+NOISE_STEP = structure(sigma=3, factor=float)
+#: The state of a layer that repeats values: the last value, and 1 if there is one; the number of the interval, from 1
+#: on; the repeated value.
+HELD = structure(last=3, has_last=int, number=int, value=3)
+#: The truth at the end of a step: the first parts of a `simnav.true_state.TRUE_STATE`.
+STEP_END = structure(position=3, velocity=3, attitude=3)
 #: Number of the interval of a measurement that a layer does not affect.
 UNTOUCHED = -2
 #: What `sort_out` finds: a run with only the block form; one that is compiled, with an IMU, at the end of the batch.
 BLOCKS, COMPILED, INERTIAL, DUE = 1, 2, 4, 8
-
-
-class HeldReading(NamedTuple):
-    """The state of a layer that repeats values: parts of one array.
-
-    Attributes
-    ----------
-    last, has_last : (3,), (1,) array
-        The last value, and 1 if there is one.
-    number : (1,) array
-        Number of the interval, from 1 on.
-    value : (3,) array
-        The repeated value.
-    """
-
-    last: Array
-    has_last: Array
-    number: Array
-    value: Array
-
-
-@helper
-def held_reading(q: Array) -> HeldReading:
-    """The parts of an array of `HELD` numbers."""
-    return HeldReading(last=q[0:3], has_last=q[3:4], number=q[4:5], value=q[5:8])
 
 
 class BatchProgress(NamedTuple):
@@ -168,8 +159,8 @@ class SampleTimes(NamedTuple):
         Index of the first sample of the step within the batch, and index after the last one.
     time : (b, s) array
         Times of the samples of the batch [s].
-    states : (b, m, 14) array
-        True states at the samples of the step.
+    states : (b, m, 15) array
+        True states at the samples of the step, each a `simnav.true_state.TRUE_STATE`.
     owner : (b, s) int array
         Number of the instrument of each sample; -1: the end of a step.
     """
@@ -209,12 +200,11 @@ class FaultLayers(NamedTuple):
     number : (b,) int array
         Number of layers.
     operations : (b, k, 3) int array
-        Action of each layer (`simnav.sensors.faults.layer.ADDS`, ...), its first bit, and 1 if each interval has a bit
-        of its own.
+        The `OPERATION` of each layer.
     sizes : (b, i, k, 4) array
-        For noise steps: the new sigma of an instrument, or the factor on its sigma if it is not 0.
+        The `NOISE_STEP` of each.
     held : (b, i, k, 8) array
-        State of layers that repeat values; updated.
+        The `HELD` of each; updated.
     """
 
     number: IntegerVector
@@ -415,9 +405,8 @@ def sense(
         Times of the samples, and the true states there.
     drawn : AidDraws
         Random numbers of the batch.
-    instruments : (b, i, 4) int and (b, i, 24) arrays
-        For each of i instruments: code of the observed quantity, number of components, and the two numbers of
-        `simnav.kinds.Kind.layout`; its parameters, as in `simnav.sensors.observation.observe_one`.
+    instruments : (b, i, 4) int and (b, i, n) arrays
+        For each of i instruments its `LAYOUT` and its `simnav.sensors.observation.INSTRUMENT`.
     layers : FaultLayers
         The faults.
     delivered : Delivered
@@ -429,7 +418,6 @@ def sense(
     layout, numbers = instruments
     operations, sizes = layers.operations, layers.sizes
     who, when, value, faults = delivered.who, delivered.when, delivered.value, delivered.faults
-    state = np.zeros(15)
     reading, wrong, sigma = np.empty(3), np.empty(3), np.empty(3)
     for b in range(active.size):
         if not active[b]:
@@ -439,13 +427,13 @@ def sense(
             tap = samples.states[b, t - first[b]]
             i = samples.owner[b, t]
             if i < 0:
-                for j in range(9):
-                    truth[b, j] = tap[j]
+                at, end = tap.view(TRUE_STATE)[0], truth[b].view(STEP_END)[0]
+                for j in range(3):
+                    end.position[j], end.velocity[j], end.attitude[j] = at.position[j], at.velocity[j], at.attitude[j]
                 continue
-            for j in range(14):
-                state[j] = tap[j]
-            d, positions, cyclic = layout[b, i, 1], layout[b, i, 2], layout[b, i, 3]
-            there = observe_one(layout[b, i, 0], numbers[b, i], state, reading)
+            own = layout[b, i].view(LAYOUT)[0]
+            d, positions, cyclic = own.components, own.positions, own.cyclic
+            there = observe_one(own.code, numbers[b, i], tap, reading)
             for j in range(d):
                 sigma[j] = noise_scalar(numbers[b, i], reading, j)
                 wrong[j] = drawn.error[b, t, j] + sigma[j] * drawn.white[b, t, j]
@@ -454,12 +442,13 @@ def sense(
             add_error_scalar(positions, cyclic, reading[:d], wrong[:d])
             label = 0
             for k in range(layers.number[b]):
-                number, what = drawn.interval[b, t, k], operations[b, k, 0]
+                layer = operations[b, k].view(OPERATION)[0]
+                number, what = drawn.interval[b, t, k], layer.action
                 if number == UNTOUCHED:
                     continue
                 touched = number >= 0
                 if what == HOLDS:
-                    touched = _hold(held_reading(layers.held[b, i, k]), number, reading, d)
+                    touched = _hold(layers.held[b, i, k].view(HELD)[0], number, reading, d)
                 elif what == DROPS:
                     if touched:
                         there = False
@@ -474,16 +463,17 @@ def sense(
                         wrong[j] = drawn.fault[b, t, k, j]
                         touched = touched or wrong[j] != 0.0
                     if touched and what == STEPS_NOISE:
+                        stepped = sizes[b, i, k].view(NOISE_STEP)[0]
                         for j in range(d):
-                            new = sizes[b, i, k, 3] * sigma[j]
-                            if sizes[b, i, k, 3] == 0.0:
-                                new = max(sigma[j], sizes[b, i, k, j])
+                            new = stepped.factor * sigma[j]
+                            if stepped.factor == 0.0:
+                                new = max(sigma[j], stepped.sigma[j])
                             wrong[j] *= sqrt(new * new - sigma[j] * sigma[j])
                             sigma[j] = new
                     if touched and what in (ADDS, STEPS_NOISE):
                         add_error_scalar(positions, cyclic, reading[:d], wrong[:d])
                 if touched:
-                    label |= 1 << (operations[b, k, 1] + (number if operations[b, k, 2] else 0))
+                    label |= 1 << (layer.first_bit + (number if layer.bit_each else 0))
             if there:
                 who[b, known], when[b, known], faults[b, known] = i, samples.time[b, t], label
                 for j in range(3):
@@ -493,15 +483,15 @@ def sense(
 
 
 @helper
-def _hold(held: HeldReading, number: int, reading: Array, d: int) -> bool:
+def _hold(held: Any, number: int, reading: Array, d: int) -> bool:
     """Replace a reading within an interval by the last one before it (or the first within). Return whether it did."""
-    if number >= 0 and held.number[0] != number + 1.0:
-        held.number[0] = number + 1.0
+    if number >= 0 and held.number != number + 1:
+        held.number = number + 1
         for j in range(d):
-            held.value[j] = held.last[j] if held.has_last[0] > 0.0 else reading[j]
+            held.value[j] = held.last[j] if held.has_last else reading[j]
     for j in range(d):
         held.last[j] = reading[j]
         if number >= 0:
             reading[j] = held.value[j]
-    held.has_last[0] = 1.0
+    held.has_last = 1
     return number >= 0

@@ -20,13 +20,16 @@ from numpy.typing import NDArray
 from simnav.arrivals import Arrivals
 from simnav.recording import AidStream, packets
 from simnav.sensors.faults.layer import DISTURBS_IMU, STEPS_NOISE, FaultLayer
-from simnav.sensors.observation import CompiledInstrument
+from simnav.sensors.observation import NUMBERS, CompiledInstrument
 from simnav.sensors.stepwise import (
     BLOCKS,
     COMPILED,
     DUE,
     HELD,
     INERTIAL,
+    LAYOUT,
+    NOISE_STEP,
+    OPERATION,
     UNTOUCHED,
     AidDraws,
     BatchProgress,
@@ -43,6 +46,7 @@ from simnav.sensors.stepwise import (
 )
 from simnav.simulation.simulator import Simulator
 from simnav.timing import TIME_TOLERANCE
+from simnav.true_state import TRUE_NUMBERS
 from simnav.types import ImuSamples, Measurement, Measurements
 from simnav.world import World, motion
 
@@ -107,7 +111,7 @@ class SteppedRuns:
         # Of one step: see `simnav.sensors.stepwise.sort_out` and `begin_step`.
         self._which = (np.zeros(n, np.bool_), np.zeros(n, np.bool_), np.zeros(n, np.bool_))
         self._limits = (np.zeros(n, np.int64), np.zeros(n, np.int64), np.zeros(n, np.int64))
-        self._taps = np.zeros((n, 1, motion.TAP_COLUMNS))
+        self._taps = np.zeros((n, 1, TRUE_NUMBERS))
         self._layers = np.zeros(n, np.int64)
         self._room(8)
 
@@ -182,23 +186,27 @@ class SteppedRuns:
     def _put_instruments(self, b: int, simulator: Simulator, layers: list[FaultLayer]) -> None:
         aids = list(simulator.aids.values())
         i, k = len(aids), len(layers)
-        numbers, layout, sizes = np.zeros((i, 24)), np.zeros((i, 4), np.int64), np.zeros((i, k, 4))
+        numbers, layout = np.zeros((i, NUMBERS)), np.zeros((i, 1), LAYOUT)
+        sizes, held = np.zeros((i, k, 1), NOISE_STEP), np.zeros((i, k, 1), HELD)
         for a, aid in enumerate(aids):
             assert isinstance(aid, CompiledInstrument)
             numbers[a] = aid.numbers
-            layout[a] = aid.code, len(aid.sigma), *aid.definition.layout
+            d = len(aid.sigma)
+            positions, cyclic = aid.definition.layout
+            layout[a] = aid.code, d, positions, cyclic
             for j, layer in enumerate(layers):
                 if layer.operation == STEPS_NOISE and layer.touches_kind(aid.name, aid.kind):
                     factor: float | None = layer.spec.factor  # type: ignore[attr-defined]
-                    sizes[a, j, 3] = 0.0 if factor is None else factor
+                    sizes["factor"][a, j] = 0.0 if factor is None else factor
                     if factor is None:
-                        sizes[a, j, : layout[a, 1]] = layer.spec.size("sigma", aid.kind)
+                        sizes["sigma"][a, j, 0, :d] = layer.spec.size("sigma", aid.kind)
         operation = [(layer.operation, layer.index, bool(layer.spec.intervals)) for layer in layers]
         self._layers[b] = k
-        self._put("operations", b, np.array(operation, np.int64).reshape(k, 3))
-        for name, value in (("numbers", numbers), ("layout", layout), ("sizes_of_noise", sizes)):
-            self._put(name, b, value)
-        self._put("held", b, np.zeros((i, k, HELD)))
+        self._put("operations", b, np.array(operation, OPERATION).reshape(k, 1).view(np.int64))
+        self._put("numbers", b, numbers)
+        self._put("layout", b, layout.view(np.int64))
+        self._put("sizes_of_noise", b, sizes.view(np.float64))
+        self._put("held", b, held.view(np.float64))
         self.held[b] = 0.0
         imu = simulator.imu
         if imu is not None:
@@ -229,7 +237,7 @@ class SteppedRuns:
         drawn = self.edge, self.samples_a_step
         most = begin_step.unchecked(compiled, drawn, (self._at, self.step, self.samples), self._limits)
         if most > self._taps.shape[1]:
-            self._taps = np.zeros((self.n, most, motion.TAP_COLUMNS))
+            self._taps = np.zeros((self.n, most, TRUE_NUMBERS))
             self._forget()
         # Their arrays are made here, of the right types.
         motion.advance.unchecked(
@@ -402,15 +410,15 @@ class SteppedRuns:
         time = np.arange(first + 1, first + n + 1) / rate
         variates = self._grown("variates", (2, n, 3), np.float64)
         both = (imu.gyroscope, imu.accelerometer)
-        triads: list[Any] = [t.ahead(variates[b, i, :n], float(time[-1])) for i, t in enumerate(both)]
+        triads = [t.ahead(variates[b, i, :n], float(time[-1])) for i, t in enumerate(both)]
         self._put("clock", b, np.array([first, rate], np.float64))
-        for k, name in ((0, "instability"), (2, "walk")):
-            table = np.zeros((2, max(len(t[k]) for t in triads), 3))
-            for i in range(2):
-                table[i, : len(triads[i][k])] = triads[i][k]
+        for name, held in zip(("instability", "walk"), zip(*triads, strict=True), strict=True):
+            table = np.zeros((2, max(len(t.rows) for t in held), 3))
+            for i, t in enumerate(held):
+                table[i, : len(t.rows)] = t.rows
             self._put(name, b, table)
-            self._put(name + "_rows", b, np.array([len(t[k]) for t in triads], np.int64))
-            self._put(name + "_first", b, np.array([t[k + 1] for t in triads], np.int64))
+            self._put(name + "_rows", b, np.array([len(t.rows) for t in held], np.int64))
+            self._put(name + "_first", b, np.array([t.first for t in held], np.int64))
         found = [layer.ahead_imu(time) for layer in simulator.layers if layer.operation == DISTURBS_IMU]
         active = np.stack([f[0] for f in found]) if found else np.zeros((0, n), np.bool_)
         errors = np.stack([f[1] for f in found]) if found else np.zeros((0, n, 6))

@@ -7,8 +7,6 @@ from typing import Annotated
 from simnav.spec import OneOf
 from simnav.world.bathymetry import Bathymetry
 from simnav.world.current import Current
-from simnav.world.given_track import GivenTrack, Limits, Poses
-from simnav.world.given_waypoints import GivenVessel, GivenWaypoints
 from simnav.world.hulls import Ship, Uuv
 from simnav.world.manoeuvres import (
     Accelerate,
@@ -30,6 +28,7 @@ from simnav.world.manoeuvring.vessel import ManoeuvringVessel
 from simnav.world.manoeuvring.workboat import Workboat
 from simnav.world.obstacles import Obstacle, Obstacles
 from simnav.world.sea import Sea
+from simnav.world.smooth_track import Limits, Poses, SmoothTrack
 from simnav.world.sound_speed import SoundSpeedProfile
 from simnav.world.start import Start
 from simnav.world.surroundings import (
@@ -43,6 +42,7 @@ from simnav.world.trajectory import SampledTrajectory, Steered, Trajectory, Voya
 from simnav.world.vessel import VESSELS, KinematicVessel, Vessel, register_vessel
 from simnav.world.water_column import WaterColumn
 from simnav.world.water_level import WaterLevel
+from simnav.world.waypoint_track import TrackVessel, WaypointTrack
 from simnav.world.wind import AirFlow, Wind
 from simnav.world.world import World
 
@@ -64,9 +64,6 @@ __all__ = [
     "Dive",
     "Ferry",
     "FlatBottom",
-    "GivenTrack",
-    "GivenVessel",
-    "GivenWaypoints",
     "Hold",
     "Hull",
     "KinematicVessel",
@@ -80,6 +77,7 @@ __all__ = [
     "SampledTrajectory",
     "Sea",
     "Ship",
+    "SmoothTrack",
     "SoundSpeedProfile",
     "Start",
     "Steered",
@@ -89,6 +87,7 @@ __all__ = [
     "SurroundingSpec",
     "Surroundings",
     "SurveyShip",
+    "TrackVessel",
     "Trajectory",
     "Turn",
     "Uuv",
@@ -96,6 +95,7 @@ __all__ = [
     "Voyage",
     "WaterColumn",
     "WaterLevel",
+    "WaypointTrack",
     "Waypoints",
     "Wind",
     "Workboat",

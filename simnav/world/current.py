@@ -11,12 +11,18 @@ from pydantic import Field, model_validator
 from simnav.geometry.earth import relative_position
 from simnav.spec import NonNegative, Positive, Spec, quantity
 from simnav.streams import stream
+from simnav.structures import length, structure
 from simnav.types import Array
 
-__all__ = ["Current", "WaterFlow", "eddies"]
+__all__ = ["EDDY", "EDDY_NUMBERS", "Current", "WaterFlow", "eddies"]
 
 #: Number of plane waves of velocity whose sum is the variable part of the current.
 _EDDIES = 8
+#: A plane wave of velocity: wave number north and east [rad/m], angular frequency [rad/s], phase [rad], and amplitude
+#: of the velocity north and east [m/s].
+EDDY = structure(wave_north=float, wave_east=float, frequency=float, phase=float, north=float, east=float)
+#: Length of an array that holds it.
+EDDY_NUMBERS = length(EDDY)
 
 
 class Current(Spec):
@@ -67,11 +73,10 @@ def eddies(current: Current | None, seed: int) -> Array:
     Returns
     -------
     (n, 6) array
-        One row for each plane wave: wave number north and east [rad/m], angular frequency [rad/s], phase [rad], and
-        amplitude of the velocity north and east [m/s]. Without a variable part there is no row.
+        One `EDDY` a row. Without a variable part there is no row.
     """
     if current is None or current.variation == 0.0:
-        return np.zeros((0, 6))
+        return np.zeros((0, EDDY_NUMBERS))
     rng = stream(seed, "current")
     n = _EDDIES
     # Directions are spread evenly around the compass, each with a random offset, so that both components have their

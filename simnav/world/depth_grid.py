@@ -13,7 +13,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from math import degrees, inf, isnan, nan
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -188,19 +188,30 @@ def _between(place: float, spacing: float, last: int) -> tuple[int, float, float
     return first, node - first, slope
 
 
+class _FourNodes(NamedTuple):
+    """A number of each node around a place, from the one before the last node to the one after the next."""
+
+    before: float
+    last: float
+    next: float
+    after: float
+
+
 @helper
-def _weights(t: float) -> tuple[float, float, float, float]:
-    """Weights of the nodes -1 to 2 at a place between the nodes 0 and 1, of Keys."""
+def _weights(t: float) -> _FourNodes:
+    """Weights of the nodes at a place between the nodes 0 and 1, of Keys."""
     t2 = t * t
     t3 = t2 * t
-    return -0.5 * t3 + t2 - 0.5 * t, 1.5 * t3 - 2.5 * t2 + 1.0, -1.5 * t3 + 2.0 * t2 + 0.5 * t, 0.5 * t3 - 0.5 * t2
+    return _FourNodes(
+        -0.5 * t3 + t2 - 0.5 * t, 1.5 * t3 - 2.5 * t2 + 1.0, -1.5 * t3 + 2.0 * t2 + 0.5 * t, 0.5 * t3 - 0.5 * t2
+    )
 
 
 @helper
-def _slopes(t: float) -> tuple[float, float, float, float]:
+def _slopes(t: float) -> _FourNodes:
     """Derivatives of `_weights`."""
     t2 = t * t
-    return -1.5 * t2 + 2.0 * t - 0.5, 4.5 * t2 - 5.0 * t, -4.5 * t2 + 4.0 * t + 0.5, 1.5 * t2 - t
+    return _FourNodes(-1.5 * t2 + 2.0 * t - 0.5, 4.5 * t2 - 5.0 * t, -4.5 * t2 + 4.0 * t + 0.5, 1.5 * t2 - t)
 
 
 @helper

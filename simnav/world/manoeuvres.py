@@ -14,16 +14,31 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from simnav.spec import NonNegative, Positive, Spec, quantity
+from simnav.structures import filled, length, structure
 from simnav.types import Array
 
 __all__ = ["Accelerate", "Dive", "Hold", "LawnMower", "Manoeuvre", "Surface", "Turn", "Waypoints", "ZigZag", "table"]
 
 HOLD, ACCELERATE, TURN, ZIGZAG, WAYPOINTS, DEPTH = range(6)
-#: Columns of a row: kind, duration, and four parameters that depend on the kind.
-COLUMNS = 6
+#: A manoeuvre of each kind: its duration [s]; speed [m/s] and acceleration [m/s^2]; angle of a turn, of a zigzag or of
+#: the path to a depth [rad], rate [rad/s], and radius of a turn or around a point [m]; the first of its points, the one
+#: after the last, and 1 if they are relative to the start of the manoeuvre; depth [m].
+MANOEUVRE = structure(
+    kind=int, duration=float, speed=float, acceleration=float, angle=float, rate=float, radius=float, first_point=int,
+    end_point=int, relative=int, depth=float,
+)  # fmt: skip
+#: Length of an array that holds it.
+ROW = length(MANOEUVRE)
 
 Angle = Annotated[float, Field(gt=0.0, lt=1.5707963267948966)]
 Point = tuple[float, float]
+
+
+def _through(first: int, end: int, radius: float, relative: bool = False) -> Array:
+    """The kernel's row for points; the arguments are those of `MANOEUVRE`."""
+    return filled(
+        MANOEUVRE, kind=WAYPOINTS, duration=inf, first_point=first, end_point=end, radius=radius, relative=relative
+    )
 
 
 class Hold(Spec):
@@ -32,9 +47,9 @@ class Hold(Spec):
     kind: Literal["hold"] = "hold"
     duration: Positive = quantity("s")
 
-    def row(self, points: list[Point]) -> list[float]:
+    def row(self, points: list[Point]) -> Array:
         """The kernel's row."""
-        return [HOLD, self.duration, 0.0, 0.0, 0.0, 0.0]
+        return filled(MANOEUVRE, kind=HOLD, duration=self.duration)
 
 
 class Accelerate(Spec):
@@ -45,9 +60,15 @@ class Accelerate(Spec):
     acceleration: Positive | None = quantity("m_s2", None)
     duration: Positive | None = quantity("s", None)
 
-    def row(self, points: list[Point]) -> list[float]:
+    def row(self, points: list[Point]) -> Array:
         """The kernel's row."""
-        return [ACCELERATE, self.duration or inf, self.speed, self.acceleration or inf, 0.0, 0.0]
+        return filled(
+            MANOEUVRE,
+            kind=ACCELERATE,
+            duration=self.duration or inf,
+            speed=self.speed,
+            acceleration=self.acceleration or inf,
+        )
 
 
 class Turn(Spec):
@@ -75,11 +96,18 @@ class Turn(Spec):
             raise ValueError("angle_deg = 0 does not turn; use a hold")
         return self
 
-    def row(self, points: list[Point]) -> list[float]:
+    def row(self, points: list[Point]) -> Array:
         """The kernel's row."""
         sign = -1.0 if (self.angle if self.angle is not None else self.rate or 1.0) < 0.0 else 1.0
         angle = sign * inf if self.angle is None else self.angle
-        return [TURN, self.duration or inf, angle, abs(self.rate or 0.0), self.radius or 0.0, 0.0]
+        return filled(
+            MANOEUVRE,
+            kind=TURN,
+            duration=self.duration or inf,
+            angle=angle,
+            rate=abs(self.rate or 0.0),
+            radius=self.radius or 0.0,
+        )
 
 
 class ZigZag(Spec):
@@ -90,9 +118,9 @@ class ZigZag(Spec):
     rate: Positive | None = quantity("deg_s", None)
     duration: Positive = quantity("s")
 
-    def row(self, points: list[Point]) -> list[float]:
+    def row(self, points: list[Point]) -> Array:
         """The kernel's row."""
-        return [ZIGZAG, self.duration, self.angle, self.rate or 0.0, 0.0, 0.0]
+        return filled(MANOEUVRE, kind=ZIGZAG, duration=self.duration, angle=self.angle, rate=self.rate or 0.0)
 
 
 class Waypoints(Spec):
@@ -102,11 +130,11 @@ class Waypoints(Spec):
     points: Annotated[tuple[Point, ...], Field(min_length=1)] = quantity("m")
     acceptance_radius: Positive = quantity("m", 50.0)
 
-    def row(self, points: list[Point]) -> list[float]:
+    def row(self, points: list[Point]) -> Array:
         """The kernel's row; appends the points."""
         first = len(points)
         points.extend(self.points)
-        return [WAYPOINTS, inf, float(first), float(len(points)), self.acceptance_radius, 0.0]
+        return _through(first, len(points), self.acceptance_radius)
 
 
 class LawnMower(Spec):
@@ -119,7 +147,7 @@ class LawnMower(Spec):
     first_turn: Literal["starboard", "port"] = "starboard"
     acceptance_radius: Positive = quantity("m", 10.0)
 
-    def row(self, points: list[Point]) -> list[float]:
+    def row(self, points: list[Point]) -> Array:
         """The kernel's row; appends the ends of the legs, in the axes of the vessel at the start of the survey."""
         first = len(points)
         side = self.spacing if self.first_turn == "starboard" else -self.spacing
@@ -127,7 +155,7 @@ class LawnMower(Spec):
             ends = (0.0, self.leg) if i % 2 == 0 else (self.leg, 0.0)
             points.extend((end, i * side) for end in ends)
         del points[first]  # the vessel is at this point already
-        return [WAYPOINTS, inf, float(first), float(len(points)), self.acceptance_radius, 1.0]
+        return _through(first, len(points), self.acceptance_radius, relative=True)
 
 
 class Dive(Spec):
@@ -137,9 +165,9 @@ class Dive(Spec):
     depth: NonNegative = quantity("m")
     angle: Angle = quantity("deg", 0.2617993877991494)
 
-    def row(self, points: list[Point]) -> list[float]:
+    def row(self, points: list[Point]) -> Array:
         """The kernel's row."""
-        return [DEPTH, inf, self.depth, self.angle, 0.0, 0.0]
+        return filled(MANOEUVRE, kind=DEPTH, duration=inf, depth=self.depth, angle=self.angle)
 
 
 class Surface(Spec):
@@ -148,9 +176,9 @@ class Surface(Spec):
     kind: Literal["surface"] = "surface"
     angle: Angle = quantity("deg", 0.2617993877991494)
 
-    def row(self, points: list[Point]) -> list[float]:
+    def row(self, points: list[Point]) -> Array:
         """The kernel's row."""
-        return [DEPTH, inf, 0.0, self.angle, 0.0, 0.0]
+        return filled(MANOEUVRE, kind=DEPTH, duration=inf, angle=self.angle)
 
 
 Manoeuvre = Hold | Accelerate | Turn | ZigZag | Waypoints | LawnMower | Dive | Surface
@@ -161,14 +189,11 @@ def table(manoeuvres: Sequence[Manoeuvre]) -> tuple[Array, Array]:
 
     Returns
     -------
-    rows : (n, 6) array
-        One row a manoeuvre, in SI units; see each manoeuvre's ``row``.
+    rows : (n, 11) array
+        One `MANOEUVRE` a row.
     points : (m, 2) array
         The waypoints that rows refer to: north and east [m].
     """
     points: list[Point] = []
     rows = [m.row(points) for m in manoeuvres]
-    return (
-        np.array(rows, dtype=np.float64).reshape(-1, COLUMNS),
-        np.array(points, dtype=np.float64).reshape(-1, 2),
-    )
+    return np.array(rows, dtype=np.float64).reshape(-1, ROW), np.array(points, dtype=np.float64).reshape(-1, 2)

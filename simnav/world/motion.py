@@ -16,17 +16,16 @@ import numpy as np
 
 from simnav.compiled import Array, helper, kernel
 from simnav.geometry.rotation import wrap_scalar
-from simnav.inverse_strapdown import AXES, BLOCK, BLOCK_COLUMNS, INTERVAL, POSITION, VELOCITY, ideal_samples
+from simnav.inverse_strapdown import BLOCK, ideal_samples, put_three
 from simnav.kernel_types import FlagVector, IntegerMatrix, IntegerVector, Matrix, Stack, Vector
 from simnav.strapdown import Triple
 from simnav.structures import length, structure
-from simnav.world.manoeuvres import ACCELERATE, COLUMNS, DEPTH, HOLD, TURN, WAYPOINTS, ZIGZAG
+from simnav.true_state import TRUE_STATE
+from simnav.world.current import EDDY, EDDY_NUMBERS
+from simnav.world.manoeuvres import ACCELERATE, DEPTH, HOLD, MANOEUVRE, ROW, TURN, WAYPOINTS, ZIGZAG
 from simnav.world.manoeuvring.dynamics import HULL, SAIL, sail
 from simnav.world.motion_block import (
-    ANGLES,
-    BLOCK_ROWS,
-    BOW,
-    FLOW,
+    MOTION,
     Course,
     body_rate,
     cosine_sine,
@@ -37,14 +36,14 @@ from simnav.world.motion_block import (
     tap_at,
     wrapped,
 )
-from simnav.world.sea import ROWS
+from simnav.world.sea import PHASES, ROWS
 from simnav.world.seaway import OSCILLATIONS, OSCILLATORS, Responses, Transitions, answers, transitions, wave_responses
 
 __all__ = [
     "PARAMETERS",
     "PROGRESS",
+    "SIZES",
     "STATE",
-    "TAP_COLUMNS",
     "RequestedStates",
     "advance",
     "command",
@@ -63,7 +62,7 @@ __all__ = [
 #: them all are zero. The state of a hull (`simnav.world.manoeuvring.dynamics.SAIL`).
 STATE = structure(
     speed=float, speed_change=float, yaw_rate=float, yaw_rate_change=float, heading=float, path_angle=float,
-    path_rate=float, depth=float, north=float, east=float, position=3, velocity=3, dcm=9, increments=6,
+    path_rate=float, depth=float, north=float, east=float, position=3, velocity=3, dcm=(3, 3), increments=6,
     commanded_speed=float, target_speed=float, largest_speed_change=float, target_heading=float, largest_yaw_rate=float,
     target_depth=float, largest_path_angle=float,
     segment_time=float, segment_heading=float, segment_sign=float, segment_north=float, segment_east=float,
@@ -82,10 +81,10 @@ PARAMETERS = structure(
     current_north=float, current_east=float, shear=float, attenuation=float, longest_phase=float,
     oscillators=length(OSCILLATORS), has_hull=int, hull=length(HULL),
 )  # fmt: skip
-#: Columns of a tap: position 0:3, velocity 3:6, roll, pitch, yaw 6:9, angular rate 9:12, current north, east 12:14.
-TAP_COLUMNS = 14
-#: Rows of the phases of waves, and columns of an eddy.
-PHASES, EDDY_COLUMNS = 3, 6
+#: What a world consists of: numbers of manoeuvres, points, waves and eddies.
+SIZES = structure(manoeuvres=int, points=int, waves=int, eddies=int)
+#: Length of the array that holds a block of the motion.
+_WORK = length(MOTION)
 
 
 class Composed(NamedTuple):
@@ -121,10 +120,10 @@ def _lag(x: float, dx: float, command: float, dt: float, tau: float, decay: floa
 
 
 @helper(borrows=True)
-def _waypoint(points: Array, j: int, relative: float, x: Any) -> tuple[float, float]:
+def _waypoint(points: Array, j: int, relative: int, x: Any) -> tuple[float, float]:
     """Waypoint j as distances north and east of the start of the run [m]."""
     a, b = points[j, 0], points[j, 1]
-    if relative > 0.0:
+    if relative:
         c, s = cos(x.segment_heading), sin(x.segment_heading)
         return x.segment_north + c * a - s * b, x.segment_east + s * a + c * b
     return a, b
@@ -141,39 +140,40 @@ def _guide(x: Any, index: Any, p: Any, rows: Array, points: Array, time: float) 
         i = index.segment
         if i >= rows.shape[0]:
             break
-        kind = int(rows[i, 0])
+        own = rows[i].view(MANOEUVRE)[0]
+        kind = own.kind
         if index.begun == 0:
             index.begun = 1
             x.segment_time = time
             x.segment_heading = x.target_heading
             x.largest_yaw_rate = p.turn_rate
             if kind == ACCELERATE:
-                x.target_speed, x.largest_speed_change = rows[i, 2], rows[i, 3]
+                x.target_speed, x.largest_speed_change = own.speed, own.acceleration
             elif kind == TURN:
-                x.segment_sign = 1.0 if rows[i, 2] > 0.0 else -1.0
-                if abs(rows[i, 2]) < inf:
-                    x.target_heading += rows[i, 2]
+                x.segment_sign = 1.0 if own.angle > 0.0 else -1.0
+                if abs(own.angle) < inf:
+                    x.target_heading += own.angle
             elif kind == ZIGZAG:
                 x.segment_sign = 1.0
             elif kind == WAYPOINTS:
-                index.waypoint = int(rows[i, 2])
+                index.waypoint = own.first_point
                 x.segment_north, x.segment_east = x.north, x.east
             elif kind == DEPTH:
-                x.target_depth, x.largest_path_angle = rows[i, 2], rows[i, 3]
-        done = time - x.segment_time >= rows[i, 1] - 1e-9
+                x.target_depth, x.largest_path_angle = own.depth, own.angle
+        done = time - x.segment_time >= own.duration - 1e-9
         if kind == HOLD:
             pass
         elif kind == ACCELERATE:
-            reached = abs(x.speed - rows[i, 2]) < 0.01 * max(1.0, rows[i, 2]) and abs(x.speed_change) < 1e-3
-            done = done or (rows[i, 1] == inf and reached)
+            reached = abs(x.speed - own.speed) < 0.01 * max(1.0, own.speed) and abs(x.speed_change) < 1e-3
+            done = done or (own.duration == inf and reached)
         elif kind == TURN:
-            rate = rows[i, 3]
-            if rows[i, 4] > 0.0:
-                rate = x.speed / rows[i, 4]
+            rate = own.rate
+            if own.radius > 0.0:
+                rate = x.speed / own.radius
             if rate <= 0.0:
                 rate = p.turn_rate
             x.largest_yaw_rate = rate
-            if abs(rows[i, 2]) < inf:
+            if abs(own.angle) < inf:
                 done = done or (abs(x.target_heading - psi) < 0.005 and abs(x.yaw_rate) < 5e-4)
             elif done:
                 x.target_heading = rest
@@ -183,8 +183,8 @@ def _guide(x: Any, index: Any, p: Any, rows: Array, points: Array, time: float) 
                 x.turned += extra * p.step
                 direct = x.segment_sign * rate + extra
         elif kind == ZIGZAG:
-            rate = rows[i, 3] if rows[i, 3] > 0.0 else p.turn_rate
-            if x.segment_sign * (psi - x.segment_heading) >= rows[i, 2]:
+            rate = own.rate if own.rate > 0.0 else p.turn_rate
+            if x.segment_sign * (psi - x.segment_heading) >= own.angle:
                 x.segment_sign = -x.segment_sign
             if not done:
                 extra = (x.to_track - x.heading_error - x.turned) / (2.0 * p.turn_time)
@@ -194,22 +194,22 @@ def _guide(x: Any, index: Any, p: Any, rows: Array, points: Array, time: float) 
         elif kind == WAYPOINTS:
             # The vessel is steered by its estimated position.
             north, east = x.north + x.north_error, x.east + x.east_error
-            while index.waypoint < int(rows[i, 3]):
+            while index.waypoint < own.end_point:
                 j = index.waypoint
-                a, b = _waypoint(points, j, rows[i, 5], x)
+                a, b = _waypoint(points, j, own.relative, x)
                 from_a, from_b = x.segment_north, x.segment_east
-                if j > int(rows[i, 2]):
-                    from_a, from_b = _waypoint(points, j - 1, rows[i, 5], x)
+                if j > own.first_point:
+                    from_a, from_b = _waypoint(points, j - 1, own.relative, x)
                 # Reached within the radius, or when it is abeam: otherwise the vessel might circle a point for ever.
                 passed = (north - a) * (a - from_a) + (east - b) * (b - from_b) > 0.0
-                if (a - north) ** 2 + (b - east) ** 2 > rows[i, 4] ** 2 and not passed:
+                if (a - north) ** 2 + (b - east) ** 2 > own.radius**2 and not passed:
                     # The vessel steers for the waypoint itself: there is no correction back to a track.
                     x.target_heading = psi + wrapped(atan2(b - east, a - north) - x.to_track - psi)
                     break
                 index.waypoint += 1
-            done = index.waypoint >= int(rows[i, 3])
+            done = index.waypoint >= own.end_point
         elif kind == DEPTH:
-            done = done or (abs(x.depth - rows[i, 2]) < 0.5 and abs(x.path_angle) < 0.02)
+            done = done or (abs(x.depth - own.depth) < 0.5 and abs(x.path_angle) < 0.02)
         if not done:
             break
         index.segment += 1
@@ -281,9 +281,10 @@ def _water(x: Any, p: Any, eddies: Array, time: float) -> None:
     """Store the velocity of the surface water at the vessel's position in the state."""
     north, east = p.current_north, p.current_east
     for i in range(eddies.shape[0]):
-        c = cos(eddies[i, 0] * x.north + eddies[i, 1] * x.east - eddies[i, 2] * time + eddies[i, 3])
-        north += eddies[i, 4] * c
-        east += eddies[i, 5] * c
+        eddy = eddies[i].view(EDDY)[0]
+        c = cos(eddy.wave_north * x.north + eddy.wave_east * x.east - eddy.frequency * time + eddy.phase)
+        north += eddy.north * c
+        east += eddy.east * c
     x.water_north, x.water_east = north, east
 
 
@@ -323,14 +324,14 @@ def initialise(state: Vector, parameters: Vector, phase: Matrix, table: Matrix, 
     ct, st = cosine_sine(now.pitch)
     c = matrix(cr, sr, ct, st, now.cos_bow, now.sin_bow)
     dcm = x.dcm
-    dcm[0], dcm[1], dcm[2] = c.c00, c.c01, c.c02
-    dcm[3], dcm[4], dcm[5] = c.c10, c.c11, c.c12
-    dcm[6], dcm[7], dcm[8] = c.c20, c.c21, c.c22
+    dcm[0, 0], dcm[0, 1], dcm[0, 2] = c.c00, c.c01, c.c02
+    dcm[1, 0], dcm[1, 1], dcm[1, 2] = c.c10, c.c11, c.c12
+    dcm[2, 0], dcm[2, 1], dcm[2, 2] = c.c20, c.c21, c.c22
     x.roll, x.pitch = now.roll, now.pitch
 
 
 @helper(borrows=True)
-def _steer(x: Any, index: Any, p: Any, plan: tuple[Array, Array], block: Array, first: int, last: int) -> None:
+def _steer(x: Any, index: Any, p: Any, plan: tuple[Array, Array], block: Any, first: int, last: int) -> None:
     """Guidance and the dynamics of the vessel in intervals of a block: store the course at their ends.
 
     ``first`` and ``last`` are the number of the first interval, and that after the last one. The other arguments are
@@ -374,7 +375,7 @@ def _drift(
     p: Any,
     water: tuple[Array, Array, Array],
     by: Transitions,
-    block: Array,
+    block: Any,
     first: int,
     last: int,
 ) -> None:
@@ -396,12 +397,12 @@ def _drift(
         _water(x, p, eddies, (time + k + 1) * dt)
         now = _compose(course, (x.water_north, x.water_east), swell.yaw[0], p, waves)
         v = now.velocity
-        block[VELOCITY, k + 1], block[VELOCITY + 1, k + 1], block[VELOCITY + 2, k + 1] = v
-        block[ANGLES, k + 1], block[ANGLES + 1, k + 1] = now.roll, now.pitch
-        block[BOW, k], block[BOW + 1, k] = now.cos_bow, now.sin_bow
-        block[FLOW, k], block[FLOW + 1, k] = x.water_north, x.water_east
-        x.north += 0.5 * dt * (block[VELOCITY, k] + v[0])
-        x.east += 0.5 * dt * (block[VELOCITY + 1, k] + v[1])
+        put_three(block.velocity, k + 1, v)
+        block.roll[k + 1], block.pitch[k + 1] = now.roll, now.pitch
+        block.cos_bow[k], block.sin_bow[k] = now.cos_bow, now.sin_bow
+        block.flow[0, k], block.flow[1, k] = x.water_north, x.water_east
+        x.north += 0.5 * dt * (block.velocity[0, k] + v[0])
+        x.east += 0.5 * dt * (block.velocity[1, k] + v[1])
 
 
 @helper(borrows=True)
@@ -414,27 +415,31 @@ def _advance_one(
     tap_time: Array,
     taps: Array,
     imu: tuple[Array, Array],
-    block: Array,
+    work: Array,
 ) -> None:
-    """Advance one world by as many samples as ``imu`` has room for. The arguments are those of `advance`."""
+    """Advance one world by as many samples as ``imu`` has room for.
+
+    ``work`` (n,) is room for a `MOTION`. The other arguments are those of `advance`.
+    """
     rate, force = imu
+    block = work.view(MOTION)[0]
     dt, tap = p.step, 0
     position, velocity, dcm, turning = x.position, x.velocity, x.dcm, x.body_rate
     by = transitions(p.oscillators.view(OSCILLATORS)[0], dt)
     # Guidance is ahead of the waves, unless waypoints or eddies make it depend on the position.
     ahead = water[2].shape[0] == 0
     for i in range(plan[0].shape[0]):
-        ahead = ahead and plan[0][i, 0] != WAYPOINTS
+        ahead = ahead and plan[0][i].view(MANOEUVRE)[0].kind != WAYPOINTS
     for k in range(BLOCK):
-        block[INTERVAL, k] = dt
+        block.interval[k] = dt
     for start in range(0, rate.shape[0], BLOCK):
         n = min(BLOCK, rate.shape[0] - start)
         first = index.sample
         for i in range(3):
-            block[VELOCITY + i, 0], block[POSITION + i, 0] = velocity[i], position[i]
-        for i in range(9):
-            block[AXES + i, 0] = dcm[i]
-        block[ANGLES, 0], block[ANGLES + 1, 0] = x.roll, x.pitch
+            block.velocity[i, 0], block.position[i, 0] = velocity[i], position[i]
+            for j in range(3):
+                block.dcm[i, j, 0] = dcm[i, j]
+        block.roll[0], block.pitch[0] = x.roll, x.pitch
         for k in range(0, n, n if ahead else 1):
             upto = n if ahead else k + 1
             _steer(x, index, p, plan, block, k, upto)
@@ -452,14 +457,15 @@ def _advance_one(
             if k > 0:
                 before = body_rate(block, k - 1, rate[start + k - 1])
             rates = before, body_rate(block, k, rate[start + k])
-            tap_at(taps[tap], min((tap_time[tap] - (first + k) * dt) / dt, 1.0), block, k, rates, p.shear)
+            share = min((tap_time[tap] - (first + k) * dt) / dt, 1.0)
+            tap_at(taps[tap].view(TRUE_STATE)[0], share, block, k, rates, p.shear)
             tap += 1
         turning[0], turning[1], turning[2] = body_rate(block, n - 1, rate[start + n - 1])
         for i in range(3):
-            velocity[i], position[i] = block[VELOCITY + i, n], block[POSITION + i, n]
-        for i in range(9):
-            dcm[i] = block[AXES + i, n]
-        x.roll, x.pitch = block[ANGLES, n], block[ANGLES + 1, n]
+            velocity[i], position[i] = block.velocity[i, n], block.position[i, n]
+            for j in range(3):
+                dcm[i, j] = block.dcm[i, j, n]
+        x.roll, x.pitch = block.roll[n], block.pitch[n]
 
 
 class RequestedStates(NamedTuple):
@@ -471,8 +477,8 @@ class RequestedStates(NamedTuple):
         The times, ascending [s].
     first, last : (w,) int array
         Index of the first of these times within the block, and index after the last one.
-    states : (w, m, 14) array
-        Overwritten with the states at these times.
+    states : (w, m, 15) array
+        Overwritten with the states at these times, each a `simnav.true_state.TRUE_STATE`.
     """
 
     time: Matrix
@@ -506,7 +512,7 @@ def advance(
     p : (w, m) array
         The `PARAMETERS` of each world.
     sizes : (w, 4) int array
-        Number of manoeuvres, points, waves and eddies of each world.
+        The `SIZES` of each world.
     plan : two (w, ...) arrays
         Rows and points of the manoeuvre tables (`simnav.world.manoeuvres.table`), each flattened. A row of the array
         may be longer than its content, like the rows of ``water``.
@@ -524,20 +530,21 @@ def advance(
     phase, table, eddies = water
     first, last = requested.first, requested.last
     samples, rate, force = imu
-    block = np.empty((BLOCK_ROWS, BLOCK_COLUMNS))
+    work = np.empty(_WORK)
     for w in range(active.size):
         if not active[w]:
             continue
-        r, q, c, e = sizes[w, 0], sizes[w, 1], sizes[w, 2], sizes[w, 3]
+        size = sizes[w].view(SIZES)[0]
+        r, q, c, e = size.manoeuvres, size.points, size.waves, size.eddies
         n, m = samples[w], last[w] - first[w]
         _advance_one(
             x[w].view(STATE)[0], index[w].view(PROGRESS)[0], p[w].view(PARAMETERS)[0],
-            (rows[w, : COLUMNS * r].reshape((r, COLUMNS)), points[w, : 2 * q].reshape((q, 2))),
+            (rows[w, : ROW * r].reshape((r, ROW)), points[w, : 2 * q].reshape((q, 2))),
             (
                 phase[w, : PHASES * c].reshape((PHASES, c)), table[w, : ROWS * c].reshape((ROWS, c)),
-                eddies[w, : EDDY_COLUMNS * e].reshape((e, EDDY_COLUMNS)),
+                eddies[w, : EDDY_NUMBERS * e].reshape((e, EDDY_NUMBERS)),
             ),
-            requested.time[w, first[w] : last[w]], requested.states[w, :m], (rate[w, :n], force[w, :n]), block,
+            requested.time[w, first[w] : last[w]], requested.states[w, :m], (rate[w, :n], force[w, :n]), work,
         )  # fmt: skip
 
 

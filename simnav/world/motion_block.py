@@ -1,35 +1,22 @@
 """The motion in a block of samples: the rows that `simnav.world.motion` stores, and what only follows from them.
 
-A block is an array of `simnav.inverse_strapdown.ideal_samples` with more rows. What follows from them is the attitude,
+A block is a record of `simnav.inverse_strapdown.ideal_samples` with more rows. What follows from them is the attitude,
 in a loop of vector instructions, and the states between the samples that somebody asked for (taps).
 """
 
 from __future__ import annotations
 
 from math import atan2, cos, sin
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from simnav.compiled import Array, helper
-from simnav.inverse_strapdown import (
-    AXES,
-    EARTH,
-    INTERVAL,
-    PER_EAST,
-    PER_NORTH,
-    POSITION,
-    SAMPLE_ROWS,
-    VELOCITY,
-    SmallMatrix,
-)
+from simnav.inverse_strapdown import SmallMatrix, matrix_at, put_matrix, samples_structure
 from simnav.strapdown import Triple
 
 __all__ = [
-    "ANGLES",
-    "BLOCK_ROWS",
-    "BOW",
-    "FLOW",
+    "MOTION",
     "Course",
     "body_rate",
     "cosine_sine",
@@ -41,10 +28,12 @@ __all__ = [
     "wrapped",
 ]
 
-# At each end of an interval: roll, pitch. At its later end: cosine and sine of the heading of the bow; the course
-# (`Course`), whose last two rows are depth and sway velocity; current at the surface, north, east.
-ANGLES, BOW, COURSE, DEPTHS, FLOW = (SAMPLE_ROWS + k for k in (0, 2, 4, 12, 14))
-BLOCK_ROWS = SAMPLE_ROWS + 16
+#: A block of the motion. At each end of an interval: roll and pitch. At its later end: cosine and sine of the heading
+#: of the bow; the course (`Course`); the current at the surface, north and east.
+MOTION = samples_structure(
+    roll=1, pitch=1, cos_bow=1, sin_bow=1, speed=1, yaw_rate=1, heading=1, cos_heading=1, sin_heading=1,
+    path=1, cos_path=1, sin_path=1, depth=1, sway=1, flow=2,
+)  # fmt: skip
 
 
 class Course(NamedTuple):
@@ -77,29 +66,29 @@ class Course(NamedTuple):
 
 
 @helper(borrows=True)
-def course_at(block: Array, k: int) -> Course:
+def course_at(block: Any, k: int) -> Course:
     """The course at the end of interval k."""
     return Course(
-        speed=block[COURSE, k],
-        yaw_rate=block[COURSE + 1, k],
-        heading=block[COURSE + 2, k],
-        cos_heading=block[COURSE + 3, k],
-        sin_heading=block[COURSE + 4, k],
-        path=block[COURSE + 5, k],
-        cos_path=block[COURSE + 6, k],
-        sin_path=block[COURSE + 7, k],
-        depth=block[DEPTHS, k],
-        sway=block[DEPTHS + 1, k],
+        speed=block.speed[k],
+        yaw_rate=block.yaw_rate[k],
+        heading=block.heading[k],
+        cos_heading=block.cos_heading[k],
+        sin_heading=block.sin_heading[k],
+        path=block.path[k],
+        cos_path=block.cos_path[k],
+        sin_path=block.sin_path[k],
+        depth=block.depth[k],
+        sway=block.sway[k],
     )
 
 
 @helper(borrows=True)
-def put_course(block: Array, k: int, course: Course) -> None:
+def put_course(block: Any, k: int, course: Course) -> None:
     """Store the course at the end of interval k."""
-    block[COURSE, k], block[COURSE + 1, k], block[COURSE + 2, k] = course.speed, course.yaw_rate, course.heading
-    block[COURSE + 3, k], block[COURSE + 4, k] = course.cos_heading, course.sin_heading
-    block[COURSE + 5, k], block[COURSE + 6, k], block[COURSE + 7, k] = course.path, course.cos_path, course.sin_path
-    block[DEPTHS, k], block[DEPTHS + 1, k] = course.depth, course.sway
+    block.speed[k], block.yaw_rate[k], block.heading[k] = course.speed, course.yaw_rate, course.heading
+    block.cos_heading[k], block.sin_heading[k] = course.cos_heading, course.sin_heading
+    block.path[k], block.cos_path[k], block.sin_path[k] = course.path, course.cos_path, course.sin_path
+    block.depth[k], block.sway[k] = course.depth, course.sway
 
 
 @helper(borrows=True)
@@ -139,68 +128,61 @@ def matrix(cr: float, sr: float, ct: float, st: float, ch: float, sh: float) -> 
 
 
 @helper(borrows=True)
-def _put_matrix(block: Array, k: int, c: SmallMatrix) -> None:
-    block[AXES, k], block[AXES + 1, k], block[AXES + 2, k] = c.c00, c.c01, c.c02
-    block[AXES + 3, k], block[AXES + 4, k], block[AXES + 5, k] = c.c10, c.c11, c.c12
-    block[AXES + 6, k], block[AXES + 7, k], block[AXES + 8, k] = c.c20, c.c21, c.c22
-
-
-@helper(borrows=True)
-def orient(block: Array, n: int) -> None:
+def orient(block: Any, n: int) -> None:
     """The direction cosine matrices at the ends of n intervals."""
-    large = 0
-    for k in range(n):
-        roll, pitch = block[ANGLES, k + 1], block[ANGLES + 1, k + 1]
-        cr, sr = _small_cosine_sine(roll)
-        ct, st = _small_cosine_sine(pitch)
-        _put_matrix(block, k + 1, matrix(cr, sr, ct, st, block[BOW, k], block[BOW + 1, k]))
-        large += (abs(roll) > 0.3) | (abs(pitch) > 0.3)
+    roll, pitch, dcm, large = block.roll[1:], block.pitch[1:], block.dcm[:, :, 1:], 0
+    m = np.uint64(n)  # as in `simnav.inverse_strapdown`
+    for k in range(m):
+        cr, sr = _small_cosine_sine(roll[k])
+        ct, st = _small_cosine_sine(pitch[k])
+        put_matrix(dcm, k, matrix(cr, sr, ct, st, block.cos_bow[k], block.sin_bow[k]))
+        large += (abs(roll[k]) > 0.3) | (abs(pitch[k]) > 0.3)
     if large > 0:
-        for k in range(n):
-            cr, sr = cosine_sine(block[ANGLES, k + 1])
-            ct, st = cosine_sine(block[ANGLES + 1, k + 1])
-            _put_matrix(block, k + 1, matrix(cr, sr, ct, st, block[BOW, k], block[BOW + 1, k]))
+        for k in range(m):
+            cr, sr = cosine_sine(roll[k])
+            ct, st = cosine_sine(pitch[k])
+            put_matrix(dcm, k, matrix(cr, sr, ct, st, block.cos_bow[k], block.sin_bow[k]))
 
 
 @helper(borrows=True)
-def body_rate(block: Array, k: int, rate: Array) -> Triple:
+def body_rate(block: Any, k: int, rate: Array) -> Triple:
     """Mean angular rate of the body relative to north-east-down over interval k, body axes [rad/s]."""
-    e0, e2 = block[EARTH, k], block[EARTH + 1, k]
+    e0, e2, c = block.earth_north[k], block.earth_down[k], matrix_at(block.dcm, k + 1)
     return (
-        rate[0] - block[AXES, k + 1] * e0 - block[AXES + 6, k + 1] * e2,
-        rate[1] - block[AXES + 1, k + 1] * e0 - block[AXES + 7, k + 1] * e2,
-        rate[2] - block[AXES + 2, k + 1] * e0 - block[AXES + 8, k + 1] * e2,
+        rate[0] - c.c00 * e0 - c.c20 * e2,
+        rate[1] - c.c01 * e0 - c.c21 * e2,
+        rate[2] - c.c02 * e0 - c.c22 * e2,
     )
 
 
 @helper(borrows=True)
-def tap_at(out: Array, a: float, block: Array, k: int, turning: tuple[Triple, Triple], shear: float) -> None:
+def tap_at(out: Any, a: float, block: Any, k: int, turning: tuple[Triple, Triple], shear: float) -> None:
     """State at the fraction a of sample interval k: velocity and angles are linear, position is their integral.
 
-    ``turning`` is the angular rate over the interval before and over this one.
+    ``out`` is a `simnav.true_state.TRUE_STATE`. ``turning`` is the angular rate over the interval before and over this
+    one.
     """
     before, now = turning
-    dt = block[INTERVAL, k]
-    yaw = atan2(block[AXES + 3, k], block[AXES, k])
-    new_yaw = atan2(block[AXES + 3, k + 1], block[AXES, k + 1])
+    dt, velocity, dcm = block.interval[k], block.velocity, block.dcm
+    yaw = atan2(dcm[1, 0, k], dcm[0, 0, k])
+    new_yaw = atan2(dcm[1, 0, k + 1], dcm[0, 0, k + 1])
     # The fraction of the position change that belongs to a linear velocity
     for i in range(3):
-        v, w = block[VELOCITY + i, k], block[VELOCITY + i, k + 1]
+        v, w = velocity[i, k], velocity[i, k + 1]
         mean = 0.5 * (v + w)
         change = -dt * mean
         if i == 0:
-            change = dt * mean * block[PER_NORTH, k]
+            change = dt * mean * block.per_north[k]
         elif i == 1:
-            change = dt * mean * block[PER_EAST, k]
+            change = dt * mean * block.per_east[k]
         gained = v * a + 0.5 * (w - v) * a * a
         scale = gained / mean if abs(mean) > 1e-9 else a
-        out[i] = block[POSITION + i, k] + change * (1.0 if a >= 1.0 else scale)
-        out[3 + i] = v + a * (w - v)
+        out.position[i] = block.position[i, k] + change * (1.0 if a >= 1.0 else scale)
+        out.velocity[i] = v + a * (w - v)
         # Angular rate at the instant, extrapolated from the means over this interval and the one before
-        out[9 + i] = now[i] + (a - 0.5) * (now[i] - before[i])
-    for i in range(2):
-        out[6 + i] = block[ANGLES + i, k] + a * (block[ANGLES + i, k + 1] - block[ANGLES + i, k])
-    out[8] = wrapped(yaw + a * wrapped(new_yaw - yaw))
-    flow = max(0.0, 1.0 - shear * max(0.0, block[DEPTHS, k]))
-    out[12] = flow * block[FLOW, k]
-    out[13] = flow * block[FLOW + 1, k]
+        out.angular_rate[i] = now[i] + (a - 0.5) * (now[i] - before[i])
+    out.attitude[0] = block.roll[k] + a * (block.roll[k + 1] - block.roll[k])
+    out.attitude[1] = block.pitch[k] + a * (block.pitch[k + 1] - block.pitch[k])
+    out.attitude[2] = wrapped(yaw + a * wrapped(new_yaw - yaw))
+    flow = max(0.0, 1.0 - shear * max(0.0, block.depth[k]))
+    out.water[0], out.water[1], out.water[2] = flow * block.flow[0, k], flow * block.flow[1, k], 0.0

@@ -18,7 +18,7 @@ and Motion Control*, Wiley 2011, chapters 8 and 10.
 from __future__ import annotations
 
 from functools import cached_property
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal, NamedTuple, Self
 
 import numpy as np
 from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
@@ -37,10 +37,57 @@ _SHARE = 0.999
 _FIRST_END = 4.0
 #: Advance of a phase in one step up to which the series of `simnav.world.seaway` are exact to rounding [rad].
 _LONGEST = 0.4
-#: Rows of the component table: phase rate, wave number north and east, cosine and sine gains of seven responses, and
-#: two cosine gains that yaw follows from.
-ROWS = 19
-YAW = 17
+
+
+class Components(NamedTuple):
+    """The wave components: the rows of the table of `components`, each an (n,) array.
+
+    Attributes
+    ----------
+    frequency, wave_north, wave_east : array
+        Angular frequency [rad/s], wave number [rad/m].
+    north_cos, north_sin, east_cos, east_sin, down_cos, down_sin : array
+        Gains of the displacements [m].
+    roll_north_cos, roll_north_sin, roll_east_cos, roll_east_sin : array
+        Gains of the slopes that roll follows from [rad].
+    pitch_north_cos, pitch_north_sin, pitch_east_cos, pitch_east_sin : array
+        Gains of the slopes that pitch follows from [rad].
+    yaw_first, yaw_second : array
+        With the heading psi, yaw is driven by cos(2 psi) times the sum of the first less sin(2 psi) times that of the
+        second [rad].
+    """
+
+    frequency: Array
+    wave_north: Array
+    wave_east: Array
+    north_cos: Array
+    north_sin: Array
+    east_cos: Array
+    east_sin: Array
+    down_cos: Array
+    down_sin: Array
+    roll_north_cos: Array
+    roll_north_sin: Array
+    roll_east_cos: Array
+    roll_east_sin: Array
+    pitch_north_cos: Array
+    pitch_north_sin: Array
+    pitch_east_cos: Array
+    pitch_east_sin: Array
+    yaw_first: Array
+    yaw_second: Array
+
+
+class Phases(NamedTuple):
+    """The phases of the wave components, each an (n,) array: cosine, sine, encounter frequency [rad/s]."""
+
+    cosine: Array
+    sine: Array
+    rate: Array
+
+
+#: Rows of the two arrays of `components`.
+PHASES, ROWS = len(Phases._fields), len(Components._fields)
 
 
 class Sea(Spec):
@@ -218,17 +265,14 @@ def components(sea: Sea | None, seed: int, depth: float | None = None) -> tuple[
     Returns
     -------
     phase : (3, n) array
-        Cosine and sine of the phase at time 0 at the start position, and a row for the encounter frequency.
+        The `Phases` at time 0 at the start position.
     table : (19, n) array
-        Frequency [rad/s], wave number north and east [rad/m]; then pairs of cosine and sine gains of the
-        displacements north, east, down [m], and of the slope responses roll-north, roll-east, pitch-north,
-        pitch-east [rad]. The roll of the vessel is the projection of (roll-north, roll-east) on its axes, and its pitch
+        The `Components`. The roll of the vessel is the projection of (roll-north, roll-east) on its axes, and its pitch
         that of (pitch-north, pitch-east). With the response ``encounter`` the gains of heave, roll and pitch are those
-        of the waves that drive them, and the last two rows are not zero: with the heading psi, yaw is driven by cos(2
-        psi) times the sum of the first less sin(2 psi) times that of the second.
+        of the waves that drive them, and those of yaw are not zero.
     """
     if sea is None or sea.significant_height == 0.0:
-        return np.zeros((3, 0)), np.zeros((ROWS, 0))
+        return np.zeros((PHASES, 0)), np.zeros((ROWS, 0))
     rng = stream(seed, "sea")
     n = sea.components
     peak = 2.0 * np.pi / sea.peak_period
@@ -288,18 +332,18 @@ def steady(sea: Sea, phase: Array, table: Array, north: float, east: float, head
     (4, 3) array
         For the down velocity [m/s], roll, pitch and yaw [rad]: value, rate, and what drives it.
     """
-    rate = table[0] - table[1] * north - table[2] * east
-    turned = np.conj(phase[0] + 1j * phase[1])
+    w, at = Components(*table), Phases(*phase)
+    rate = w.frequency - w.wave_north * north - w.wave_east * east
+    turned = np.conj(at.cosine + 1j * at.sine)
     c, s = np.cos(heading), np.sin(heading)
-
-    def gain(row: int) -> Array:
-        return np.asarray(table[row] + 1j * table[row + 1])
-
+    down = w.down_cos + 1j * w.down_sin
+    roll_north, roll_east = w.roll_north_cos + 1j * w.roll_north_sin, w.roll_east_cos + 1j * w.roll_east_sin
+    pitch_north, pitch_east = w.pitch_north_cos + 1j * w.pitch_north_sin, w.pitch_east_cos + 1j * w.pitch_east_sin
     driven = [
-        -1j * rate * gain(7),
-        gain(9) * s - gain(11) * c,
-        gain(13) * c + gain(15) * s,
-        table[YAW] * np.cos(2.0 * heading) - table[YAW + 1] * np.sin(2.0 * heading),
+        -1j * rate * down,
+        roll_north * s - roll_east * c,
+        pitch_north * c + pitch_east * s,
+        w.yaw_first * np.cos(2.0 * heading) - w.yaw_second * np.sin(2.0 * heading),
     ]
     out = np.empty((4, 3))
     for k, ((natural, damping), force) in enumerate(zip(sea.oscillators, driven, strict=True)):
@@ -349,15 +393,15 @@ class Waves:
         (n,) array
             Height of the surface above the mean sea surface [m].
         """
-        start, table = self._components
+        start, w = Phases(*self._components[0]), Components(*self._components[1])
         north, east, _ = relative_position(position, self._origin).T
-        amplitude = np.sqrt(2.0 * self.sea.significant_height**2 / 16.0 / max(table.shape[1], 1))
+        amplitude = np.sqrt(2.0 * self.sea.significant_height**2 / 16.0 / max(w.frequency.size, 1))
         elevation = np.zeros(len(time))
-        for k in range(table.shape[1]):
-            phase = np.arctan2(start[1, k], start[0, k])
-            wave = np.cos(table[0, k] * time - table[1, k] * north - table[2, k] * east + phase)
+        for k in range(w.frequency.size):
+            phase = np.arctan2(start.sine[k], start.cosine[k])
+            wave = np.cos(w.frequency[k] * time - w.wave_north[k] * north - w.wave_east[k] * east + phase)
             if depth is not None:
-                wave *= np.exp(-np.hypot(table[1, k], table[2, k]) * depth)
+                wave *= np.exp(-np.hypot(w.wave_north[k], w.wave_east[k]) * depth)
             elevation += wave
         elevation *= amplitude
         return elevation

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 from simnav.compiled import Array, helper
 from simnav.declared_process import Oscillation, oscillation
 from simnav.structures import structure
-from simnav.world.sea import YAW
+from simnav.world.sea import Components, Phases
 
 __all__ = ["OSCILLATIONS", "OSCILLATORS", "Responses", "Transitions", "answers", "transitions", "wave_responses"]
 
@@ -19,6 +19,21 @@ __all__ = ["OSCILLATIONS", "OSCILLATORS", "Responses", "Transitions", "answers",
 OSCILLATORS = structure(heave=2, roll=2, pitch=2, yaw=2)
 #: Value, rate and force of each: heave velocity [m/s], angles [rad].
 OSCILLATIONS = structure(heave=3, roll=3, pitch=3, yaw=3)
+
+
+@helper(borrows=True)
+def components_of(table: Array) -> Components:
+    """The rows of a table by name."""
+    return Components(
+        table[0], table[1], table[2], table[3], table[4], table[5], table[6], table[7], table[8], table[9], table[10],
+        table[11], table[12], table[13], table[14], table[15], table[16], table[17], table[18],
+    )  # fmt: skip
+
+
+@helper(borrows=True)
+def phases_of(phase: Array) -> Phases:
+    """The rows of the (3, n) phases by name."""
+    return Phases(phase[0], phase[1], phase[2])
 
 
 class Responses(NamedTuple):
@@ -60,8 +75,9 @@ def _parts(table: Array, north: float, east: float, dt: float, longest: float) -
     last = table.shape[1] - 1
     if longest == 0.0 or last < 0:
         return 1
-    number = sqrt(table[1, last] * table[1, last] + table[2, last] * table[2, last])
-    fastest = table[0, last] + number * sqrt(north * north + east * east)
+    w = components_of(table)
+    number = sqrt(w.wave_north[last] * w.wave_north[last] + w.wave_east[last] * w.wave_east[last])
+    fastest = w.frequency[last] + number * sqrt(north * north + east * east)
     return 1 + int(fastest * dt / longest)
 
 
@@ -73,31 +89,31 @@ def wave_responses(phase: Array, table: Array, north: float, east: float, dt: fl
     A phase advances by at most ``longest`` at a time [rad]; 0: by the whole step.
     """
     parts = _parts(table, north, east, dt, longest)
-    part = dt / parts
+    part, w, at = dt / parts, components_of(table), phases_of(phase)
     # Two loops over the components: the second only reads the rows that the first writes. So the compiler can vectorise
     # both without a check at run time whether the rows overlap.
     for _ in range(parts):
         for i in range(phase.shape[1]):
-            rate = table[0, i] - table[1, i] * north - table[2, i] * east
+            rate = w.frequency[i] - w.wave_north[i] * north - w.wave_east[i] * east
             d = rate * part
             d2 = d * d
             # The series are exact to rounding up to 0.4 rad.
             sd = d * (1.0 - d2 / 6.0 * (1.0 - d2 / 20.0 * (1.0 - d2 / 42.0 * (1.0 - d2 / 72.0))))
             cd = 1.0 - d2 / 2.0 * (1.0 - d2 / 12.0 * (1.0 - d2 / 30.0 * (1.0 - d2 / 56.0 * (1.0 - d2 / 90.0))))
-            c, s = phase[0, i], phase[1, i]
-            phase[0, i] = c * cd - s * sd
-            phase[1, i] = s * cd + c * sd
-            phase[2, i] = rate
+            c, s = at.cosine[i], at.sine[i]
+            at.cosine[i] = c * cd - s * sd
+            at.sine[i] = s * cd + c * sd
+            at.rate[i] = rate
     s0 = s1 = s2 = s3 = s4 = s5 = s6 = 0.0
     for i in range(phase.shape[1]):
-        c, s, rate = phase[0, i], phase[1, i], phase[2, i]
-        s0 += rate * (table[4, i] * c - table[3, i] * s)
-        s1 += rate * (table[6, i] * c - table[5, i] * s)
-        s2 += rate * (table[8, i] * c - table[7, i] * s)
-        s3 += table[9, i] * c + table[10, i] * s
-        s4 += table[11, i] * c + table[12, i] * s
-        s5 += table[13, i] * c + table[14, i] * s
-        s6 += table[15, i] * c + table[16, i] * s
+        c, s, rate = at.cosine[i], at.sine[i], at.rate[i]
+        s0 += rate * (w.north_sin[i] * c - w.north_cos[i] * s)
+        s1 += rate * (w.east_sin[i] * c - w.east_cos[i] * s)
+        s2 += rate * (w.down_sin[i] * c - w.down_cos[i] * s)
+        s3 += w.roll_north_cos[i] * c + w.roll_north_sin[i] * s
+        s4 += w.roll_east_cos[i] * c + w.roll_east_sin[i] * s
+        s5 += w.pitch_north_cos[i] * c + w.pitch_north_sin[i] * s
+        s6 += w.pitch_east_cos[i] * c + w.pitch_east_sin[i] * s
     return Responses(s0, s1, s2, s3, s4, s5, s6)
 
 
@@ -168,9 +184,10 @@ def answers(
         In the form of ``waves``.
     """
     first = second = 0.0
+    waves_of, cosine = components_of(table), phases_of(phase).cosine
     for i in range(phase.shape[1]):
-        first += table[YAW, i] * phase[0, i]
-        second += table[YAW + 1, i] * phase[0, i]
+        first += waves_of.yaw_first[i] * cosine[i]
+        second += waves_of.yaw_second[i] * cosine[i]
     heave = _oscillate(x.heave, p.heave, waves.down, dt, by.heave)
     roll = _oscillate(x.roll, p.roll, waves.roll_north * sp - waves.roll_east * cp, dt, by.roll)
     pitch = _oscillate(x.pitch, p.pitch, waves.pitch_north * cp + waves.pitch_east * sp, dt, by.pitch)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from simnav.geometry.rotation import wrap_angle
 from simnav.structures import filled, length
+from simnav.true_state import TRUE_NUMBERS, TRUE_STATE
 from simnav.types import Array, ImuSamples, NavigationStates, TapStates
 from simnav.world import motion
 from simnav.world.current import Current, eddies
@@ -58,7 +59,7 @@ class World:
     Attributes
     ----------
     sizes : (4,) int array
-        Number of manoeuvres, points, waves and eddies.
+        What it consists of, a `simnav.world.motion.SIZES`.
     """
 
     def __init__(
@@ -106,7 +107,10 @@ class World:
         self._rows, self._points = table(manoeuvres)
         self._phase, self._waves = components(sea, seed, depth)
         self._eddies = eddies(current, seed)
-        self.sizes = np.array([len(self._rows), len(self._points), self._phase.shape[1], len(self._eddies)])
+        sizes = np.zeros(1, motion.SIZES)
+        sizes["manoeuvres"], sizes["points"] = len(self._rows), len(self._points)
+        sizes["waves"], sizes["eddies"] = self._phase.shape[1], len(self._eddies)
+        self.sizes = sizes.view(np.int64)
         if sea is not None and sea.response == "encounter" and len(self._phase[0]):
             p["oscillators"] = np.ravel(sea.oscillators)
             north, east = start.speed * np.cos(start.heading), start.speed * np.sin(start.heading)
@@ -139,7 +143,7 @@ class World:
     def state(self) -> NavigationStates:
         """The present state, as a series of one state."""
         x = self._state
-        dcm = x["dcm"][0].reshape(3, 3)
+        dcm = x["dcm"][0]
         attitude = np.stack([x["roll"], x["pitch"], np.arctan2(dcm[1, :1], dcm[0, :1])], axis=1)
         return NavigationStates(np.array([self.time]), x["position"].copy(), x["velocity"].copy(), attitude)
 
@@ -217,7 +221,7 @@ class World:
         """
         n = round(self.rate)
         room = np.empty((1, n, 3))
-        none, states = np.zeros(1, np.int64), np.empty((1, 0, motion.TAP_COLUMNS))
+        none, states = np.zeros(1, np.int64), np.empty((1, 0, TRUE_NUMBERS))
         nowhere = motion.RequestedStates(np.empty((1, 0)), none, none, states)
         imu = np.array([n]), room, room.copy()
         arguments: Any = (*self._one(), nowhere, imu)
@@ -282,7 +286,7 @@ class World:
         rate, force = memory[2 * n : 5 * n].reshape(1, n, 3), memory[5 * n :].reshape(1, n, 3)
         times = np.concatenate([np.empty(0), *taps.values()])
         order = np.argsort(times, kind="stable")
-        sorted_states = np.empty((1, len(times), motion.TAP_COLUMNS))
+        sorted_states = np.empty((1, len(times), TRUE_NUMBERS))
         requested = motion.RequestedStates(
             times[None, order], np.zeros(1, np.int64), np.array([len(times)]), sorted_states
         )
@@ -292,11 +296,9 @@ class World:
         states[order] = sorted_states[0]
         out, i = {}, 0
         for name, t in taps.items():
-            s = states[i : i + len(t)]
+            s = states[i : i + len(t)].view(TRUE_STATE)[:, 0]
             i += len(t)
-            water = np.zeros((len(t), 3))
-            water[:, :2] = s[:, 12:14]
-            out[name] = TapStates(t, s[:, 0:3], s[:, 3:6], s[:, 6:9], s[:, 9:12], water)
+            out[name] = TapStates(t, s["position"], s["velocity"], s["attitude"], s["angular_rate"], s["water"].copy())
         # Division, not multiplication by the interval: the time is then the float nearest to the decimal, 2.29 s.
         time[:] = np.arange(first + 1, first + n + 1)
         time /= self.rate

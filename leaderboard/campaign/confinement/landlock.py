@@ -97,7 +97,7 @@ class Unreadable:
     (`_STATE`): of these an earlier process could change much.
 
     Landlock knows rights that are granted, for a folder with all that is below it. So the right to read is granted for
-    everything beside the way to the hidden places. The folders on this way can still be listed.
+    everything beside the folders above the hidden places. These folders can still be listed.
 
     Parameters
     ----------
@@ -107,11 +107,11 @@ class Unreadable:
 
     def __init__(self, hidden: Iterable[str]):
         self._hidden = {os.path.realpath(path) for path in (*hidden, *_STATE)}
-        self._way = {parent for path in self._hidden for parent in _parents(path)}
+        self._above = {parent for path in self._hidden for parent in _parents(path)}
         self._ruleset, self._seen, self._found = -1, dict[str, int](), dict[str, int]()
 
     def prepare(self) -> None:
-        """Note what can be read; for a folder on the way that has changed, again, so that new files count."""
+        """Note what can be read; for a folder above a hidden place that has changed, again, so that new files count."""
         if not available():
             return
         hidden = {path: os.stat(path).st_ino for path in self._hidden if os.path.exists(path)}
@@ -124,7 +124,7 @@ class Unreadable:
                 _allow(self._ruleset, path, _READ_FILE)
         if self._ruleset < 0:
             return
-        for folder in self._way:
+        for folder in self._above:
             with contextlib.suppress(OSError):
                 changed = os.stat(folder).st_mtime_ns
                 if self._seen.get(folder) == changed:
@@ -133,7 +133,7 @@ class Unreadable:
                     for entry in entries:  # what a link leads to counts where it lies
                         if folder == "/dev" and entry.name not in _DEVICES:
                             continue
-                        if entry.path not in self._hidden and entry.path not in self._way and not entry.is_symlink():
+                        if entry.path not in self._hidden and entry.path not in self._above and not entry.is_symlink():
                             _allow(self._ruleset, entry.path, _READ_FILE)
                 self._seen[folder] = changed
 

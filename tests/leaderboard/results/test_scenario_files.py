@@ -65,8 +65,8 @@ def test_what_is_missing_is_not_refuted(results: Path, tmp_path: Path):
     ("more", "message"),
     [
         ('plugins = ["evil.py"]\n', "names plug-ins; read it, and give it with --scenario"),
-        ('[trajectory]\nkind = "given_poses"\nfile = "/etc/passwd"\n', "names the file '/etc/passwd'"),
-        ('[vessel]\nkind = "given_poses"\nfile = "poses"\n', "names the file 'poses'"),
+        ('[trajectory]\nkind = "pose_track"\nfile = "/etc/passwd"\n', "names the file '/etc/passwd'"),
+        ('[vessel]\nkind = "pose_track"\nfile = "poses"\n', "names the file 'poses'"),
         ("version = ", "cannot be used"),
         ("", "holds pond-v1, not lake-v1"),
     ],

@@ -73,7 +73,7 @@ def test_the_truth_of_a_simulation_is_a_trajectory(tmp_path):
     first = ideal(parse(SHIP), 3)
     write_csv(first, tmp_path)
     truth = first.data.truth
-    second = ideal(own('kind = "given_poses"\nfile = "truth.csv"', tmp_path), 1)
+    second = ideal(own('kind = "pose_track"\nfile = "truth.csv"', tmp_path), 1)
     at = np.searchsorted(truth.time - truth.time[0], second.data.truth.time - 1e-6)
     miss = relative_position(second.data.truth.position, truth.position[at])
     np.testing.assert_allclose(miss, 0.0, atol=1e-3)
@@ -87,7 +87,7 @@ def test_the_truth_of_a_simulation_is_a_trajectory(tmp_path):
 
 def test_columns_have_any_names_and_units(tmp_path):
     (tmp_path / "survey.csv").write_text(TABLE)
-    vessel = """kind = "given_poses"
+    vessel = """kind = "pose_track"
 file = "survey.csv"
 comment = "#"
 time = "when"
@@ -112,7 +112,7 @@ attitude_units = ["1", "1", "deg"]
 def test_local_coordinates_have_an_origin(tmp_path):
     rows = [f"{t},{3.0 * t},{4.0 * t},{-10.0}" for t in range(0, 70, 10)]
     (tmp_path / "local.csv").write_text("time_s,east_m,north_m,up_m\n" + "\n".join(rows))
-    vessel = """kind = "given_poses"
+    vessel = """kind = "pose_track"
 file = "local.csv"
 frame = "enu"
 position = ["east_m", "north_m", "up_m"]
@@ -129,7 +129,7 @@ def test_a_path_is_relative_to_the_scenario_and_the_content_counts(tmp_path):
     (tmp_path / "a").mkdir()
     table = "time_s,latitude_deg,longitude_deg\n0,54.0,7.9\n60,54.002,7.9\n"
     (tmp_path / "a" / "poses.csv").write_text(table)
-    (tmp_path / "a" / "own.toml").write_text(HEAD + 'kind = "given_poses"\nfile = "poses.csv"')
+    (tmp_path / "a" / "own.toml").write_text(HEAD + 'kind = "pose_track"\nfile = "poses.csv"')
     scenario = load(tmp_path / "a" / "own.toml")
     assert len(record(scenario, 1).data.truth) == 60
     assert pickle.loads(pickle.dumps(scenario)).vessel == scenario.vessel
@@ -182,7 +182,7 @@ def test_mistakes_in_a_table_are_one_sentence(tmp_path, table, vessel, message):
     if table is not None:
         (tmp_path / "poses.csv").write_text(table)
     with pytest.raises(SpecError, match=message):
-        record(own('kind = "given_poses"\nfile = "poses.csv"\n' + vessel, tmp_path), 1)
+        record(own('kind = "pose_track"\nfile = "poses.csv"\n' + vessel, tmp_path), 1)
 
 
 def ais(rows, head="MMSI,BaseDateTime,LAT,LON,SOG,COG,Heading"):

@@ -12,11 +12,11 @@ from pydantic import BeforeValidator, model_validator
 
 from simnav.spec import Positive, SpecError, quantity
 from simnav.types import Array
-from simnav.world.given_track import GivenTrack, Limits, Poses, metres_per_unit
+from simnav.world.smooth_track import Limits, Poses, SmoothTrack, metres_per_unit
 from simnav.world.trajectory import Voyage
 from simnav.world.vessel import Vessel, register_vessel
 
-__all__ = ["GivenVessel", "GivenWaypoints"]
+__all__ = ["TrackVessel", "WaypointTrack"]
 
 #: Pieces of a leg between which the time is integrated from the speed.
 _PIECES = 64
@@ -30,13 +30,13 @@ def _numbers(value: Any) -> Any:
 Numbers = Annotated[tuple[float, ...], BeforeValidator(_numbers)]
 
 
-class GivenVessel(Vessel):
+class TrackVessel(Vessel):
     """Base of the vessels that follow a trajectory of the user.
 
     Attributes
     ----------
     max_speed, max_acceleration, max_turn_rate, course_speed : float
-        See `simnav.world.given_track.Limits`.
+        See `simnav.world.smooth_track.Limits`.
     """
 
     starts: ClassVar[bool] = False
@@ -58,7 +58,7 @@ class GivenVessel(Vessel):
 
 
 @register_vessel
-class GivenWaypoints(GivenVessel):
+class WaypointTrack(TrackVessel):
     """A vessel that passes given waypoints, at given times or at given speeds, on a smooth curve.
 
     Attributes
@@ -75,7 +75,7 @@ class GivenWaypoints(GivenVessel):
         interpolation*, SIAM J. Numerical Analysis 17(2), 1980).
     """
 
-    kind: Literal["given_waypoints"] = "given_waypoints"
+    kind: Literal["waypoint_track"] = "waypoint_track"
     latitude: Numbers = quantity("deg", description="of the waypoints")
     longitude: Numbers = quantity("deg", description="of the waypoints")
     height: Numbers = quantity("m", (), description="above the ellipsoid; one each, or one for all; default 0")
@@ -132,9 +132,9 @@ class GivenWaypoints(GivenVessel):
         number = np.arange(len(time)) / _PIECES + 1.0
         return Poses("vessel", time, between, None, [f"waypoint {k:.3g}" for k in number])
 
-    def trajectory(self, voyage: Voyage) -> GivenTrack:
+    def trajectory(self, voyage: Voyage) -> SmoothTrack:
         """See `Vessel.trajectory`."""
-        return GivenTrack(self.poses(), voyage, self.limits())
+        return SmoothTrack(self.poses(), voyage, self.limits())
 
 
 def _timed(place: Array, leg: Array, speed: Array) -> tuple[Array, Array]:

@@ -16,7 +16,7 @@ from simnav.simulation.simulator import Simulator, ideal
 from simnav.source import record
 from simnav.spec import SpecError
 from simnav.strapdown import integrate
-from simnav.world.given_track import GivenTrack, Limits, Poses
+from simnav.world.smooth_track import Limits, Poses, SmoothTrack
 from simnav.world.surroundings import Surroundings
 from simnav.world.trajectory import Voyage
 from tests.cases.steered import ends_of
@@ -34,7 +34,7 @@ duration_s = {duration}
 [instruments.imu]
 rate_hz = {rate}
 """
-POINTS = """kind = "given_waypoints"
+POINTS = """kind = "waypoint_track"
 latitude_deg = [54.0, 54.01, 54.01, 54.0]
 longitude_deg = [179.99, 179.99, -179.99, -179.98]
 """
@@ -69,7 +69,7 @@ def voyage(duration, rate):
 
 def run(given, duration, rate, **kwargs):
     """Truth at the poses, the initial state, and the ideal samples."""
-    track = GivenTrack(given, voyage(duration, rate), LIMITS, **kwargs)
+    track = SmoothTrack(given, voyage(duration, rate), LIMITS, **kwargs)
     start = track.state()
     at = given.time - given.time[0]
     return track.advance(duration, {"poses": at[(at > 0.0) & (at <= duration)]}), start
@@ -172,7 +172,7 @@ def test_waypoints_are_passed_at_their_times_across_the_antimeridian():
 def test_waypoints_are_passed_at_their_speeds():
     scenario = own(POINTS + "speed_m_s = [4.0, 6.0, 6.0, 3.0]", 650.0)
     given = scenario.vessel.poses()
-    track = GivenTrack(given, scenario.voyage(1, scenario.surround(1), 50.0), scenario.vessel.limits())
+    track = SmoothTrack(given, scenario.voyage(1, scenario.surround(1), 50.0), scenario.vessel.limits())
     corners = given.time[[64, 128]]
     tap = track.advance(650.0, {"corner": corners}).taps["corner"]
     ends = np.radians([[54.01, 179.99, 0.0], [54.01, -179.99, 0.0]])
@@ -203,32 +203,32 @@ def shifted(given, k, metres):
 def test_a_jump_is_refused(metres, message):
     given = poses(np.arange(0.0, 61.0, 1.0))
     with pytest.raises(SpecError, match=message):
-        GivenTrack(shifted(given, 30, metres), voyage(60.0, 50.0), LIMITS)
+        SmoothTrack(shifted(given, 30, metres), voyage(60.0, 50.0), LIMITS)
 
 
 def test_a_jump_of_the_heading_is_refused():
     given = poses(np.arange(0.0, 61.0, 1.0))
     given.attitude[30:, 2] += 2.0
     with pytest.raises(SpecError, match=r"a smooth vessel turns by .* deg/s there; max_turn_rate_deg_s = 57"):
-        GivenTrack(given, voyage(60.0, 50.0), LIMITS)
+        SmoothTrack(given, voyage(60.0, 50.0), LIMITS)
 
 
 def test_what_is_no_trajectory_is_refused():
     given = poses(np.arange(0.0, 61.0, 1.0))
     with pytest.raises(SpecError, match="the poses reach 60 s from the start of the run, and duration_s = 100"):
-        GivenTrack(given, voyage(100.0, 50.0), LIMITS)
+        SmoothTrack(given, voyage(100.0, 50.0), LIMITS)
     with pytest.raises(SpecError, match="line 5: the time 2 s is not after 2 s of line 4"):
         Poses("poses", np.array([0.0, 1.0, 2.0, 2.0]), given.position[:4], None, given.line)
     with pytest.raises(SpecError, match="1 pose is no trajectory"):
         Poses("poses", given.time[:1], given.position[:1], None, given.line)
     still = Poses("poses", given.time, given.position[:1].repeat(61, axis=0), None, given.line)
     with pytest.raises(SpecError, match=r"never moves at course_speed_m_s = 0.2 or more.*give the attitude, too"):
-        GivenTrack(still, voyage(60.0, 50.0), LIMITS)
+        SmoothTrack(still, voyage(60.0, 50.0), LIMITS)
     quick = poses(np.arange(0.0, 61.0, 0.5))
     with pytest.raises(
         SpecError, match=r"at 5 samples of the IMU a second the truth would miss the poses by .* Hz are"
     ):
-        GivenTrack(quick, voyage(60.0, 5.0), LIMITS)
+        SmoothTrack(quick, voyage(60.0, 5.0), LIMITS)
 
 
 def test_a_departure_smooths_poses_with_errors():
@@ -237,7 +237,7 @@ def test_a_departure_smooths_poses_with_errors():
     noisy = Poses("ais", t, clean.position + np.random.default_rng(1).normal(size=(len(t), 3)) * [1e-6, 1e-6, 0.0],
                   None, clean.line)  # fmt: skip
     with pytest.raises(SpecError, match="because the acceleration changes by"):
-        GivenTrack(noisy, voyage(600.0, 20.0), LIMITS)
+        SmoothTrack(noisy, voyage(600.0, 20.0), LIMITS)
     tap = run(noisy, 600.0, 20.0, departure=6.0)[0].taps["poses"]
     error = relative_position(tap.position, clean.position[1:])[:, :2]
     assert np.sqrt(np.mean(error**2)) < 4.0  # the errors of the poses are 6.4 m
@@ -272,7 +272,7 @@ def test_in_closed_loop_the_vessel_is_aside_by_the_error_of_its_estimate():
     given = poses(np.arange(0.0, 400.0, 2.0))
     ends = []
     for error in (0.0, 20.0):
-        track = GivenTrack(given, Voyage(None, (), Surroundings(), 50.0, 300.0, 1), LIMITS)
+        track = SmoothTrack(given, Voyage(None, (), Surroundings(), 50.0, 300.0, 1), LIMITS)
         velocity = []
         for k in range(300):
             track.steer_by(error if k >= 50 else 0.0, -0.5 * error if k >= 50 else 0.0)
@@ -290,7 +290,7 @@ def test_in_closed_loop_the_vessel_is_aside_by_the_error_of_its_estimate():
 
 
 def test_the_environment_steers_it():
-    table = 'kind = "given_waypoints"\nlatitude_deg = [54.0, 54.01, 54.02]\nlongitude_deg = [7.9, 7.91, 7.9]\n'
+    table = 'kind = "waypoint_track"\nlatitude_deg = [54.0, 54.01, 54.02]\nlongitude_deg = [7.9, 7.91, 7.9]\n'
     table += "speed_m_s = 5.0\n"
     gnss = '[instruments.gnss]\nkind = "gnss_position"\nrate_hz = 1.0\nsigma_m = 1.0\n'
     scenario = parse(SCENARIO.format(duration=60.0, rate=20.0, vessel=table) + gnss)

@@ -32,7 +32,7 @@ from simnav.types import Array
 from simnav.world.start import HIGHEST_LATITUDE, POLAR
 from simnav.world.trajectory import SampledTrajectory, Voyage
 
-__all__ = ["GivenTrack", "Limits", "Poses", "metres_per_unit", "smooth_track"]
+__all__ = ["Limits", "Poses", "SmoothTrack", "metres_per_unit", "smooth_track"]
 
 #: How far the truth may be from a given pose [m]; it decides which IMU rates are refused.
 _EXACT = 5e-4
@@ -64,6 +64,27 @@ class Limits:
     acceleration: float
     turn_rate: float
     course_speed: float = 0.2
+
+
+@dataclass(frozen=True, eq=False)
+class _Offset:
+    """How a vessel goes over to another offset from its poses.
+
+    Attributes
+    ----------
+    wanted, here, rate : (2,) array
+        Wanted offset, north and east [m]; the offset and its rate at the last wish [m], [m/s].
+    since : float
+        Time of the last wish [s].
+    lag : float
+        Time constant [s].
+    """
+
+    wanted: Array
+    here: Array
+    rate: Array
+    since: float
+    lag: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,7 +177,7 @@ def smooth_track(poses: Poses, departure: float = 0.0) -> Curve:
     return curve
 
 
-class GivenTrack(SampledTrajectory):
+class SmoothTrack(SampledTrajectory):
     """The trajectory through given poses (see the module).
 
     Parameters
@@ -195,8 +216,7 @@ class GivenTrack(SampledTrajectory):
         self._check_motion(voyage.rate)
         self._angles = self._attitude_curve()
         self._check_turns()
-        #: Offset from the poses, north and east: wanted; its value, its rate and the time of the last wish; the lag.
-        self._offset: tuple[Array, Array, Array, float, float] | None = None
+        self._offset: _Offset | None = None
         start = np.array([self._first])
         super().__init__(self._curve(start, 0)[0], voyage)
 
@@ -215,17 +235,17 @@ class GivenTrack(SampledTrajectory):
         speed = float(np.linalg.norm(self._velocity_at(np.minimum(self._first + now, self._last))[0, :2]))
         # The lag closes a distance d at d / (e tau) at most.
         lag = float(np.linalg.norm(wanted - here)) / (np.e * max(speed / 3.0, _CREEP))
-        self._offset = wanted, here, rate, self.time, max(lag, _FOLLOWING)
+        self._offset = _Offset(wanted, here, rate, self.time, max(lag, _FOLLOWING))
 
     def _aside(self, time: Array) -> tuple[Array, Array]:
         """(n, 2) offsets from the poses, north and east [m], and their rates [m/s], at n times from now on."""
         if self._offset is None:
             return np.zeros((len(time), 2)), np.zeros((len(time), 2))
-        wanted, here, rate, since, lag = self._offset
-        t = (time - since)[:, None]
-        off, slope = here - wanted, rate + (here - wanted) / lag
-        decay = np.exp(-t / lag)
-        return wanted + (off + slope * t) * decay, (rate - slope * t / lag) * decay
+        o = self._offset
+        t = (time - o.since)[:, None]
+        off, slope = o.here - o.wanted, o.rate + (o.here - o.wanted) / o.lag
+        decay = np.exp(-t / o.lag)
+        return o.wanted + (off + slope * t) * decay, (o.rate - slope * t / o.lag) * decay
 
     def _velocity_at(self, moment: Array) -> Array:
         velocity = self._curve(moment, 1) * metres_per_unit(self._curve(moment, 0))
