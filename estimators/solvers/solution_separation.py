@@ -237,6 +237,7 @@ class SolutionSeparation(Solver):
         self._settled = start.time
         self._last_delivery = dict.fromkeys(self._names, start.time)
         self._silence = {name: max(_SILENCE, 3.0 / instruments[name].rate) for name in self._names}
+        self._news = {name: 3.0 / instruments[name].rate for name in self._names}
         self._readmitted: dict[str, float] = {}
         self._count = dict.fromkeys(self._names, 0)
         self._alternatives: dict[str, Hypothesis] = {}
@@ -248,6 +249,7 @@ class SolutionSeparation(Solver):
         self._disturbed = False
         self._imu = self._other_opinion_of_the_imu() if self._inertial and self._group else None
         self._witnesses = len(set(self._group.values())) > 1
+        self._sole = set(self._group) if self._inertial and len(self._group) == 1 else set()
         self._trial = -np.inf
         self._searching = self._inertial and self._wrong_start is None
         if self._searching:  # a filter that finds its heading may think too early that it has
@@ -275,6 +277,9 @@ class SolutionSeparation(Solver):
         out, gross = self._exclusion.excluded, self._exclusion.gross
         gross.clear()
         self._exclusion.linear = self._disturbed or measurements.time >= self._settled
+        delivered = {m.instrument: m.time for m in measurements.aids}
+        heard = self._group.keys() & {*self._delivering(self._group), *delivered} - out
+        self._exclusion.alone = {n: self._news[n] for n in heard if len(heard) == 1 and self._group[n]}
         estimate = self._main.update(measurements)
         fading = exp(-max(measurements.time - self._time, 0.0) / _RECENT)
         self._main.watch(estimate, self._components, fading)
@@ -286,7 +291,6 @@ class SolutionSeparation(Solver):
                 before = self._exclusion.usual.get(name, 1.0)
                 self._exclusion.usual[name] = before + slow * (min(nis, _UNUSUAL * before) - before)
         self._time = measurements.time
-        delivered = {m.instrument: m.time for m in measurements.aids}
         self._last_delivery |= {name: time for name, time in delivered.items() if name in self._last_delivery}
         running = [(sub, {sub.name, *out}) for name in self._names if name not in out for sub in self._pairs[name]]
         running += [(sub, {sub.name}) for sub in self._alternatives.values()]
@@ -439,6 +443,8 @@ class SolutionSeparation(Solver):
 
     def _can_spare(self, name: str) -> bool:
         """Whether what is left without an instrument gives a position."""
+        if name in self._sole:
+            return False
         out = {name} if self._mistaken(name) else {name, *self._exclusion.excluded}
         return self._rules.can_spare([n for n in self._delivering(self._names) if n not in out])
 
