@@ -55,7 +55,9 @@ all sub-filters are restarted from the main filter. After such a beginning this 
 disagrees with an instrument, for ``horizon`` seconds at most.
 
 **Gross errors.** A single measurement that is improbable in the main filter (`_NOT_GROSS`) is rejected by all filters,
-unless the measurements of its instrument stay improbable for `_PATIENCE` seconds.
+unless the measurements of its instrument stay improbable for `_PATIENCE` seconds. A fix that no other fix or log is
+heard beside has the IMU alone against it. It is rejected only if it is single: not if the one before is longer ago than
+three periods or `_PATIENCE`, or was improbable in about the same direction (`Exclusion.alone`).
 
 **Readmission.** When an excluded instrument has agreed with the main filter for ``recovery`` seconds, it is used again.
 The time is doubled after every further exclusion, up to a factor of `_LONGEST`. For the next ``horizon`` seconds it is
@@ -249,7 +251,6 @@ class SolutionSeparation(Solver):
         self._disturbed = False
         self._imu = self._other_opinion_of_the_imu() if self._inertial and self._group else None
         self._witnesses = len(set(self._group.values())) > 1
-        self._sole = set(self._group) if self._inertial and len(self._group) == 1 else set()
         self._trial = -np.inf
         self._searching = self._inertial and self._wrong_start is None
         if self._searching:  # a filter that finds its heading may think too early that it has
@@ -443,8 +444,6 @@ class SolutionSeparation(Solver):
 
     def _can_spare(self, name: str) -> bool:
         """Whether what is left without an instrument gives a position."""
-        if name in self._sole:
-            return False
         out = {name} if self._mistaken(name) else {name, *self._exclusion.excluded}
         return self._rules.can_spare([n for n in self._delivering(self._names) if n not in out])
 

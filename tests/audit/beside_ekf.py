@@ -67,7 +67,7 @@ def _path(scenario: str) -> Path | str:
 
 
 def ratios(scenario: str, seeds: Sequence[int], names: Sequence[str]) -> dict[str, dict[int, float]]:
-    """The horizontal RMSE of rows over that of ``ekf``, without an IMU of ``ship-ekf``, by row and seed; without rows that do not suit.
+    """The horizontal RMSE of rows over that of the plain row, by row and seed; without rows that do not suit.
 
     Parameters
     ----------
