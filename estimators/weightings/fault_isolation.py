@@ -4,8 +4,9 @@ A weighting decreases the weight of factors with large residuals. If the motion 
 all measurements, and the window does not recover. As in a filter (`simnav.estimators.adaptations.prediction`, after
 Zhan et al. 2026), the motion is a suspect if fixes and logs fail their chi-square tests together, several times in a
 row. A filter cannot distinguish this from two instruments that are wrong at once, but a window can. For one iteration,
-the motion factors of that time get nearly no weight. Then correct measurements agree with each other, and wrong ones do
-not. Only those that agree get their full weight.
+the motion factors of that time get nearly no weight; the errors of the instruments, which are states beside the motion,
+stay as they are (`simnav.estimators.algebra.factors.Rows`). Then correct measurements agree with each other, and wrong
+ones do not. Only those that agree get their full weight.
 
 A measurement counts as failed if its residual fails the test, or if the last one of its instrument has ended with
 hardly any weight: a new measurement has its full weight at first, and an uncertain state follows it. While a log is
@@ -15,7 +16,8 @@ If no fix was heard for a while, a log is the last witness beside the motion. If
 the two is wrong, and nothing in the measurements says which. Then the motion is suspected: a log that is rejected for
 good leaves a prediction without bound, and a log that is wrongly believed leaves an error that grows with its own.
 The assumption is that a log is not wrong for long while it is the last witness. Where there is no log at all, the same
-holds of fixes whose residuals have a common direction; those of a larger noise have none.
+holds of fixes whose residuals have a common direction; those of a larger noise have none. Fixes alone hold velocity and
+attitude badly, so the motion is loosened little at the first test, and more from test to test until they agree.
 """
 
 from __future__ import annotations
