@@ -4,7 +4,7 @@ A window is a prior on its first node, motion factors between neighbours and aid
 correction dx_k of node k, the step minimises the sum of
 
 - ``(dx_0 - d)' P_0^-1 (dx_0 - d)``                        prior
-- ``w_k (e_k + dx_k+1 - F_k dx_k)' Q_k^-1 (...)``          motion
+- ``w_k (e_k + dx_k+1 - F_k dx_k)' Q_k^-1 (...)``          motion (w_k = 1 for the errors of instruments)
 - ``w_i (r_i - H_i dx_k)' R_i^-1 (r_i - H_i dx_k)``        aiding
 - ``lambda dx_k' diag(P_k)^-1 dx_k``                       Levenberg-Marquardt damping, P_k as predicted
 
@@ -100,8 +100,14 @@ def _copy_node(P: Array, d: Array, to_P: Array, to_d: Array) -> None:
 
 
 @helper
-def _predict(P: Array, F: Array, Q: Array, weight: float, elements: Elements, room: Room, out: Array) -> None:
-    """Compute ``out = F P F' + Q / weight``, for a sparse F."""
+def _predict(
+    P: Array, F: Array, Q: Array, weight: float, coupled: int, elements: Elements, room: Room, out: Array
+) -> None:
+    """Compute ``out = F P F' + Q / weight``, for a sparse F. From component ``coupled`` on the weight is 1.
+
+    A wrong motion is no reason for the errors of the aids to change: if they could, a fix that contradicts the motion
+    would be explained by a bias of its receiver.
+    """
     n = P.shape[0]
     value, column, count = elements
     full, work, turned = room
@@ -117,7 +123,7 @@ def _predict(P: Array, F: Array, Q: Array, weight: float, elements: Elements, ro
     scale = 1.0 / weight
     for i in range(n):
         for j in range(i + 1):
-            x = 0.5 * (full[i, j] + full[j, i]) + scale * Q[i, j]
+            x = 0.5 * (full[i, j] + full[j, i]) + (scale if i < coupled else 1.0) * Q[i, j]
             out[i, j] = x
             out[j, i] = x
 
@@ -332,7 +338,8 @@ def solve_chain(window: Window, rows: Rows, prior: Matrix, damping: float, first
         if k == 0:
             _copy_node(prior, window.prior.shift, P, d)
         else:
-            _predict(filtered[k - 1], transition[k - 1], noise[k - 1], motion_weight[k - 1], elements, room, P)
+            weight = motion_weight[k - 1]
+            _predict(filtered[k - 1], transition[k - 1], noise[k - 1], weight, rows.coupled, elements, room, P)
             for r in range(n):
                 x = -error[k - 1, r]
                 for c in range(n):
@@ -522,7 +529,7 @@ def keep_weights(window: Window, rows: Rows, motion_before: Vector, before: Vect
 def half_squares(window: Window, rows: Rows) -> float:
     """The cost: half the weighted sum of squares of all factors."""
     whitener, shift = window.prior.whitener, window.prior.shift
-    norm, weight = window.motions.norm, window.motions.weight
+    norm, weight, whitened = window.motions.norm, window.motions.weight, window.motions.whitened
     aid_norm, aid_weight = window.aids.norm, window.aids.weight
     total = 0.0
     for i in range(shift.size):
@@ -532,6 +539,9 @@ def half_squares(window: Window, rows: Rows) -> float:
         total += x * x
     for k in range(rows.first_motion, rows.first_motion + rows.nodes - 1):
         total += weight[k] * norm[k] * norm[k]
+        if weight[k] != 1.0:
+            for i in range(rows.coupled, shift.size):
+                total += (1.0 - weight[k]) * whitened[k, i] * whitened[k, i]
     for i in range(rows.first_aid, rows.first_aid + rows.aids):
         total += aid_weight[i] * aid_norm[i] * aid_norm[i]
     return 0.5 * total

@@ -31,6 +31,9 @@ class Rows(NamedTuple):
     base, base_between : int
         Number of the first node, and of the first intermediate state, since the start of the run. Aiding factors and
         intermediate states refer to nodes by such numbers.
+    coupled : int
+        Components from this one on are errors of instruments. They keep their process noise whatever the weight of a
+        motion factor is.
     """
 
     first_node: int
@@ -42,6 +45,7 @@ class Rows(NamedTuple):
     between: int
     base: int
     base_between: int
+    coupled: int
 
 
 class NewRows(NamedTuple):
@@ -89,7 +93,7 @@ class Motions(Record):
     residual, whitened : (K - 1, n) arrays
         Error e, the newer node minus the prediction from the older one; the whitened error.
     norm, weight : (K - 1,) arrays
-        Norm of the whitened error; the weight that divides Q.
+        Norm of the whitened error; the weight that divides Q of the motion (`Rows.coupled`).
     time : (K - 1,) array
         Time of the node at the end [s].
     """

@@ -216,7 +216,7 @@ class Chain(ABC):
         nodes, aids, between = self.nodes, self.aids, self.between
         return Rows(
             nodes.first, nodes.last - nodes.first, self.motions.first, aids.first, aids.last - aids.first,
-            between.first, between.last - between.first, self.base, self.base_between,
+            between.first, between.last - between.first, self.base, self.base_between, min(self.coupled, self.size),
         )  # fmt: skip
 
     @property

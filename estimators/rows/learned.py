@@ -53,4 +53,13 @@ class NetFgo(
     is lost. On a ship without an IMU it had up to 5.2 times the error of ``ship-ekf`` (``random-ships``).
 
     Source: ours (``estimators/training/factor_network.py``).
+
+    Versions
+    --------
+    2
+        Where the motion gets less weight, the states of vessel and IMU may change, but not the errors of instruments:
+        a bias of the receiver explained fixes that contradicted a wrong motion. Fixes without a log are asked with a
+        looser motion from test to test until they agree.
     """
+
+    version = 2

@@ -32,6 +32,7 @@ class NetFgo(
     weighting=LearnedWeights,
     isolation=FaultIsolation,
 ):
+    version = 2
     def __init__(
         self,
         *,

@@ -44,7 +44,7 @@ class GncFgoLoose(
     weighting=GraduatedNonConvexity,
     isolation=FaultIsolation,
 ):
-    version = 2
+    version = 3
     loose = True
     def __init__(
         self,

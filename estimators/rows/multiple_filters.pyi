@@ -25,7 +25,8 @@ class HeadingBankEkf(Row, solver=HeadingBank, model=Suitable):
 
 @register("solution-separation")
 class SolutionSeparationEkf(Row, solver=SolutionSeparation, model=Suitable):
-    version = 3
+    version = 4
+    advised_against = True
     def __init__(
         self,
         *,
@@ -47,7 +48,7 @@ class MidValue(
     isolation=FaultIsolation,
     iteration=poor_heading,
 ):
-    version = 4
+    version = 5
     def __init__(
         self,
         *,

@@ -52,9 +52,13 @@ class HuberFgo(_Robust, weighting=piece(TunedMEstimator, weight=huber)):
         It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
     3
         The motion is suspected, too, where the weighting has rejected measurements, and where there is no log.
+    4
+        Where the motion gets less weight, the states of vessel and IMU may change, but not the errors of instruments:
+        a bias of the receiver explained fixes that contradicted a wrong motion. Fixes without a log are asked with a
+        looser motion from test to test until they agree.
     """
 
-    version = 3
+    version = 4
 
 
 @register("tukey-fgo")
@@ -77,9 +81,13 @@ class TukeyFgo(_Robust, weighting=piece(TunedMEstimator, weight=tukey)):
         It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
     3
         The motion is suspected, too, where the weighting has rejected measurements, and where there is no log.
+    4
+        Where the motion gets less weight, the states of vessel and IMU may change, but not the errors of instruments:
+        a bias of the receiver explained fixes that contradicted a wrong motion. Fixes without a log are asked with a
+        looser motion from test to test until they agree.
     """
 
-    version = 3
+    version = 4
 
 
 @register("cauchy-fgo")
@@ -99,9 +107,13 @@ class CauchyFgo(_Robust, weighting=piece(TunedMEstimator, weight=cauchy)):
         It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
     3
         The motion is suspected, too, where the weighting has rejected measurements, and where there is no log.
+    4
+        Where the motion gets less weight, the states of vessel and IMU may change, but not the errors of instruments:
+        a bias of the receiver explained fixes that contradicted a wrong motion. Fixes without a log are asked with a
+        looser motion from test to test until they agree.
     """
 
-    version = 3
+    version = 4
 
 
 @register("gm-fgo")
@@ -124,9 +136,13 @@ class GmFgo(_Robust, weighting=piece(TunedMEstimator, weight=geman_mcclure)):
         It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
     3
         The motion is suspected, too, where the weighting has rejected measurements, and where there is no log.
+    4
+        Where the motion gets less weight, the states of vessel and IMU may change, but not the errors of instruments:
+        a bias of the receiver explained fixes that contradicted a wrong motion. Fixes without a log are asked with a
+        looser motion from test to test until they agree.
     """
 
-    version = 3
+    version = 4
 
 
 @register("dcs-fgo")
@@ -150,9 +166,13 @@ class DcsFgo(_Robust, weighting=DynamicCovarianceScaling):
         It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
     3
         The motion is suspected, too, where the weighting has rejected measurements, and where there is no log.
+    4
+        Where the motion gets less weight, the states of vessel and IMU may change, but not the errors of instruments:
+        a bias of the receiver explained fixes that contradicted a wrong motion. Fixes without a log are asked with a
+        looser motion from test to test until they agree.
     """
 
-    version = 3
+    version = 4
 
 
 @register("switchable-fgo")
@@ -175,9 +195,13 @@ class SwitchableFgo(_Robust, weighting=SwitchableConstraints):
         It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
     3
         The motion is suspected, too, where the weighting has rejected measurements, and where there is no log.
+    4
+        Where the motion gets less weight, the states of vessel and IMU may change, but not the errors of instruments:
+        a bias of the receiver explained fixes that contradicted a wrong motion. Fixes without a log are asked with a
+        looser motion from test to test until they agree.
     """
 
-    version = 3
+    version = 4
 
 
 @register("gnc-fgo")
@@ -211,9 +235,13 @@ class GncFgo(
         It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
     5
         The motion is suspected, too, where the weighting has rejected measurements, and where there is no log.
+    6
+        Where the motion gets less weight, the states of vessel and IMU may change, but not the errors of instruments:
+        a bias of the receiver explained fixes that contradicted a wrong motion. Fixes without a log are asked with a
+        looser motion from test to test until they agree.
     """
 
-    version = 5
+    version = 6
 
 
 @register("max-mixture-fgo")
@@ -233,9 +261,13 @@ class MaxMixtureFgo(_Robust, weighting=MaxMixture):
         It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
     3
         The motion is suspected, too, where the weighting has rejected measurements, and where there is no log.
+    4
+        Where the motion gets less weight, the states of vessel and IMU may change, but not the errors of instruments:
+        a bias of the receiver explained fixes that contradicted a wrong motion. Fixes without a log are asked with a
+        looser motion from test to test until they agree.
     """
 
-    version = 3
+    version = 4
 
 
 @register("ga-fgo")
@@ -255,9 +287,11 @@ class GaFgo(_Window, weighting=piece(GradientAdaptive, fewest=5)):
     --------
     2
         It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
+    3
+        Where the motion gets less weight, the states of vessel and IMU may change, but not the errors of instruments.
     """
 
-    version = 2
+    version = 3
 
 
 @register("ga-fgo-paper")

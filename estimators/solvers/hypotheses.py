@@ -9,12 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
-from math import radians
+from math import radians, sqrt
 
 import numpy as np
 
 from simnav.estimators.adaptations.base import Adaptation, Innovation
-from simnav.estimators.algebra.chi_square import chi_square_limits
+from simnav.estimators.algebra.chi_square import chi_square_limits, normal_quantile
 from simnav.estimators.algebra.direct_update import normalised_square
 from simnav.types import Array, Estimate, InitialState, Instruments
 
@@ -36,6 +36,8 @@ _LOOSENED = 100.0
 _VERTICAL_GYROSCOPE = 11
 #: A measurement less probable than this is a gross error, unless its instrument goes on so for `_PATIENCE` seconds.
 _NOT_GROSS, _PATIENCE = 0.99999, 5.0
+#: Probability that two improbable measurements of white noise are not found to have a common direction.
+_DIRECTED = 0.9
 #: Of a good measurement to agree with the filter.
 _AGREES = 0.999
 
@@ -55,6 +57,11 @@ class Exclusion(Adaptation):
         Long-term mean of the normalised innovation squared of an instrument, by component; it is used if above 1.
     linear : bool
         False while the heading is not known. An improbable measurement is then not taken as a gross error.
+    alone : dict of str to float
+        The fixes that no other fix or log is heard beside, and the time after which one is news [s], at most
+        `_PATIENCE`. Whether they or the prediction are wrong, only their own measurements before can tell: a gross
+        error is single. So one is believed where the one before is older, or was improbable in about the same
+        direction.
     """
 
     def __init__(self) -> None:
@@ -63,8 +70,11 @@ class Exclusion(Adaptation):
         self.gross: set[tuple[str, float]] = set()
         self.usual: dict[str, float] = {}
         self.linear = True
+        self.alone: dict[str, float] = {}
+        self._before: dict[str, tuple[float, Array | None]] = {}
         self._failing: dict[str, float] = {}
         self._agrees, self._gross = chi_square_limits(_AGREES), chi_square_limits(_NOT_GROSS)
+        self._directed = normal_quantile(_DIRECTED)
 
     def begin_again(self, excluded: Collection[str] = ()) -> None:
         """Reset the records of the instruments, and set the excluded ones."""
@@ -88,12 +98,30 @@ class Exclusion(Adaptation):
             else:
                 self.agrees_since.pop(name, None)
             return None
-        if nis <= self._gross[m] or not self.linear:
+        improbable = nis > self._gross[m]
+        believed = name in self.alone and self._is_course(innovation, improbable)
+        if not improbable or not self.linear:
             self._failing.pop(name, None)
+        elif believed:
+            self._failing.setdefault(name, time)
         elif time - self._failing.setdefault(name, time) < _PATIENCE:
             self.gross.add((name, time))
             return None
         return innovation.noise
+
+    def _is_course(self, innovation: Innovation, improbable: bool) -> bool:
+        """Whether the measurement before does not show that this one is a gross error; record it."""
+        name, time = innovation.measurement.instrument, innovation.measurement.time
+        sigma = np.sqrt(innovation.predicted.diagonal() + innovation.noise.diagonal())
+        standard = innovation.residual / sigma
+        before, its = self._before.get(name, (-np.inf, None))
+        self._before[name] = time, standard if improbable else None
+        if time - before > min(self.alone[name], _PATIENCE):
+            return True
+        if its is None or not improbable:
+            return False
+        cosine = float(standard @ its) / float(np.linalg.norm(standard) * np.linalg.norm(its))
+        return cosine * sqrt(len(standard)) > self._directed
 
 
 class WatchedFilter(KalmanEstimator):

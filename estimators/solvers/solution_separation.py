@@ -55,7 +55,9 @@ all sub-filters are restarted from the main filter. After such a beginning this 
 disagrees with an instrument, for ``horizon`` seconds at most.
 
 **Gross errors.** A single measurement that is improbable in the main filter (`_NOT_GROSS`) is rejected by all filters,
-unless the measurements of its instrument stay improbable for `_PATIENCE` seconds.
+unless the measurements of its instrument stay improbable for `_PATIENCE` seconds. A fix that no other fix or log is
+heard beside has the IMU alone against it. It is rejected only if it is single: not if the one before is longer ago than
+three periods or `_PATIENCE`, or was improbable in about the same direction (`Exclusion.alone`).
 
 **Readmission.** When an excluded instrument has agreed with the main filter for ``recovery`` seconds, it is used again.
 The time is doubled after every further exclusion, up to a factor of `_LONGEST`. For the next ``horizon`` seconds it is
@@ -237,6 +239,7 @@ class SolutionSeparation(Solver):
         self._settled = start.time
         self._last_delivery = dict.fromkeys(self._names, start.time)
         self._silence = {name: max(_SILENCE, 3.0 / instruments[name].rate) for name in self._names}
+        self._news = {name: 3.0 / instruments[name].rate for name in self._names}
         self._readmitted: dict[str, float] = {}
         self._count = dict.fromkeys(self._names, 0)
         self._alternatives: dict[str, Hypothesis] = {}
@@ -275,6 +278,9 @@ class SolutionSeparation(Solver):
         out, gross = self._exclusion.excluded, self._exclusion.gross
         gross.clear()
         self._exclusion.linear = self._disturbed or measurements.time >= self._settled
+        delivered = {m.instrument: m.time for m in measurements.aids}
+        heard = self._group.keys() & {*self._delivering(self._group), *delivered} - out
+        self._exclusion.alone = {n: self._news[n] for n in heard if len(heard) == 1 and self._group[n]}
         estimate = self._main.update(measurements)
         fading = exp(-max(measurements.time - self._time, 0.0) / _RECENT)
         self._main.watch(estimate, self._components, fading)
@@ -286,7 +292,6 @@ class SolutionSeparation(Solver):
                 before = self._exclusion.usual.get(name, 1.0)
                 self._exclusion.usual[name] = before + slow * (min(nis, _UNUSUAL * before) - before)
         self._time = measurements.time
-        delivered = {m.instrument: m.time for m in measurements.aids}
         self._last_delivery |= {name: time for name, time in delivered.items() if name in self._last_delivery}
         running = [(sub, {sub.name, *out}) for name in self._names if name not in out for sub in self._pairs[name]]
         running += [(sub, {sub.name}) for sub in self._alternatives.values()]

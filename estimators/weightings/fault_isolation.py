@@ -4,8 +4,9 @@ A weighting decreases the weight of factors with large residuals. If the motion 
 all measurements, and the window does not recover. As in a filter (`simnav.estimators.adaptations.prediction`, after
 Zhan et al. 2026), the motion is a suspect if fixes and logs fail their chi-square tests together, several times in a
 row. A filter cannot distinguish this from two instruments that are wrong at once, but a window can. For one iteration,
-the motion factors of that time get nearly no weight. Then correct measurements agree with each other, and wrong ones do
-not. Only those that agree get their full weight.
+the motion factors of that time get nearly no weight; the errors of the instruments, which are states beside the motion,
+stay as they are (`simnav.estimators.algebra.factors.Rows`). Then correct measurements agree with each other, and wrong
+ones do not. Only those that agree get their full weight.
 
 A measurement counts as failed if its residual fails the test, or if the last one of its instrument has ended with
 hardly any weight: a new measurement has its full weight at first, and an uncertain state follows it. While a log is
@@ -15,7 +16,8 @@ If no fix was heard for a while, a log is the last witness beside the motion. If
 the two is wrong, and nothing in the measurements says which. Then the motion is suspected: a log that is rejected for
 good leaves a prediction without bound, and a log that is wrongly believed leaves an error that grows with its own.
 The assumption is that a log is not wrong for long while it is the last witness. Where there is no log at all, the same
-holds of fixes whose residuals have a common direction; those of a larger noise have none.
+holds of fixes whose residuals have a common direction; those of a larger noise have none. Fixes alone hold velocity and
+attitude badly, so the motion is loosened little at the first test, and more from test to test until they agree.
 """
 
 from __future__ import annotations
@@ -37,8 +39,9 @@ __all__ = ["FaultIsolation"]
 REJECTED = 0.5
 #: Weight of the motion factors in the iteration that tests the measurements.
 LOOSE = 1e-6
-#: The same where there is no log: fixes alone do not hold velocity and attitude, which must not go too far.
-LOOSE_WITHOUT_LOG = 1e-3
+#: The same where there is no log, at the first test: fixes alone do not hold velocity and attitude, which must not go
+#: too far. While the fixes do not agree, it is multiplied by the other factor from test to test, down to `LOOSE`.
+LOOSE_WITHOUT_LOG, LOOSER = 1e-3, 0.1
 
 
 @kernel
@@ -85,6 +88,7 @@ class FaultIsolation:
         self._blamed: list[tuple[float, float, NDArray[np.bool_]]] = []  # from, to, and which instruments agreed
         self._tested = -np.inf
         self._rejected: set[int] = set()
+        self._loose = LOOSE if self._has_logs else LOOSE_WITHOUT_LOG
         self._asking: tuple[float, float] | None = None
         self._weight = self._motion_weight = np.empty(0)
         self._fresh = True
@@ -113,6 +117,7 @@ class FaultIsolation:
                 count = min(len(factors.weight), len(self._weight))
                 factors.weight[:count] = self._weight[:count]
                 factors.motion_weight[:] = self._motion_weight
+                self._loose = max(LOOSER * self._loose, LOOSE)
                 if self._alone(asked[1]):
                     self._failures.clear()  # what a wrong motion refers to a node contradicts itself for good
                 return False
@@ -130,8 +135,7 @@ class FaultIsolation:
         factors.weight[(factors.time >= start) & (factors.time <= end)] = 1.0
         # The first reading may belong to an older node, so the motion that leads there is loosened, too.
         first = max(int(np.searchsorted(factors.motion_time, start, side="right")) - 1, 0)
-        loose = LOOSE if self._has_logs else LOOSE_WITHOUT_LOG
-        factors.motion_weight[first:][factors.motion_time[first:] <= end] = loose
+        factors.motion_weight[first:][factors.motion_time[first:] <= end] = self._loose
         return False
 
     def _rejected_before(self, factors: Factors) -> set[int]:
@@ -156,8 +160,10 @@ class FaultIsolation:
         for i, time in zip(factors.instrument[new].tolist(), factors.time[new].tolist()):
             if self._is_fix.get(factors.names[i]):
                 self._fixed = time
-        if not (self._failures or self._blamed or failing_now or self._rejected):
-            return None
+        if not (self._failures or failing_now or self._rejected):
+            self._loose = LOOSE if self._has_logs else LOOSE_WITHOUT_LOG
+            if not self._blamed:
+                return None
         # A new measurement has its full weight, so that an uncertain state may follow it; the weighting decides later.
         failed = factors.norm[new] ** 2 > self._limits[factors.components[new]]
         failed |= np.isin(factors.instrument[new], list(self._rejected))

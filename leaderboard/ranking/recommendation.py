@@ -7,7 +7,8 @@ decides nothing.
 
 **Choice.** All pairs of rows are tested at once. Where no row that may be taken is told from the plain row and better,
 the plain row is taken: nothing more is shown. Otherwise the row with the smallest error among those that are told from
-the plain row, and from which no other is told and better.
+the plain row, and from which no other is told and better. A row whose page advises against it
+(`simnav.estimator.Estimator.advised_against`) is not taken.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
+from simnav.estimator import EstimatorError, find
 from simnav.leaderboard.results.plain import as_json
 from simnav.leaderboard.results.shown import Shown
 
@@ -128,7 +130,8 @@ def _chosen(asked: Recommendation, over: TroubleGroup, score: str) -> Recommenda
     epoch, limit = 1000.0 * found.update_median, asked.limit
     candidates = {r.estimator: _candidate(r, over.plain, score, epoch) for r in over.ranked}
     plain = candidates.get(over.plain) or _candidate(found, over.plain, score, epoch)
-    allowed = {n: c for n, c in candidates.items() if limit is None or c.milliseconds <= limit}
+    left = {n: c for n, c in candidates.items() if not _advised_against(n)}
+    allowed = {n: c for n, c in left.items() if limit is None or c.milliseconds <= limit}
     if not allowed:
         why = "no row is ranked" if limit is None else f"no row with a stored cost takes {limit:g} ms or less"
         return replace(asked, why=why)
@@ -145,6 +148,14 @@ def _chosen(asked: Recommendation, over: TroubleGroup, score: str) -> Recommenda
         asked, confidence=confidence, why=over.insufficient, row=row, plain=plain, as_good=tuple(rest),
         compared=len(candidates),
     )  # fmt: skip
+
+
+def _advised_against(name: str) -> bool:
+    """Whether a row says so of itself; one that is not known here says nothing."""
+    try:
+        return find(name).advised_against
+    except EstimatorError:
+        return False
 
 
 def _evidence(fitting: Sequence[TrackRuns], asked: Sequence[str]) -> dict[str, TrackRuns]:

@@ -33,6 +33,8 @@ class Estimator(ABC):
     slow : bool
         True for rows that take several milliseconds an epoch or more. A quick campaign runs them only if they are
         named.
+    advised_against : bool
+        True for a row whose page says where not to use it, and that a recommendation never names. It is ranked.
     real_time_as : str
         Name of another estimator whose real-time estimates are the same bit for bit, if this one only adds smoothing;
         otherwise empty. Boards then rank this estimator by its smoothed trajectory only.
@@ -49,6 +51,7 @@ class Estimator(ABC):
     name: ClassVar[str] = ""
     reference: ClassVar[bool] = False
     slow: ClassVar[bool] = False
+    advised_against: ClassVar[bool] = False
     real_time_as: ClassVar[str] = ""
     version: ClassVar[int] = 1
     formerly: ClassVar[Mapping[str, str]] = {}

@@ -35,9 +35,9 @@ def window_of(nodes: Nodes, motions: Motions, aids: AidingFactors, prior: Prior 
     )  # fmt: skip
 
 
-def rows_of(nodes: int, aids: int, before: int = 0) -> Rows:
+def rows_of(nodes: int, aids: int, before: int = 0, coupled: int = N) -> Rows:
     """Where a window is in columns with so many rows before it."""
-    return Rows(before, nodes, before, before, aids, 0, 0, BASE, 0)
+    return Rows(before, nodes, before, before, aids, 0, 0, BASE, 0, coupled)
 
 
 def padded(record, before: int = 2, after: int = 1):
@@ -172,6 +172,23 @@ def test_measurements_of_one_instrument_on_one_node_are_their_mean():
     np.testing.assert_allclose(size, alone, rtol=1e-9)
     for ours, theirs in zip(merged, single, strict=True):
         np.testing.assert_allclose(ours, theirs, atol=1e-10)
+
+
+def test_the_weight_of_a_motion_does_not_loosen_the_errors_of_instruments():
+    """From component ``coupled`` on the process noise is that of the weight 1, in the step and in the cost."""
+    p, coupled = Problem(3), 3
+    p.Q[:, coupled:, :coupled] = p.Q[:, :coupled, coupled:] = 0.0
+    window, rows = p.window, rows_of(COUNT, len(p.node), coupled=coupled)
+    solve_chain(window, rows, p.prior, 0.0, 0)
+    whitener = np.linalg.inv(np.linalg.cholesky(p.Q))
+    whiten(0, window.motions.residual, whitener, window.motions.whitened, window.motions.norm)
+    window.aids.norm[:], window.prior.whitener[:] = 0.0, 0.0
+    cost = half_squares(window, rows)
+    p.Q[:, :coupled, :coupled] /= p.w[:, None, None]
+    p.w[:] = 1.0
+    _, (*_, step) = p.solve()
+    np.testing.assert_allclose(window.nodes.step, step, rtol=1e-9, atol=1e-12)
+    assert cost == pytest.approx(0.5 * np.einsum("ki,kij,kj", p.e, np.linalg.inv(p.Q), p.e))
 
 
 def test_damping_is_levenberg_and_marquardts():

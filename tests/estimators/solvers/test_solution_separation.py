@@ -282,6 +282,31 @@ def test_single_gross_errors_are_left_out_and_flagged(recording_of):
     assert flagged == [("gnss", float(gnss.time[k])) for k in (20, 33)]
 
 
+def test_lone_fixes_are_gross_errors_only_if_they_are_single(recording_of):
+    """Beside an IMU alone: one that jumps is left out; not the first after a gap, nor those of a course."""
+    recording = recording_of(4, 100.0, aids=(GNSS, COMPASS))
+    gnss = recording.data.aids["gnss"]
+    gnss.value[20, 0] += 60.0 / 6.37e6  # jumps
+    gnss.value[50:, 0] += 60.0 / 6.37e6  # is off for good
+    estimator = make("solution-separation")
+    estimator.reset(recording.start, recording.instruments)
+    flagged = [f for packet in recording.steps() for f in estimator.update(packet).flagged]
+    first = [time for name, time in flagged if time < gnss.time[60]]
+    assert first == [float(gnss.time[k]) for k in (20, 50)]
+
+
+def test_the_only_aid_of_a_poor_imu_is_not_given_up():
+    """After each outage the fixes are far from the prediction of an IMU that is eight times noisier than it says."""
+    recording = record(load("sole-gnss"), 701)
+    error, _, excluded = run(recording)
+    assert not any(excluded)
+    plain = make("ekf")
+    plain.reset(recording.start, recording.instruments)
+    position = [plain.update(packet).position for packet in recording.steps()]
+    own = np.hypot(*earth.relative_position(np.array(position), recording.data.truth.position)[:, :2].T)
+    assert np.sqrt(np.mean(error**2)) < 1.2 * np.sqrt(np.mean(own**2))
+
+
 def test_a_larger_risk_is_a_lower_level(recording_of):
     recording = recording_of(4, 30.0, aids=AIDS)
     strict, loose = (run(recording, risk=r)[1] for r in (1e-9, 1e-3))

@@ -139,6 +139,14 @@ def test_the_row_is_that_with_the_smallest_error_in_the_trouble() -> None:
     assert named(chosen(made(ERRORS))) == "vb-akf"  # the geometric mean of both kinds, each counting the same
 
 
+def test_a_row_that_its_page_advises_against_is_not_taken() -> None:
+    errors = {s: {**by, "solution-separation": 1.5} for s, by in ERRORS.items()}
+    found = chosen(made(errors), "lying-fixes")
+    assert "solution-separation" in [r.estimator for r in found.groups[0].ranked]
+    assert named(found) == "robust"
+    assert "solution-separation" not in [c.estimator for c in found.as_good]
+
+
 def test_without_a_difference_the_plain_row_is_taken() -> None:
     found = chosen(made(EQUAL | {"gnss-noise-v1": ERRORS["gnss-outage-v1"] | dict.fromkeys(("even", "vb-akf"), 10.0)}))
     assert (named(found), found.confidence) == ("ekf", "undecided")
