@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from math import sqrt
 
-from simnav.compiled import kernel
+from simnav.compiled import helper, kernel
 from simnav.kernel_types import Matrix
 
 __all__ = ["bound", "copied", "scale"]
@@ -41,7 +41,7 @@ def bound(estimate: Matrix, nominal: Matrix, low: float, high: float, bounded: M
         bounded[i, i] *= nominal[i, i] * bounded[i, i]
 
 
-@kernel
+@helper
 def copied(noise: Matrix, used: Matrix) -> None:
     """Copy an (m, m) array into another; a slice would take seconds to compile."""
     for i in range(noise.shape[0]):
