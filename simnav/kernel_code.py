@@ -22,6 +22,7 @@ from numba.core.runtime.nrt import rtsys
 __all__ = ["LibraryOnDemand", "libraries"]
 
 _Library: Any = codegen.JITCodeLibrary  # Numba has no annotations
+_environment_of: Any = lookup_environment
 _ENVIRONMENT = "_ZN08NumbaEnv"  # how the names of the variables begin that hold a function's objects of Python
 
 
@@ -72,7 +73,7 @@ class LibraryOnDemand(_Library):  # type: ignore[misc]
         self._made = True
         super()._finalize_final_module()
         for variable in self._final_module.global_variables:
-            environment = lookup_environment(variable.name) if variable.name.startswith(_ENVIRONMENT) else None
+            environment = _environment_of(variable.name) if variable.name.startswith(_ENVIRONMENT) else None
             if environment is not None:
                 self._codegen.set_env(variable.name, environment)
 

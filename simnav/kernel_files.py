@@ -42,6 +42,7 @@ _Reference: Any = types.StructRef
 structures: Any = structref
 boxing: Any = pythonapi
 arrays: Any = arrayobj
+lowering: Any = imputils
 config: Any = numba_config
 
 
@@ -227,7 +228,7 @@ def record_type(name: str, fields: Mapping[str, Any]) -> Any:
 _ARRAY: Any = types.Array(types.float64, 1, "C")
 
 
-@imputils.lower_builtin("array.view", _ARRAY, types.DTypeSpec)  # type: ignore[untyped-decorator]
+@lowering.lower_builtin("array.view", _ARRAY, types.DTypeSpec)  # type: ignore[untyped-decorator]
 def structures_in(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
     """An array of float64, seen as structures (`simnav.structures`).
 
@@ -252,4 +253,4 @@ def structures_in(context: Any, builder: Any, signature: Any, arguments: Any) ->
         meminfo=array.meminfo,
         parent=array.parent,
     )
-    return imputils.impl_ret_borrowed(context, builder, seen, view._getvalue())
+    return lowering.impl_ret_borrowed(context, builder, seen, view._getvalue())
