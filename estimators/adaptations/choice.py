@@ -11,7 +11,7 @@ from math import sqrt
 
 import numpy as np
 
-from simnav.compiled import helper, kernel
+from simnav.compiled import kernel
 from simnav.estimators.models.filtering import Prediction, Readings
 from simnav.kernel_types import FlagVector, IntegerVector, Matrix, Vector
 from simnav.records import Record
@@ -65,7 +65,7 @@ class Choice(Record):
     tested: TestedPrediction
 
 
-@helper
+@kernel
 def is_poor(predicted: Matrix, nominal: Matrix, last: Vector) -> bool:
     """Whether a prediction is less certain than the noise used last, so that it tells little about the noise."""
     before, trace, m = 0.0, 0.0, predicted.shape[0]
@@ -75,7 +75,7 @@ def is_poor(predicted: Matrix, nominal: Matrix, last: Vector) -> bool:
     return trace > before
 
 
-@helper
+@kernel
 def has_noise(nominal: Matrix) -> bool:
     """Whether all components have noise."""
     noisy = True
@@ -84,7 +84,7 @@ def has_noise(nominal: Matrix) -> bool:
     return noisy
 
 
-@helper
+@kernel
 def remember(noise: Matrix, last: Vector, sigma: Vector) -> None:
     """Keep the elements of a noise, and its sigmas for the report."""
     m = noise.shape[0]

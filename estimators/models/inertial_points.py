@@ -243,7 +243,7 @@ def move_in_pieces(
         propagate_points(before, numbers, constants, decay, errors)
 
 
-@helper
+@kernel
 def move(dynamics: Dynamics, samples: Samples, until: float) -> None:
     """Advance state and points; the covariance becomes that of the process noise."""
     dynamics.covariance[:] = 0.0
@@ -260,7 +260,7 @@ def propagate(dynamics: Dynamics, samples: Samples, until: float) -> None:
         propagate_through(move, retract, dynamics, samples, until)
 
 
-@helper
+@kernel
 def read(dynamics: Dynamics, readings: Readings, k: int, differences: Matrix) -> None:
     """What an instrument should read at the points, minus what it should read at the state."""
     aid = aid_of(dynamics.aids, readings.instrument[k])

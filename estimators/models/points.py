@@ -60,7 +60,7 @@ def draw_points(covariance: Matrix, spread: float, points: Matrix) -> None:
             points[n + j, i] = -points[j, i]
 
 
-@helper
+@kernel
 def add_moments(points: SigmaPoints, values: Matrix, mean: Vector, covariance: Matrix) -> None:
     """Mean and covariance of what a function is at the points.
 
@@ -92,7 +92,7 @@ def add_moments(points: SigmaPoints, values: Matrix, mean: Vector, covariance: M
             covariance[i, c] += points.weight * squares[i, c] + points.excess * (mean[i] * mean[c])
 
 
-@helper
+@kernel
 def correlate(points: SigmaPoints, values: Matrix, cross: Matrix) -> None:
     """Overwrite (n, m) with the covariance of the state's error and a function; for the values see `add_moments`."""
     (k, n), m = points.errors.shape, values.shape[1]

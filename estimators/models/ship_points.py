@@ -60,7 +60,7 @@ def observe_points(aid: Aid, x: Vector, errors: Matrix, differences: Matrix) -> 
             differences[j, i] = atan2(sin(difference), cos(difference)) if aid.code == HEADING else difference
 
 
-@helper
+@kernel
 def move(dynamics: Dynamics, samples: Samples, until: float) -> None:
     """Advance state and points; the covariance becomes that of the process noise."""
     state = ship_state(dynamics.numbers)
@@ -77,7 +77,7 @@ def propagate(dynamics: Dynamics, samples: Samples, until: float) -> None:
         propagate_through(move, retract, dynamics, samples, until)
 
 
-@helper
+@kernel
 def read(dynamics: Dynamics, readings: Readings, k: int, differences: Matrix) -> None:
     """What an instrument should read at the points, minus what it should read at the state."""
     aid, x = aid_of(dynamics.aids, readings.instrument[k]), ship_state(dynamics.numbers).x
