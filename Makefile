@@ -30,7 +30,6 @@ $(VENV)/installed-test: $(VENV)/pyvenv.cfg pyproject.toml
 	@touch $@ $(VENV)/installed
 
 leaderboard: $(VENV)/installed
-	$(BIN)/simnav warmup
 	$(BIN)/simnav campaign --profile quick --output $(RESULTS)
 	$(BIN)/simnav leaderboard $(RESULTS) --output $(SITE)
 
@@ -43,7 +42,8 @@ test: $(VENV)/installed-test
 bench: $(VENV)/installed-test
 	$(BIN)/simnav warmup
 	@mkdir -p results
-	$(BIN)/python -m pytest tests/benchmarks --benchmark-enable --benchmark-only --benchmark-columns=median,mean,iqr,rounds --benchmark-sort=name --benchmark-json=results/bench.json
+	$(BIN)/python -m pytest tests/benchmarks --benchmark-enable --benchmark-only --benchmark-quiet --benchmark-json=results/bench.json
+	$(BIN)/python -m tests.benchmarks.table results/bench.json
 
 $(VENV)/installed-docs: $(VENV)/pyvenv.cfg pyproject.toml
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[docs]'

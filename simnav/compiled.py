@@ -137,11 +137,13 @@ class Kernel(Generic[Parameters, Returned]):
         import numba
         import numpy as np
 
-        from simnav.kernel_files import call_by_symbol, compile_with
+        from simnav.kernel_code import LibraryOnDemand
+        from simnav.kernel_files import call_by_symbol, compile_with, structures_in
 
         text = [str(sys.implementation.cache_tag), numba.__version__, np.__version__]
-        for how in (Kernel._jit, compile_with, call_by_symbol):  # they are compiled
-            text += _code_text(how.__code__)
+        functions = (Kernel._jit, compile_with, call_by_symbol, structures_in, LibraryOnDemand._optimize_functions)
+        for function in functions:  # what decides how kernels are compiled
+            text += _code_text(function.__code__)
         for k in self.tree():
             fastmath = sorted(k.fastmath) if isinstance(k.fastmath, set) else k.fastmath
             text += [k.__module__, k.__qualname__, f"{k.signature} {fastmath!r} {k.borrows!r} {k.passed!r}"]
@@ -225,7 +227,7 @@ class Kernel(Generic[Parameters, Returned]):
         config.CACHE_DIR, config.SLP_VECTORIZE = directory or previous[0], not fast
         try:
             compiled: Callable[..., Any] = numba.jit(**options)(function)
-            compile_with(compiled, self.signature)
+            compile_with(compiled, self.signature, fast)
             if self.typed and not fast:
                 # Its callers contain a call of it, and no copy of its code. They are compiled, or loaded, after it.
                 code = self.fingerprint() if directory is None else os.path.basename(directory)

@@ -25,8 +25,11 @@ from numba.core import config as numba_config
 from numba.core.caching import FunctionCache, IndexDataCacheFile
 from numba.core.runtime.nrt import rtsys
 from numba.experimental import structref
+from numba.np import arrayobj
 
-__all__ = ["WithDigests", "call_by_symbol", "compile_with", "record_type"]
+from simnav.kernel_code import libraries
+
+__all__ = ["WithDigests", "call_by_symbol", "compile_with", "record_type", "structures_in"]
 
 _DIGEST = hashlib.sha256().digest_size
 
@@ -38,6 +41,8 @@ _Overloads: Any = base.OverloadSelector
 _Reference: Any = types.StructRef
 structures: Any = structref
 boxing: Any = pythonapi
+arrays: Any = arrayobj
+lowering: Any = imputils
 config: Any = numba_config
 
 
@@ -97,7 +102,7 @@ class WithDigests(_Files):  # type: ignore[misc]
         return False
 
 
-def compile_with(dispatcher: Any, signature: str | None) -> None:
+def compile_with(dispatcher: Any, signature: str | None, fast: bool) -> None:
     """Compile a dispatcher of Numba for a signature, or load it, with files that have digests if it has a cache.
 
     Parameters
@@ -106,6 +111,8 @@ def compile_with(dispatcher: Any, signature: str | None) -> None:
         A function decorated by `numba.jit` without a signature.
     signature : str or None
         Numba signature. None: Numba compiles the function later, for each caller, as a helper.
+    fast : bool
+        Whether it has fast arithmetic: then it is compiled as by Numba alone (`simnav.kernel_code`).
     """
     cache = getattr(dispatcher, "_cache", None)
     if cache is None:  # NUMBA_DISABLE_JIT: it is the plain function
@@ -121,13 +128,17 @@ def compile_with(dispatcher: Any, signature: str | None) -> None:
         def compile_plainly(types: Any) -> Any:
             previous, config.SLP_VECTORIZE = config.SLP_VECTORIZE, False
             try:
-                return compile_for(types)
+                with libraries(dispatcher.targetctx, on_demand=not fast):
+                    return compile_for(types)
             finally:
                 config.SLP_VECTORIZE = previous
 
         dispatcher.compile = compile_plainly
     else:
-        with typeinfer.register_dispatcher(dispatcher):  # as `numba.jit` with a signature does
+        with (
+            typeinfer.register_dispatcher(dispatcher),  # as `numba.jit` with a signature does
+            libraries(dispatcher.targetctx, on_demand=not fast),
+        ):
             dispatcher.compile(signature)
         dispatcher.disable_compile()
 
@@ -212,3 +223,34 @@ def _taken(kind: Any, record: Any, c: Any) -> Any:
 def record_type(name: str, fields: Mapping[str, Any]) -> Any:
     """The type of a record with fields of these types of Numba."""
     return RecordType(name, list(fields.items()))
+
+
+_ARRAY: Any = types.Array(types.float64, 1, "C")
+
+
+@lowering.lower_builtin("array.view", _ARRAY, types.DTypeSpec)  # type: ignore[untyped-decorator]
+def structures_in(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+    """An array of float64, seen as structures (`simnav.structures`).
+
+    By itself Numba compiles a function with the checks of NumPy for each structure, a twentieth of the time of all
+    kernels. For an array without gaps it is enough that its length is a multiple of that of the structure.
+    """
+    seen = signature.return_type
+    array = arrays.make_array(_ARRAY)(context, builder, arguments[0])
+    view = arrays.make_array(seen)(context, builder)
+    size = context.get_constant(types.intp, context.get_abi_sizeof(context.get_data_type(seen.dtype)))
+    length = builder.mul(array.nitems, array.itemsize)
+    misfit = builder.icmp_signed("!=", builder.srem(length, size), size.type(0))
+    with builder.if_then(misfit, likely=False):
+        message = "the length of an array must be a multiple of that of the structure which it is seen as"
+        context.call_conv.return_user_exc(builder, ValueError, (message,))
+    arrays.populate_array(
+        view,
+        data=builder.bitcast(array.data, view.data.type),
+        shape=[builder.sdiv(length, size)],
+        strides=[size],
+        itemsize=size,
+        meminfo=array.meminfo,
+        parent=array.parent,
+    )
+    return lowering.impl_ret_borrowed(context, builder, seen, view._getvalue())

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import contextlib
+import gc
 import importlib.util
+import itertools
 import multiprocessing
 import os
 import warnings
@@ -23,7 +25,9 @@ Callback = Callable[[int, int, str], None]
 _WORTH_A_PROCESS = 4  # fewer kernels than this are compiled in this process
 
 
-def warmup(progress: Callback | None = None, *, load: bool = True, processes: int | None = None) -> None:
+def warmup(
+    progress: Callback | None = None, *, load: bool = True, processes: int | None = None, everything: bool = True
+) -> None:
     """Compile all kernels of simnav, of the estimators and of installed plug-ins that are not in the cache.
 
     Parameters
@@ -34,13 +38,16 @@ def warmup(progress: Callback | None = None, *, load: bool = True, processes: in
         True: also load the kernels into this process.
     processes : int, optional
         Number of processes that compile at the same time; by default the number of cores, at most 4.
+    everything : bool
+        False: only the kernels of modules that this process has imported, as a campaign has when its rows are known.
     """
     with announced(lambda: None):  # the progress says it
+        if everything:
+            _import_all()
         _warm_up(progress or (lambda done, total, name: None), load, processes)
 
 
 def _warm_up(report: Callback, load: bool, processes: int | None) -> None:
-    _import_all()
     every = kernels()
     missing = [k for k in every if not k.cached()]
     done = len(every) - len(missing)
@@ -106,7 +113,10 @@ def _compile_beside(missing: list[Kernel[..., Any]], processes: int) -> Iterator
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", DeprecationWarning)  # fork beside threads
-            with ProcessPoolExecutor(processes, mp_context=context) as pool, contextlib.suppress(BrokenExecutor):
+            with (
+                ProcessPoolExecutor(processes, mp_context=context, initializer=_collect_seldom) as pool,
+                contextlib.suppress(BrokenExecutor),
+            ):
                 while waiting or running:
                     # A kernel after those that it calls, which are then in the cache.
                     for i in [i for i in waiting if calls[i] <= done][: processes - len(running)]:
@@ -126,6 +136,16 @@ _todo: list[Kernel[..., Any]] = []
 def _size(parts: Iterable[Kernel[..., Any]]) -> int:
     """The size of the code of kernels, as a measure of their compile time."""
     return sum(len(k.function.__code__.co_code) for k in parts)
+
+
+def _collect_seldom() -> None:
+    """Python looks seldom for unused cycles of objects, and not in what was imported.
+
+    The compiler makes very many objects, and by default Python looks so often that a seventh of the time is lost. To
+    look never would take gigabytes.
+    """
+    gc.freeze()
+    gc.set_threshold(100_000, 5, 5)
 
 
 def _compile(index: int) -> str:

@@ -58,7 +58,7 @@ FACTORS: Mapping[str, Callable[[float, float, float], float]] = {
 }
 
 
-@kernel
+@helper
 def _published_residual(residual: Vector, predicted: Matrix, noise: Matrix) -> float:
     """Eq. 31: v'v / sqrt(tr S)."""
     square, trace = 0.0, 0.0

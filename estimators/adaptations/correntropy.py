@@ -7,7 +7,7 @@ from typing import Literal
 
 import numpy as np
 
-from simnav.compiled import kernel
+from simnav.compiled import helper, kernel
 from simnav.estimators.algebra.direct_update import posterior
 from simnav.estimators.models.filtering import Prediction, Readings
 from simnav.kernel_types import Matrix, Vector
@@ -19,7 +19,7 @@ from .noise import WeightedNoise
 __all__ = ["MaximumCorrentropy", "correntropy_noise", "correntropy_rule"]
 
 
-@kernel
+@helper
 def correntropy_noise(
     innovation: Vector,
     predicted: Matrix,

@@ -22,7 +22,7 @@ from .scaled_noise import bound
 __all__ = ["FixedWindow", "InnovationBased", "adaptive_window", "innovation_noise"]
 
 
-@kernel
+@helper
 def adaptive_window(variance: float, nominal: float, low: float, high: float, shortest: int, longest: int) -> int:
     """Length of the window after Mao, Wang and Fu (2025), eq. 20: the more the innovations scatter, the longer.
 
@@ -43,7 +43,7 @@ def adaptive_window(variance: float, nominal: float, low: float, high: float, sh
 
 
 #: Columns of a row of a window: v; then, each (m, m), v v', e e', and H P H' or minus H P+ H'.
-@kernel
+@helper
 def _push(rows: Matrix, count: int, innovation: Vector, residual: Vector, sign: float, predicted: Matrix) -> None:
     """Overwrite the oldest row with that of the present epoch."""
     m, row = innovation.size, rows[count % rows.shape[0]]
@@ -87,7 +87,7 @@ class _Window(NamedTuple):
     high: float
 
 
-@kernel
+@helper
 def _average(
     rows: Matrix,
     count: int,

@@ -20,7 +20,7 @@ from pathlib import Path
 
 import numpy as np
 
-from simnav.compiled import kernel
+from simnav.compiled import helper, kernel
 from simnav.estimators.algebra.direct_update import normalised_square
 from simnav.estimators.models.filtering import Prediction, Readings
 from simnav.estimators.networks.file import Network
@@ -58,7 +58,7 @@ _MEMORY, _TYPICAL = 10.0, 0.6
 LARGEST = 1000.0
 
 
-@kernel
+@helper
 def set_by_network(
     settings: Vector, memory: Vector, common: Vector, readings: Readings, k: int, prediction: Prediction
 ) -> float:

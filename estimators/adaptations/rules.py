@@ -13,13 +13,13 @@ one such function, a kernel with ``passed=True`` or plain Python, in a class tha
 
 from __future__ import annotations
 
-from simnav.compiled import kernel
+from simnav.compiled import helper
 from simnav.kernel_types import Matrix
 
 __all__ = ["copied"]
 
 
-@kernel
+@helper
 def copied(noise: Matrix, used: Matrix) -> None:
     """Copy an (m, m) array into another; a slice would take seconds to compile."""
     for i in range(noise.shape[0]):

@@ -45,7 +45,7 @@ def normalised_trace(noise: Matrix, residual: Vector, spread: Matrix) -> float:
     return _trace(inverse, residual, spread) if _whitening(noise, inverse) else -1.0
 
 
-@kernel
+@helper
 def student_weight(innovation: Vector, predicted: Matrix, noise: Matrix, dof: float, iterations: int) -> float:
     """The weight w of a measurement; its noise is R / w (see `StudentT`).
 

@@ -6,7 +6,7 @@ from math import sqrt
 
 import numpy as np
 
-from simnav.compiled import kernel
+from simnav.compiled import helper, kernel
 from simnav.estimators.algebra.direct_update import posterior
 from simnav.estimators.models.filtering import Prediction, Readings
 from simnav.kernel_types import Matrix, Vector
@@ -18,7 +18,7 @@ from .noise import EstimatedNoise, Scope
 __all__ = ["VariationalBayes", "variational_bayes_noise", "variational_noise"]
 
 
-@kernel
+@helper
 def variational_noise(
     innovation: Vector,
     predicted: Matrix,

@@ -10,7 +10,7 @@ from math import exp, log
 
 import numpy as np
 
-from simnav.compiled import kernel
+from simnav.compiled import helper
 from simnav.kernel_types import Matrix, Vector
 
 from .cholesky import factorise, invert_factor
@@ -18,7 +18,7 @@ from .cholesky import factorise, invert_factor
 __all__ = ["mixture_update"]
 
 
-@kernel
+@helper
 def mixture_update(
     covariance: Matrix,
     cross: Matrix,

@@ -36,7 +36,7 @@ from typing import Literal
 
 import numpy as np
 
-from simnav.compiled import kernel
+from simnav.compiled import helper, kernel
 from simnav.estimators.models.channels import instrument_of, owners
 from simnav.kernel_types import IntegerVector, Matrix, Vector
 from simnav.kinds import POSITION, VELOCITY
@@ -53,7 +53,7 @@ Shape = tuple[float, float, float]
 _CHI_MEDIAN = np.array([1.0, 0.674490, 1.177410, 1.538172])
 
 
-@kernel
+@helper
 def medians(values: Vector, group: IntegerVector, fewest: int, out: Vector) -> None:
     """Medians of groups.
 

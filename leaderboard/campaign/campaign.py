@@ -442,7 +442,7 @@ def _unique(what: str, labels: list[str]) -> None:
 
 
 def _compile(report: Callable[[Progress], None]) -> None:
-    """Compile what is not in the cache, before several workers would do it at once."""
+    """Compile what the runs need and the cache lacks, before several workers would do it at once."""
     from simnav.warmup import warmup
 
     started = time.monotonic()
@@ -450,7 +450,7 @@ def _compile(report: Callable[[Progress], None]) -> None:
     def compiled(done: int, total: int, name: str) -> None:
         report(Progress("compile", done, total, elapsed=time.monotonic() - started, note=name))
 
-    warmup(compiled, load=False)
+    warmup(compiled, load=False, everything=False)
 
 
 # --- spreading the work -------------------------------------------------------------------------------

@@ -20,7 +20,7 @@ from simnav.leaderboard.campaign.campaign import Progress, run_campaign
 from simnav.leaderboard.campaign.request import EstimatorRequest
 from simnav.scenario import load
 
-__all__ = ["rows"]
+__all__ = ["Cluster", "Cost", "cost", "rows"]
 
 SCENARIO = "gnss-outage"
 ROWS = ("ekf", "gated-ekf", "iae", "sw-fgo")
@@ -44,7 +44,7 @@ class Waiting(Estimator):
 _TICKS = 100.0  # of /proc/PID/stat in a second
 
 
-class _Cluster:
+class Cluster:
     """A scheduler and workers."""
 
     def __init__(self, folder: Path):
@@ -88,16 +88,16 @@ def rows() -> Iterator[tuple[str, str, str, bool]]:
         (folder / "waiting.py").write_text(WAITING)
         computing = [EstimatorRequest(row) for row in ROWS]
         waiting = [EstimatorRequest(str(folder / "waiting.py"), label="waiting")]
-        cluster = _Cluster(folder)
+        cluster = Cluster(folder)
         try:
             cluster.add()
             cluster.warm()
-            one = _run(cluster, computing, folder / "one", range(RUNS))
-            one_waits = _run(cluster, waiting, folder / "one-waits", range(WAITS))
+            one = cost(cluster, computing, folder / "one", range(RUNS))
+            one_waits = cost(cluster, waiting, folder / "one-waits", range(WAITS))
             cluster.add()
             cluster.warm()
-            two = _run(cluster, computing, folder / "two", range(RUNS))
-            two_wait = _run(cluster, waiting, folder / "two-wait", range(WAITS))
+            two = cost(cluster, computing, folder / "two", range(RUNS))
+            two_wait = cost(cluster, waiting, folder / "two-wait", range(WAITS))
             before = _cpu(cluster.scheduler.pid)
             time.sleep(IDLE)
             idle = (_cpu(cluster.scheduler.pid) - before) / IDLE
@@ -122,7 +122,7 @@ def rows() -> Iterator[tuple[str, str, str, bool]]:
 
 
 @dataclass(frozen=True)
-class _Cost:
+class Cost:
     """What a campaign took: wall time, and CPU time of the workers, the scheduler and the campaign's process [s]."""
 
     wall: float
@@ -131,7 +131,8 @@ class _Cost:
     campaign: float
 
 
-def _run(cluster: _Cluster, requests: list[EstimatorRequest], folder: Path, seeds: range) -> _Cost:
+def cost(cluster: Cluster, requests: list[EstimatorRequest], folder: Path, seeds: range) -> Cost:
+    """What a campaign on a cluster takes from its first to its last run."""
     seen_at: list[tuple[float, float, float, float]] = []
 
     def now() -> tuple[float, float, float, float]:
@@ -144,7 +145,7 @@ def _run(cluster: _Cluster, requests: list[EstimatorRequest], folder: Path, seed
 
     run_campaign([load(SCENARIO)], requests, seeds, folder, backend="dask", scheduler=cluster.address, progress=seen,
                  confinement="none")  # fmt: skip
-    return _Cost(*(b - a for a, b in zip(seen_at[0], seen_at[-1], strict=True)))
+    return Cost(*(b - a for a, b in zip(seen_at[0], seen_at[-1], strict=True)))
 
 
 def _family(pid: int) -> list[int]:

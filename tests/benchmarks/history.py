@@ -14,7 +14,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-__all__ = ["COLUMNS", "FILE", "lines", "present_edition", "updated"]
+__all__ = ["COLUMNS", "FILE", "benchmark_name", "lines", "present_edition", "updated"]
 
 FILE = Path(__file__).with_name("history.csv")
 COLUMNS = ("edition", "date", "commit", "processor", "benchmark", "median_s", "least_s", "rounds")
@@ -25,6 +25,11 @@ def present_edition(path: Path = _EDITIONS) -> int:
     """The newest edition of the standard result."""
     with path.open(newline="") as file:
         return max(int(line["edition"]) for line in csv.DictReader(file))
+
+
+def benchmark_name(one: Mapping[str, Any]) -> str:
+    """File and name of a benchmark of a report: several files have benchmarks of the same name."""
+    return str(one["fullname"]).rpartition("/")[2]
 
 
 def lines(report: Mapping[str, Any], edition: int) -> list[dict[str, str]]:
@@ -54,12 +59,12 @@ def lines(report: Mapping[str, Any], edition: int) -> list[dict[str, str]]:
     return [
         {
             **shared,
-            "benchmark": one["name"],
+            "benchmark": benchmark_name(one),
             "median_s": f"{one['stats']['median']:.4g}",
             "least_s": f"{one['stats']['min']:.4g}",
             "rounds": str(one["stats"]["rounds"]),
         }
-        for one in sorted(report["benchmarks"], key=lambda one: str(one["name"]))
+        for one in sorted(report["benchmarks"], key=benchmark_name)
     ]
 
 

@@ -14,8 +14,11 @@ REPORT: dict[str, Any] = {
     "commit_info": {"id": "0123456789abcdef", "dirty": True},
     "machine_info": {"cpu": {"brand_raw": "A processor"}},
     "benchmarks": [
-        {"name": "test_b", "stats": {"median": 0.25, "min": 0.2, "rounds": 5}},
-        {"name": "test_a", "stats": {"median": 1.23456e-5, "min": 1e-5, "rounds": 9}},
+        {"fullname": "tests/test_bench_x.py::test_b", "stats": {"median": 0.25, "min": 0.2, "rounds": 5}},
+        {
+            "fullname": "tests/test_bench_x.py::test_a",
+            "stats": {"median": 1.23456e-5, "min": 1e-5, "rounds": 9},
+        },
     ],
 }
 
@@ -23,16 +26,16 @@ REPORT: dict[str, Any] = {
 def test_a_line_says_what_was_measured_where_and_of_what():
     first, second = lines(REPORT, 15)
     assert tuple(first) == COLUMNS
-    assert first["benchmark"] == "test_a"
+    assert first["benchmark"] == "test_bench_x.py::test_a"
     assert (first["edition"], first["commit"], first["median_s"]) == ("15", "0123456789ab+", "1.235e-05")
-    assert (second["benchmark"], second["least_s"], second["rounds"]) == ("test_b", "0.2", "5")
+    assert (second["benchmark"], second["least_s"], second["rounds"]) == ("test_bench_x.py::test_b", "0.2", "5")
 
 
 def test_lines_of_an_edition_are_replaced_and_others_stay():
     old = lines(REPORT, 14) + lines(REPORT, 15)
     new = lines({**REPORT, "benchmarks": REPORT["benchmarks"][:1]}, 15)
     assert [(line["edition"], line["benchmark"]) for line in updated(old, new)] == [
-        ("14", "test_a"), ("14", "test_b"), ("15", "test_b"),
+        ("14", "test_bench_x.py::test_a"), ("14", "test_bench_x.py::test_b"), ("15", "test_bench_x.py::test_b"),
     ]  # fmt: skip
 
 

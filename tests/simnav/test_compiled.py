@@ -17,6 +17,7 @@ import pytest
 
 from simnav import cache_folder, compiled, warmup
 from simnav.kernel_types import Vector, hints_of
+from simnav.structures import structure
 
 HELPER = """
 from simnav.compiled import helper as inlined
@@ -337,6 +338,30 @@ def test_how_helpers_are_compiled(monkeypatch: pytest.MonkeyPatch) -> None:
     # A helper is in the cache for all its callers, whichever of them compiled it first.
     assert sorted(allowed) == [("_total", False), ("_twice", True)]
     assert before == config.SLP_VECTORIZE
+
+
+def _second(values: Vector) -> float:
+    return values.view(PAIR)[0].second
+
+
+PAIR = structure(first=float, second=float)
+
+
+def test_machine_code_is_made_for_kernels_and_not_for_their_helpers(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(compiled, "cache_directory", lambda: None)
+    caller, part = compiled.Kernel(_twice, typed=True), compiled.Kernel(_total, typed=False, borrows=True)
+    monkeypatch.setitem(globals(), "_helper", part)
+    assert caller(np.array([1.0, 2.0])) == 6.0
+    made = [next(iter(k.compile().overloads.values())).library._made for k in (caller, part)]  # type: ignore[attr-defined]
+    assert made == [True, False]
+
+
+def test_a_structure_of_the_wrong_length_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(compiled, "cache_directory", lambda: None)
+    second = compiled.Kernel(_second, typed=True)
+    assert second(np.array([1.0, 2.0, 3.0, 4.0])) == 2.0
+    with pytest.raises(ValueError, match="must be a multiple of that of the structure"):
+        second(np.array([1.0, 2.0, 3.0]))
 
 
 def _room(n: int) -> Vector:

@@ -103,3 +103,11 @@ def test_several_are_compiled_beside_each_other(
         assert set(here) == {"cached"}
     assert [k(1.0) for k in ours] == [1.0, 2.0, 3.0, 4.0, 0.0]
     assert several.k4(0.5) == 0.5
+
+
+def test_a_campaign_compiles_only_what_is_imported(monkeypatch: pytest.MonkeyPatch) -> None:
+    reported: list[tuple[int, int, str]] = []
+    monkeypatch.setattr(warmup, "kernels", list)
+    monkeypatch.setattr(warmup, "_import_all", lambda: pytest.fail("modules were imported"))
+    warmup.warmup(lambda *p: reported.append(p), everything=False)
+    assert reported == [(0, 0, "")]
