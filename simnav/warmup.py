@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import gc
 import importlib.util
-import itertools
 import multiprocessing
 import os
 import warnings
