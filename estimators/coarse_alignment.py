@@ -58,8 +58,8 @@ __all__ = ["ENOUGH", "LEVELLING", "SPACING_DEG", "WIDER", "CoarseAlignment", "tu
 
 #: How long the specific force is averaged for roll and pitch [s].
 LEVELLING = 20.0
-#: Distance between the headings at which filters begin [deg]: a filter that begins 10 deg off, as with the 20 deg of the
-#: row ``heading-bank``, sometimes believes in a heading that is wrong by six of its standard deviations.
+#: Distance between the headings at which filters begin [deg]. A filter that begins 10 deg off, as with the 20 deg of
+#: the row ``heading-bank``, sometimes believes in a heading that is wrong by six of its standard deviations.
 SPACING_DEG = 8.0
 #: A row begins when no component of the attitude has a larger standard deviation [rad].
 ENOUGH = radians(2.0)
