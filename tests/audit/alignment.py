@@ -165,7 +165,7 @@ def rows(found: Mapping[str, Any]) -> Iterator[tuple[str, str, str, bool]]:
         late = np.quantile(aligned, 0.9, method="higher")
         figure = (
             f"{mean:.3f} times the error (geometric mean; median {np.median(ratio[known]):.3f}, worst "
-            f"{ratio[known].max():.2f}; by the covariances {told:.3f}), aligned on {known.sum()} of {len(known)} voyages after "
-            f"{np.median(aligned):.0f} s (median), {late:.0f} s (90 %)"
+            f"{ratio[known].max():.2f}; by the covariances {told:.3f}), aligned on {known.sum()} of {len(known)} voyages "
+            f"after {np.median(aligned):.0f} s (median), {late:.0f} s (90 %)"
         )
         yield name, figure, f"at most {MOST:g} times what the covariances say", mean <= MOST * max(1.0, told)
