@@ -38,6 +38,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from math import asin, atan2, isfinite, radians
+from typing import Any
 
 import numpy as np
 
@@ -125,7 +126,7 @@ class CoarseAlignment:
     def __init__(self, start: InitialState, instruments: Instruments):
         self.start, self.aligned = start, False
         self.packets: list[Measurements] = []
-        self._filters = make("heading-bank", spacing_deg=SPACING_DEG)
+        self._filters: Any = make("heading-bank", spacing_deg=SPACING_DEG)
         self._instruments = instruments
         self._levelled = start.unknown == "heading"
         self._filters.reset(start if self._levelled else self._level(np.array([0.0, 0.0, -1.0])), instruments)

@@ -155,9 +155,9 @@ def rows(found: Mapping[str, Any]) -> Iterator[tuple[str, str, str, bool]]:
     """A row for each part."""
     for name, values in found.items():
         if name == "moored":
-            ratio = float(np.sqrt(np.mean(np.square(values))))
-            figure = f"{ratio:.2f} times the closed form (root of the mean square of {len(values)} runs)"
-            yield f"heading after {MOORED:g} s at the quay, {BIAS:g} deg/h", figure, "at most 1.25", ratio <= 1.25
+            size = float(np.sqrt(np.mean(np.square(values))))
+            figure = f"{size:.2f} times the closed form (root of the mean square of {len(values)} runs)"
+            yield f"heading after {MOORED:g} s at the quay, {BIAS:g} deg/h", figure, "at most 1.25", size <= 1.25
             continue
         aligned, ratio, predicted = np.array(values).T
         known = np.isfinite(aligned)
@@ -165,7 +165,7 @@ def rows(found: Mapping[str, Any]) -> Iterator[tuple[str, str, str, bool]]:
         late = np.quantile(aligned, 0.9, method="higher")
         figure = (
             f"{mean:.3f} times the error (geometric mean; median {np.median(ratio[known]):.3f}, worst "
-            f"{ratio[known].max():.2f}; by the covariances {told:.3f}), aligned on {known.sum()} of {len(known)} voyages "
-            f"after {np.median(aligned):.0f} s (median), {late:.0f} s (90 %)"
+            f"{ratio[known].max():.2f}; by the covariances {told:.3f}), aligned on {known.sum()} of {len(known)} "
+            f"voyages after {np.median(aligned):.0f} s (median), {late:.0f} s (90 %)"
         )
         yield name, figure, f"at most {MOST:g} times what the covariances say", mean <= MOST * max(1.0, told)
