@@ -147,7 +147,7 @@ class CoarseAlignment:
         packet = _kept(measurements)
         self.packets.append(packet)
         if self._levelled:
-            estimate = self._filters.update(packet)
+            estimate: Estimate = self._filters.update(packet)
         elif packet.time - self.start.time < LEVELLING:
             estimate = self._carried_on(packet.time)
         else:
