@@ -169,15 +169,15 @@ def _of_component(y: Array, X: Array, ends: NDArray[np.int64]) -> MotionShares:
     # Nothing of a part in a recording may be chance, and so may a large one: within a factor of `_APART`.
     sizes = np.sqrt(np.clip(each, whole / _APART**2, whole * _APART**2) / np.maximum(whole, 1e-300))
     speed = {"speed_m_s": SPEED}
-    proportional = ({}, speed, {**speed, "turn_rate_deg_s": TURN_RATE_DEG_S})
+    proportional: tuple[dict[str, float], ...] = ({}, speed, {**speed, "turn_rate_deg_s": TURN_RATE_DEG_S})
     shares = whole * factors / float(whole @ factors)
-    parts = [
+    constant, with_speed, in_turns = (
         Part(float(share), sqrt(factor), *_range(size), names)
         for share, factor, size, names in zip(shares, factors, sizes.T, proportional, strict=True)
-    ]
+    )
     scaled = np.sqrt(y / np.maximum(X @ whole, 1e-3 * float(y.mean())))
     freedom = float(student.fit(np.concatenate([scaled, -scaled]), floc=0.0)[0])
-    return MotionShares(*parts, max(freedom, 2.2) if freedom < _NORMAL else np.inf)
+    return MotionShares(constant, with_speed, in_turns, max(freedom, 2.2) if freedom < _NORMAL else np.inf)
 
 
 def _range(size: Array) -> tuple[float, float]:
