@@ -32,6 +32,7 @@ from simnav.estimator.late_arrivals import LateArrivals, Manner, TrueTimes, is_u
 from simnav.estimator.parameters import former_names, under_present_names
 from simnav.types import Array, Estimate, InitialState, Instruments, Measurements, NavigationStates
 
+from .coarse_alignment import CoarseAlignment
 from .fix_test import FixTest
 
 if typing.TYPE_CHECKING:
@@ -60,6 +61,8 @@ class Solver(Estimator):
     refuses: ClassVar[Mapping[str, str]] = {}
     row: str = ""
     reports_all: bool = False
+    #: True for a solver that searches an unknown heading by itself, so that its row does not wait for one.
+    searches_heading: ClassVar[bool] = False
 
     @classmethod
     def misfit(cls, keyword: str, made: type) -> str:
@@ -212,6 +215,7 @@ class Row(Estimator):
     late: Manner = "replay"
     _late: LateArrivals | None = None
     _fix_test: FixTest | None = None
+    _alignment: CoarseAlignment | None = None
     _truth: TrueTimes | None = None
     _shared: Sequence[object] = ()
 
@@ -273,12 +277,31 @@ class Row(Estimator):
         self._late = self._late_arrivals() if any(sheet.timing for sheet in instruments.values()) else None
         self._fix_test = FixTest(instruments) if self.sets_aside else None
         self.solver.reset(start, instruments)
+        self._alignment = CoarseAlignment(start, instruments) if self._waits(start) else None
+
+    def _waits(self, start: InitialState) -> bool:
+        """Whether the row cannot begin before it knows its attitude."""
+        searched = start.unknown == "heading" and getattr(self.solver, "searches_heading", False)
+        return bool(start.unknown) and not searched and not self.reference and self._instruments.imu is not None
 
     def _late_arrivals(self) -> LateArrivals:
         return LateArrivals(self._instruments, self.late, self._truth, self._shared)
 
     def update(self, measurements: Measurements) -> Estimate:
         """Take one step's measurements, each at its own time, also those that arrive late."""
+        alignment = self._alignment
+        if alignment is None:
+            return self._take(measurements)
+        estimate = alignment.update(measurements)
+        if alignment.aligned:
+            self._alignment = None
+            self.solver.reset(alignment.start, self._instruments)
+            for packet in alignment.packets:
+                estimate = self._take(packet)
+        return estimate
+
+    def _take(self, measurements: Measurements) -> Estimate:
+        """Take the measurements of a step of a row that has begun."""
         if self._late is None and is_untimely(measurements):
             self._late = self._late_arrivals()
         if self._late is None:
@@ -289,11 +312,11 @@ class Row(Estimator):
 
     def smooth(self) -> NavigationStates | None:
         """The trajectory of a solver that smooths; else None."""
-        return self.solver.smooth()
+        return None if self._alignment is not None else self.solver.smooth()
 
     def earlier(self, lags: Sequence[float]) -> Array | None:
         """The states of earlier times of a solver that looks back; else None."""
-        return self.solver.earlier(lags)
+        return None if self._alignment is not None else self.solver.earlier(lags)
 
     def longest_lag(self, instruments: Instruments) -> float:
         """How far a solver looks back [s]."""

@@ -9,9 +9,10 @@ attitude error [rad], the rotation vector of C_est C_true^T resolved in north-ea
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +25,7 @@ __all__ = [
     "COMPONENTS",
     "KINDS",
     "NO_SIDE",
+    "UNKNOWN_ANGLE",
     "Array",
     "Datasheet",
     "Estimate",
@@ -42,6 +44,9 @@ __all__ = [
     "TapStates",
     "TriadDatasheet",
 ]
+
+#: Standard deviation of an angle of which nothing is known [rad]: a normal error of this size is uniform on the circle.
+UNKNOWN_ANGLE = math.pi
 
 #: The nine error components of every covariance and every ``estimated`` mask, in order.
 COMPONENTS: tuple[str, ...] = (
@@ -272,7 +277,8 @@ class InitialState:
     position, velocity, attitude : (3,) array
         Geodetic [rad, rad, m]; north-east-down [m/s]; roll, pitch, yaw [rad].
     covariance : (9, 9) array
-        Covariance of the errors, in the order of `COMPONENTS`.
+        Covariance of the errors, in the order of `COMPONENTS`. An angle of which nothing is known has a standard
+        deviation of `UNKNOWN_ANGLE`.
     """
 
     time: float
@@ -280,6 +286,14 @@ class InitialState:
     velocity: Array
     attitude: Array
     covariance: Array
+
+    @property
+    def unknown(self) -> Literal["", "heading", "attitude"]:
+        """What of the attitude the start does not know: "heading", "attitude" (all of it), or nothing."""
+        known = [float(v) < (1.0 - 1e-9) * UNKNOWN_ANGLE**2 for v in self.covariance.diagonal()[6:9]]
+        if any(known[:2]):
+            return "" if known[2] else "heading"
+        return "" if known[2] else "attitude"
 
 
 @dataclass(eq=False, slots=True)

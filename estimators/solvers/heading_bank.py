@@ -134,6 +134,7 @@ class HeadingBank(Solver):
     """
 
     pieces: ClassVar[tuple[str, ...]] = ("model",)
+    searches_heading: ClassVar[bool] = True
     refuses: ClassVar[Mapping[str, str]] = {
         **KalmanEstimator.refuses,
         "iteration": "its filters begin at headings that are near enough to be linearised at",

@@ -4,8 +4,9 @@
   spline, whose smoothness generalised cross-validation finds (P. Craven and G. Wahba, "Smoothing noisy data with spline
   functions", Numerische Mathematik 31, 1979). Angles that the reference lacks are those of the plain row.
 - Errors of an instrument that was measured beside a reference: the processes that fit its readings less the reference
-  (`simnav.leaderboard.realism.fit`). They take the place of all its other errors, which are in these differences. With
-  several recordings each run draws sizes between those of the recordings.
+  (`simnav.leaderboard.realism.fit`). They take the place of all its other errors, which are in these differences. The
+  fast error of a speed is split by speed and turn rate (`motion_shares`). With several recordings each run draws sizes
+  between those of the recordings.
 - All other errors: as `simnav.leaderboard.identification.report.identify` found them.
 - Faults that are laid over the log stay.
 """
@@ -21,16 +22,19 @@ from typing import Any
 import numpy as np
 
 from simnav.estimator import make
+from simnav.kinds import BODY_VELOCITY, WATER_SPEED
 from simnav.leaderboard.realism.features import on_grid
 from simnav.leaderboard.realism.fit import fitted_apart
 from simnav.recording import Recording
 from simnav.scenario import Scenario
 from simnav.scenario.residuals import ErrorSeries, residuals
 from simnav.scenario.writing import toml_text
+from simnav.sensors import AidSpec
 from simnav.spec import SpecError
 from simnav.trial import run_trial
 from simnav.types import Array
 
+from .motion_shares import motion_shares
 from .report import Identification
 
 __all__ = ["Twin", "twin_of"]
@@ -161,7 +165,7 @@ def _errors(table: dict[str, Any], name: str, scenario: Scenario) -> dict[str, A
         return None
     if not series or min(len(s.time) for s in series) < 60:
         return None
-    processes = tomllib.loads(fitted_apart(series).to_toml(name, scenario.aids[name].definition))["instruments"][name]
+    processes = _processes(series, name, scenario.aids[name])
     if len(series) >= _SEVERAL:
         processes["error"] = [_drawn(one, *_spread(series)) for one in processes.get("error", [])]
     if loss := _loss(series):
@@ -169,10 +173,32 @@ def _errors(table: dict[str, Any], name: str, scenario: Scenario) -> dict[str, A
     return {**_without_errors(table), "rate_hz": float(f"{series[0].rate:.4g}"), **processes}
 
 
+def _processes(series: Sequence[ErrorSeries], name: str, spec: AidSpec) -> dict[str, Any]:
+    """The keys of an instrument's errors; the fast error of a speed in parts that grow with the motion."""
+    kind = spec.definition
+    found: dict[str, Any] = tomllib.loads(fitted_apart(series).to_toml(name, kind))["instruments"][name]
+    shares = motion_shares(series) if kind.equation in (BODY_VELOCITY, WATER_SPEED) else None
+    if shares is None:
+        return found
+    key, count = f"sigma_{kind.components[0].error_unit}", len(shares)
+    sizes = np.atleast_1d(found[key])
+    white = [{"kind": "white", key: (sizes * row).tolist() if count > 1 else float(sizes[0])} for row in np.eye(count)]
+    whole = [table for table in (*white, *found.get("error", [])) if np.any(table[key])]
+    component = [int(np.argmax(np.atleast_1d(table[key]))) for table in whole]
+    split = [
+        part
+        for k, share in enumerate(shares)
+        for part in share.split([table for table, own in zip(whole, component, strict=True) if own == k], key)
+    ]
+    return {**found, key: (0.0 * sizes).tolist() if count > 1 else 0.0, "error": split}
+
+
 def _drawn(process: dict[str, Any], low: float, high: float) -> dict[str, Any]:
     """A process whose sizes each run draws."""
 
-    def size(value: float) -> Any:
+    def size(value: Any) -> Any:
+        if isinstance(value, dict):  # drawn already
+            return value
         return {"log_uniform": [float(f"{k * value:.3g}") for k in (low, high)]} if value > 0.0 else value
 
     return {

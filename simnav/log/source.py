@@ -178,10 +178,12 @@ class LogSource:
         if heading is None and scenario.initial_error.attitude[2] >= _UNKNOWN_HEADING:
             heading = 0.0, "unknown"
         true_start, made = _start(reference, self.initial_truth, imu, begin, heading)
-        if "heading (unknown)" in made:
+        aligned = imu is not None and scenario.initial_error.unknown
+        if "heading (unknown)" in made and not aligned:
             warnings.warn(
                 f"{self._called()}: the heading at the start is unknown; only estimators that search it can use such a "
-                "start, as their lines in 'simnav list estimators' say; the others take it as nearly known",
+                "start, as their lines in 'simnav list estimators' say; the others take it as nearly known. With an "
+                "IMU and attitude_deg = [., ., 180] of [initial_error] all rows of simnav find it",
                 LogWarning,
                 2,
             )

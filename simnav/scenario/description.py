@@ -17,7 +17,7 @@ from simnav.scenario.catalogue import NAME, gym_id
 from simnav.sensors import AidSpec, AnyFault, AnyInstrument, ImuSpec
 from simnav.sensors.error_processes import in_sea
 from simnav.spec import Positive, Spec, entries, quantity
-from simnav.types import Array, Datasheet, Instruments
+from simnav.types import UNKNOWN_ANGLE, Array, Datasheet, Instruments
 from simnav.world import AnySurrounding, AnyVessel, Current, Manoeuvre, Sea, Ship, Start, Surroundings, Vessel, Voyage
 from simnav.world.depth_grid import DepthGrid
 from simnav.world.surroundings import BATHYMETRY, surround
@@ -48,7 +48,8 @@ class InitialError(Spec):
     attitude: Sigmas = quantity(
         "deg",
         tuple(math.radians(d) for d in (0.05, 0.05, 0.5)),
-        description="attitude error about north, east, down (the last is heading)",
+        description="attitude error about north, east, down (the last is heading); `[1, 1, 180]`: an unknown heading, "
+        "`[180, 180, 180]`: an unknown attitude",
     )
     times_told: dict[Literal["position", "velocity", "attitude"], Factor] = Field(
         {}, description="errors that really are so many times what an estimator is told, like `attitude = 10`"
@@ -62,6 +63,23 @@ class InitialError(Spec):
             least = "greater than 0" if min(value) <= 0.0 else f"finite and at least {SMALLEST:g} in SI units"
             raise ValueError(f"the initial covariance must be positive definite: every sigma should be {least}")
         return value
+
+    @field_validator("attitude")
+    @classmethod
+    def _whole(cls, value: Sigmas) -> Sigmas:
+        unknown = [v >= (1.0 - 1e-9) * UNKNOWN_ANGLE for v in value]
+        if any(unknown[:2]) and not all(unknown):
+            told = ", ".join(f"{math.degrees(v):g}" for v in value)
+            raise ValueError(
+                f"[{told}] deg: 180 deg is an angle of which nothing is known; without roll or pitch nothing of the "
+                "attitude is known: [180, 180, 180]; an unknown heading alone is [1, 1, 180]"
+            )
+        return value
+
+    @property
+    def unknown(self) -> bool:
+        """Whether nothing is known of the heading; see `simnav.types.InitialState.unknown`."""
+        return self.attitude[2] >= (1.0 - 1e-9) * UNKNOWN_ANGLE
 
     def covariance(self) -> Array:
         """(9, 9) covariance over `simnav.types.COMPONENTS` that an estimator receives."""

@@ -11,7 +11,7 @@ from simnav.log.source import LogSource
 from simnav.scenario.scenario import Scenario
 from simnav.sensors import AidSpec, DerivedInstrument
 from simnav.spec import SpecError, closest
-from simnav.types import KINDS, Array
+from simnav.types import KINDS, Array, TapStates
 
 __all__ = ["ErrorSeries", "instrument_of", "residuals"]
 
@@ -32,6 +32,8 @@ class ErrorSeries:
         Readings a second [Hz].
     duration : float
         Length of the run [s].
+    taps : TapStates or None
+        The motion at the n times, where it is known.
     """
 
     run: str
@@ -39,6 +41,7 @@ class ErrorSeries:
     error: Array
     rate: float
     duration: float
+    taps: TapStates | None = None
 
 
 def instrument_of(scenario: Scenario, name: str) -> AidSpec:
@@ -74,10 +77,14 @@ def residuals(scenario: Scenario, name: str) -> list[ErrorSeries]:
         exact = spec.ideal().install(name, 0, source.surroundings)
         if isinstance(exact, DerivedInstrument):
             raise SpecError(f"{scenario.id}: {name!r} reads another instrument; the reference does not say its reading")
-        value, _, _ = exact.reading(source.taps(stream.time))
+        taps = source.taps(stream.time)
+        value, _, _ = exact.reading(taps)
         error = KINDS[spec.kind].difference(stream.value, value)
         known = np.isfinite(error).all(axis=1)
         # The rate of the datasheet is a limit; the log says how often the instrument really speaks.
         rate = float(1.0 / np.median(np.diff(stream.time))) if len(stream.time) > 1 else spec.rate
-        found.append(ErrorSeries(recording or "recording", stream.time[known], error[known], rate, source.duration))
+        here = TapStates(**{name: getattr(taps, name)[known] for name in taps.__dataclass_fields__})
+        found.append(
+            ErrorSeries(recording or "recording", stream.time[known], error[known], rate, source.duration, here)
+        )
     return found

@@ -77,6 +77,7 @@ def test_every_scenario_tells_its_reader_what_it_is(header: Header):
         "cooperative",
         "imu-faults",
         "imu-faults-underwater",
+        "alignment",
     }
     assert scenario.track in tracks | {"training"}
     assert scenario.training == header.training == (scenario.track == "training")

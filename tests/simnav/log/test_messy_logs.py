@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
 import pytest
 
@@ -269,10 +271,15 @@ def test_a_vessel_that_starts_moored(tiny):
 
 
 def test_a_heading_that_nobody_knows(tiny):
-    moored(tiny).replace("attitude_deg = [0.1, 0.1, 1.0]", "attitude_deg = [0.1, 0.1, 180.0]")
+    moored(tiny).replace("attitude_deg = [0.1, 0.1, 1.0]", "attitude_deg = [0.1, 0.1, 120.0]")
     with pytest.warns(LogWarning, match="the heading at the start is unknown; only estimators that search it can use"):
         source = LogSource(tiny.scenario(), 0)
     assert "heading (unknown)" in source.note
+    assert source.start.unknown == ""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")  # rows with an IMU align themselves
+        source = LogSource(tiny.replace("[0.1, 0.1, 120.0]", "[0.1, 0.1, 180.0]").scenario(), 0)
+    assert source.start.unknown == "heading"
 
 
 def test_a_compass_gives_the_heading_of_a_moored_vessel(tiny):
