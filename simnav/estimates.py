@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -10,6 +10,8 @@ import numpy as np
 from simnav.types import Array, Estimate, Flags
 
 __all__ = ["Estimates"]
+
+_VECTORS = ("position", "velocity", "attitude", "covariance")
 
 
 @dataclass(eq=False, slots=True)
@@ -26,7 +28,7 @@ class Estimates:
         Covariances of the errors.
     estimated : (9,) bool array or None
         As of `Estimate`.
-    diagnostics : mapping of str to (t, ...) array
+    diagnostics : dict of str to (t, ...) array
         Diagnostics and further states by name, as a trial keeps them.
     flagged : list of (int, str, float)
         Number of the step, source and time of each measurement that is considered faulty, in order of the steps.
@@ -44,33 +46,28 @@ class Estimates:
     def __len__(self) -> int:
         return len(self.time)
 
-    def __iter__(self) -> Iterator[Estimate]:
-        """Each of them; further states are among the diagnostics."""
-        vectors = (self.position, self.velocity, self.attitude, self.covariance)
-        for k, time in enumerate(self.time.tolist()):
-            diagnostics = {n: a[k] if a.ndim > 1 else float(a[k]) for n, a in self.diagnostics.items()}
-            flags = [(source, when) for step, source, when in self.flagged if step == k]
-            yield Estimate(time, *(None if v is None else v[k] for v in vectors), self.estimated, diagnostics, flags)
-
     @staticmethod
-    def of(estimates: Sequence[Estimate]) -> Estimates:
-        """Estimates that hold the same vectors, components, diagnostics and states, in arrays.
+    def of(estimates: Iterable[Estimate]) -> Estimates:
+        """The vectors and the further states of estimates that all hold the same; diagnostics and flags are left out.
 
         Parameters
         ----------
-        estimates : sequence of Estimate
-            At least one.
+        estimates : iterable of Estimate
+            At least one. Each is copied before the next one is asked for.
         """
-
-        def stacked(name: str) -> Array | None:
-            return None if getattr(first, name) is None else np.array([getattr(e, name) for e in estimates])
-
-        first = estimates[0]
-        diagnostics = {name: np.array([e.diagnostics[name] for e in estimates]) for name in first.diagnostics}
-        for name in first.states:
-            for what, part in (("state", 0), ("sigma", 1)):
-                diagnostics[f"{what}.{name}"] = np.array([e.states[name][part] for e in estimates])
-        return Estimates(
-            np.array([e.time for e in estimates]), *map(stacked, ("position", "velocity", "attitude", "covariance")),
-            first.estimated, diagnostics, [(k, *flag) for k, e in enumerate(estimates) for flag in e.flagged],
-        )  # fmt: skip
+        times: list[float] = []
+        vectors: dict[str, list[Array]] = {}
+        states: dict[str, list[Array]] = {}
+        estimated = None
+        for estimate in estimates:
+            times.append(estimate.time)
+            estimated = estimate.estimated
+            for name in _VECTORS:
+                if (vector := getattr(estimate, name)) is not None:
+                    vectors.setdefault(name, []).append(np.array(vector))
+            for name, (value, sigma) in estimate.states.items():
+                states.setdefault(f"state.{name}", []).append(np.array(value))
+                states.setdefault(f"sigma.{name}", []).append(np.array(sigma))
+        arrays = {name: np.array(parts) for name, parts in vectors.items()}
+        diagnostics = {name: np.array(parts) for name, parts in states.items()}
+        return Estimates(np.array(times), **arrays, estimated=estimated, diagnostics=diagnostics)

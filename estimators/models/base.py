@@ -315,8 +315,9 @@ class ErrorModel(ABC):
         covariances : (t, n, n) array
             Their covariances.
         """
-        present, found = self.numbers.copy(), []
-        for self.numbers[:], covariance in zip(numbers, covariances, strict=True):
-            found.append(self.estimate(covariance))
+        present = self.numbers.copy()
+        found = Estimates.of(
+            self.estimate(covariance) for self.numbers[:], covariance in zip(numbers, covariances, strict=True)
+        )
         self.numbers[:] = present
-        return Estimates.of(found)
+        return found

@@ -203,9 +203,8 @@ class KalmanEstimator(Solver):
         known = self._admission.record, self._report
         flags = filter_steps.unchecked(self._filter, *known, arrivals, imu, readings, model.time, found)
         estimates = model.estimates(found.numbers, found.covariances)
-        estimates.diagnostics |= dict(zip(self._labels, found.reports.T))
-        if self._noise_report is not None:
-            estimates.diagnostics |= self._noise_report.table(found.reports[:, n:])
+        noise = {} if self._noise_report is None else self._noise_report.table(found.reports[:, n:])
+        estimates.diagnostics = {**dict(zip(self._labels, found.reports.T)), **noise, **estimates.diagnostics}
         estimates.flagged = [(int(k), self._names[int(row)], time) for k, row, time in found.flags[:flags].tolist()]
         return estimates
 

@@ -32,6 +32,7 @@ from .limits import why_it_died
 from .memory_group import MemoryGroup
 from .messages import LARGEST, Down, Up, command
 from .reachable_kernels import ALL
+from .replies import facts_in, trajectory_in
 from .resource_use import PROCESSES
 
 if TYPE_CHECKING:
@@ -403,7 +404,7 @@ class RemoteSession:
         simnav.trial.FailureError
             If that fails.
         """
-        facts = _facts(self._ask(Down.MAKE, (entrant, _search_path(), words)))
+        facts = facts_in(self._ask(Down.MAKE, (entrant, _search_path(), words)))
         name, needs = facts.get("name"), facts.get("needs")
         self.needs = tuple(tuple(n) if isinstance(n, list) else n for n in needs) if isinstance(needs, list) else needs
         self.name = name[:200] if isinstance(name, str) else ""
@@ -416,12 +417,12 @@ class RemoteSession:
         simnav.trial.FailureError
             If it cannot be found.
         """
-        return _facts(self._ask(Down.DESCRIBE, (entrant, _search_path(), [0])))
+        return facts_in(self._ask(Down.DESCRIBE, (entrant, _search_path(), [0])))
 
     def begin(self, recording: Recording, packets: PacketEncoder) -> None:
         """Hand over start and datasheets."""
         homes = homes_of_kinds(recording.instruments)
-        facts = _facts(self._ask(Down.RESET, (recording.start, recording.instruments, packets.streams, homes)))
+        facts = facts_in(self._ask(Down.RESET, (recording.start, recording.instruments, packets.streams, homes)))
         self.observed = facts.get("observes")
 
     def run(self, packets: PacketEncoder, log: TrialLog) -> None:
@@ -498,7 +499,7 @@ class RemoteSession:
             return None
         if reply[0] != Up.TRAJECTORY:
             self._refuse(reply)
-        return _trajectory(reply[ANSWER.size :])
+        return trajectory_in(reply[ANSWER.size :])
 
     def describe(self, error: BaseException) -> str:
         """What an exception says that was raised here."""
@@ -509,7 +510,7 @@ class RemoteSession:
         if self._silent:
             return
         try:
-            names = _facts(self._ask(Down.END, None)).get("libraries", [])
+            names = facts_in(self._ask(Down.END, None)).get("libraries", [])
         except (FailureError, InvalidOutputError):
             return
         if isinstance(names, list):
@@ -589,32 +590,3 @@ class RemoteSession:
 def _search_path() -> list[str]:
     """Where this process finds modules, for one in another folder: an empty entry is the folder that we are in."""
     return [os.path.abspath(entry) for entry in sys.path]
-
-
-def _facts(reply: bytes) -> dict[str, Any]:
-    """The JSON object in an answer."""
-    try:
-        facts = json.loads(reply[ANSWER.size :] or b"{}")
-    except (ValueError, RecursionError):
-        facts = None
-    if not isinstance(facts, dict):
-        raise InvalidOutputError("the answer is not in the form of an estimate")
-    return facts
-
-
-def _trajectory(body: bytes) -> NavigationStates:
-    """Four arrays: their shapes in JSON, then their numbers."""
-    try:
-        begin = 8 + int.from_bytes(body[:8])
-        shapes = [tuple(map(int, shape)) for shape in json.loads(body[8:begin])]
-        arrays = []
-        for shape in shapes:
-            if any(s < 0 for s in shape):
-                raise ValueError
-            count = int(np.prod(shape, dtype=object)) if shape else 1
-            arrays.append(np.frombuffer(body, np.float64, count, begin).reshape(shape))
-            begin += 8 * count
-        time_, position, velocity, attitude = arrays
-    except (ValueError, TypeError, RecursionError, OverflowError):
-        raise InvalidOutputError("the trajectory is not in the form of arrays") from None
-    return NavigationStates(time_, position, velocity, attitude)
