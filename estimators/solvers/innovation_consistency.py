@@ -38,7 +38,7 @@ BOUND = 2.0
 #: there have been so many; of the last ones bounded, with their sums; the last sum over its degrees of freedom; and for
 #: how many epochs in a row each sum has been improbable.
 TEST = structure(
-    sum=float, freedom=float, epochs=int, sums=EPOCHS, freedoms=EPOCHS, bounded=LONG, long_freedoms=LONG,
+    total=float, freedom=float, epochs=int, sums=EPOCHS, freedoms=EPOCHS, bounded=LONG, long_freedoms=LONG,
     long_sum=float, long_freedom=float, variance_factor=float, improbable=int, lasting=int,
 )  # fmt: skip
 
@@ -52,7 +52,7 @@ def begun_test() -> Array:
 def add_square(memory: Array, nis: float, freedom: float) -> None:
     """Add a normalised innovation squared, and its degrees of freedom, to the present epoch."""
     test = memory.view(TEST)[0]
-    test.sum += nis
+    test.total += nis
     test.freedom += freedom
 
 
@@ -64,23 +64,23 @@ def end_epoch(memory: Array) -> None:
     if freedom == 0.0:
         return
     newest = test.epochs % EPOCHS
-    test.sums[newest], test.freedoms[newest] = test.sum, freedom
-    total, of_total = 0.0, 0.0
+    test.sums[newest], test.freedoms[newest] = test.total, freedom
+    squares, freedoms = 0.0, 0.0
     for k in range(EPOCHS):  # the oldest first; before there are so many, the first ones are zero
         at = (newest + 1 + k) % EPOCHS
-        total += test.sums[at]
-        of_total += test.freedoms[at]
-    test.variance_factor = total / of_total
-    test.improbable = test.improbable + 1 if chi_square_deviate(total, of_total) > IMPROBABLE else 0
+        squares += test.sums[at]
+        freedoms += test.freedoms[at]
+    test.variance_factor = squares / freedoms
+    test.improbable = test.improbable + 1 if chi_square_deviate(squares, freedoms) > IMPROBABLE else 0
     oldest = test.epochs % LONG
-    bounded, its_freedom = test.sum if test.sum < BOUND * freedom else BOUND * freedom, test.long_freedoms[oldest]
+    bounded, its_freedom = test.total if test.total < BOUND * freedom else BOUND * freedom, test.long_freedoms[oldest]
     test.long_sum += bounded - test.bounded[oldest]
     test.long_freedom += freedom - its_freedom
     test.bounded[oldest], test.long_freedoms[oldest] = bounded, freedom
     if its_freedom > 0.0:  # from then on there are so many epochs
         test.lasting = test.lasting + 1 if chi_square_deviate(test.long_sum, test.long_freedom) > IMPROBABLE else 0
     test.epochs += 1
-    test.sum, test.freedom = 0.0, 0.0
+    test.total, test.freedom = 0.0, 0.0
 
 
 @helper
