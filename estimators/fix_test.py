@@ -14,7 +14,7 @@ the estimate after the step, with the datasheet's noise, bias and the covariance
 from __future__ import annotations
 
 from dataclasses import replace
-from math import cos, hypot, isfinite, sin, sqrt
+from math import cos, hypot, isfinite, nan, sin, sqrt
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -23,17 +23,18 @@ from simnav.compiled import helper, kernel, ready
 from simnav.estimates import Estimates
 from simnav.estimators.algebra.chi_square import chi_square_limits, normal_quantile
 from simnav.geometry.earth import radii_scalar
-from simnav.kernel_types import FlagVector, IntegerVector, Matrix, Vector
+from simnav.kernel_types import IntegerVector, Matrix, Vector
 from simnav.kinds import kinds_with
 from simnav.records import Record
 from simnav.steps import Steps
-from simnav.types import Array, Datasheet, Estimate, Flags, Instruments, Measurements
+from simnav.types import Array, Datasheet, Estimate, Instruments, Measurement, Measurements
 
 from .persistence import Courses, add_innovation, is_correlated, is_large, no_innovations
 
 __all__ = ["FixTest"]
 
 _SAME = 1e-6  # a fix from before the step by less than this is of the step [s]
+_STILL = np.zeros(3)
 
 
 class _Receivers(Record):
@@ -103,8 +104,15 @@ def _add_fix(receivers: _Receivers, row: int, time: float, latitude: float, long
         receivers.against[row] = receivers.against[row] + 1 if against else 0
 
 
+@kernel
+def _judge_fix(receivers: _Receivers, row: int, fix: tuple[float, float, float], estimate: _Estimate) -> int:
+    """Compare a fix, its time, latitude and longitude; how many in a row contradict, of the worst receiver."""
+    _add_fix(receivers, row, fix[0], fix[1], fix[2], estimate)
+    return int(receivers.against.max())
+
+
 class _Fixes(NamedTuple):
-    """The fixes of t steps.
+    """The fixes of several steps.
 
     Attributes
     ----------
@@ -133,22 +141,19 @@ class _Answers(NamedTuple):
 
 
 @kernel
-def _judge(receivers: _Receivers, fixes: _Fixes, answers: _Answers, patience: int, found: FlagVector) -> None:
-    """Compare fixes with the estimates; ``found`` (t,) says after which steps the fixes contradict them.
-
-    Its first value before is whether they did before the first step.
-    """
-    k, contradicted = 0, found[0]
-    for step in range(answers.time.size):
+def _judge_fixes(receivers: _Receivers, fixes: _Fixes, answers: _Answers, worst: IntegerVector) -> None:
+    """Compare fixes with the estimates after their steps; ``worst`` (t,) is that of `_judge_fix` after each step."""
+    k, against = 0, receivers.against.max()
+    for step in range(worst.size):
         while k < fixes.step.size and fixes.step[k] == step:
             estimate = _Estimate(
                 answers.time[step], answers.position[step], answers.velocity[step], answers.heading[step],
                 answers.variance[step, 0], answers.variance[step, 1],
             )  # fmt: skip
             _add_fix(receivers, fixes.receiver[k], fixes.time[k], fixes.place[k, 0], fixes.place[k, 1], estimate)
-            contradicted = receivers.against.max() >= patience
+            against = receivers.against.max()
             k += 1
-        found[step] = contradicted
+        worst[step] = against
 
 
 class FixTest:
@@ -197,46 +202,46 @@ class FixTest:
         -------
         Estimate
         """
-        if self._rows:
-            fixes = [
-                (self._rows[m.instrument], m.time, *m.value[:2].tolist())
-                for m in measurements.aids
-                if m.instrument in self._rows and m.time > measurements.start - _SAME
-            ]
-            if fixes:
-                rows, times, *places = map(np.array, zip(*fixes))
-                vectors = (estimate.position, estimate.velocity, estimate.attitude, estimate.covariance)
-                one = Estimates(np.array([estimate.time]), *(None if v is None else v[None] for v in vectors))
-                self._compare(_Fixes(np.zeros(len(rows), np.int64), rows, times, np.column_stack(places)), one)
+        if self._rows and estimate.position is not None and estimate.covariance is not None:
+            for m in measurements.aids:
+                if m.instrument in self._rows and m.time > measurements.start - _SAME:
+                    self._add(m, estimate, estimate.position, estimate.covariance)
         if not self.contradicted:
             return estimate
         return replace(estimate, diagnostics={**estimate.diagnostics, "inconsistent": 1.0})
 
+    def _add(self, m: Measurement, estimate: Estimate, position: Array, covariance: Array) -> None:
+        """Add a fix of this step."""
+        velocity = _STILL if estimate.velocity is None else ready(estimate.velocity)
+        heading = nan if estimate.attitude is None else float(estimate.attitude[2])
+        variances = float(covariance[0, 0]), float(covariance[1, 1])
+        answer = _Estimate(estimate.time, ready(position), velocity, heading, *variances)
+        fix: list[float] = m.value.tolist()
+        worst = _judge_fix.unchecked(self._receivers, self._rows[m.instrument], (m.time, fix[0], fix[1]), answer)
+        self.contradicted = worst >= self.PATIENCE
+
     def judge_all(self, steps: Steps, estimates: Estimates) -> None:
         """Judge the estimates of several steps; they are changed."""
+        position, covariance, t = estimates.position, estimates.covariance, len(estimates)
+        if not self._rows or position is None or covariance is None:
+            return
         row_of = np.array([self._rows.get(stream.name, -1) for stream in steps.streams], np.int64)
-        rows, step = row_of[steps.instrument.astype(np.intp)], np.repeat(np.arange(len(steps)), np.diff(steps.readings))
+        rows, step = row_of[steps.instrument.astype(np.intp)], np.repeat(np.arange(t), np.diff(steps.readings))
         starts = np.array([steps.start, *steps.ends[:-1]])
         at = np.flatnonzero((rows >= 0) & (steps.time > starts[step] - _SAME))
-        place = np.ascontiguousarray(steps.numbers[at, :2])
-        found = self._compare(_Fixes(step[at], rows[at], steps.time[at], place), estimates)
-        if found.any():
-            estimates.diagnostics["inconsistent"] = np.where(found, 1.0, estimates.diagnostics["inconsistent"])
-
-    def _compare(self, fixes: _Fixes, estimates: Estimates) -> Flags:
-        """Compare fixes with estimates; after which of these they contradict them."""
-        found, t = np.full(len(estimates), self.contradicted), len(estimates)
-        if estimates.position is not None and estimates.covariance is not None:
-            velocity, attitude = estimates.velocity, estimates.attitude
-            answers = _Answers(
-                ready(estimates.time), ready(estimates.position),
-                np.zeros((t, 3)) if velocity is None else ready(velocity),
-                np.full(t, np.nan) if attitude is None else ready(attitude[:, 2]),
-                ready(estimates.covariance.diagonal(axis1=1, axis2=2)[:, :2]),
-            )  # fmt: skip
-            _judge.unchecked(self._receivers, fixes, answers, self.PATIENCE, found)
-            self.contradicted = bool(found[-1])
-        return found
+        fixes = _Fixes(step[at], rows[at], steps.time[at], np.ascontiguousarray(steps.numbers[at, :2]))
+        answers = _Answers(
+            ready(estimates.time), ready(position),
+            np.zeros((t, 3)) if estimates.velocity is None else ready(estimates.velocity),
+            np.full(t, nan) if estimates.attitude is None else ready(estimates.attitude[:, 2]),
+            ready(covariance.diagonal(axis1=1, axis2=2)[:, :2]),
+        )  # fmt: skip
+        worst = np.empty(t, np.int64)
+        _judge_fixes.unchecked(self._receivers, fixes, answers, worst)
+        contradicted = worst >= self.PATIENCE
+        self.contradicted = bool(contradicted[-1])
+        if contradicted.any():
+            estimates.diagnostics["inconsistent"] = np.where(contradicted, 1.0, estimates.diagnostics["inconsistent"])
 
 
 def _variance(sheet: Datasheet) -> Array:

@@ -68,6 +68,5 @@ class Estimates:
             for name, (value, sigma) in estimate.states.items():
                 states.setdefault(f"state.{name}", []).append(np.array(value))
                 states.setdefault(f"sigma.{name}", []).append(np.array(sigma))
-        arrays = {name: np.array(parts) for name, parts in vectors.items()}
-        diagnostics = {name: np.array(parts) for name, parts in states.items()}
-        return Estimates(np.array(times), **arrays, estimated=estimated, diagnostics=diagnostics)
+        arrays = [np.array(vectors[name]) if name in vectors else None for name in _VECTORS]
+        return Estimates(np.array(times), *arrays, estimated, {name: np.array(parts) for name, parts in states.items()})
