@@ -68,5 +68,7 @@ class Estimates:
             for name, (value, sigma) in estimate.states.items():
                 states.setdefault(f"state.{name}", []).append(np.array(value))
                 states.setdefault(f"sigma.{name}", []).append(np.array(sigma))
-        arrays = [np.array(vectors[name]) if name in vectors else None for name in _VECTORS]
-        return Estimates(np.array(times), *arrays, estimated, {name: np.array(parts) for name, parts in states.items()})
+        arrays = (np.array(vectors[name]) if name in vectors else None for name in _VECTORS)
+        position, velocity, attitude, covariance = arrays
+        diagnostics = {name: np.array(parts) for name, parts in states.items()}
+        return Estimates(np.array(times), position, velocity, attitude, covariance, estimated, diagnostics)
