@@ -225,11 +225,9 @@ class FixTest:
         position, covariance, t = estimates.position, estimates.covariance, len(estimates)
         if not self._rows or position is None or covariance is None:
             return
-        row_of = np.array([self._rows.get(stream.name, -1) for stream in steps.streams], np.int64)
-        rows, step = row_of[steps.instrument.astype(np.intp)], np.repeat(np.arange(t), np.diff(steps.readings))
-        starts = np.array([steps.start, *steps.ends[:-1]])
+        rows, step, starts = steps.rows_of(self._rows), steps.step, np.array([steps.start, *steps.ends[:-1]])
         at = np.flatnonzero((rows >= 0) & (steps.time > starts[step] - _SAME))
-        fixes = _Fixes(step[at], rows[at], steps.time[at], np.ascontiguousarray(steps.numbers[at, :2]))
+        fixes = _Fixes(step[at], rows[at], steps.time[at], np.ascontiguousarray(steps.rows[at, 2:4]))
         answers = _Answers(
             ready(estimates.time), ready(position),
             np.zeros((t, 3)) if estimates.velocity is None else ready(estimates.velocity),

@@ -188,10 +188,9 @@ class KalmanEstimator(Solver):
         model, n, t = self.model, len(self._labels), len(steps)
         model.load(steps.imu)
         rows = {name: row for row, name in enumerate(self._names)}
-        row_of = np.array([rows.get(stream.name, -1) for stream in steps.streams], np.int64)
         arrivals = Arrivals(
-            ready(steps.ends), np.ascontiguousarray(steps.readings), row_of[steps.instrument.astype(np.intp)],
-            ready(steps.time), ready(steps.numbers[:, :3]),
+            np.array(steps.ends), np.array(steps.readings), steps.rows_of(rows), ready(steps.time),
+            ready(steps.rows[:, 2:5]),
         )  # fmt: skip
         size = model.size
         found = StepStates(
@@ -199,7 +198,7 @@ class KalmanEstimator(Solver):
             np.empty((len(steps.time), 3)),
         )  # fmt: skip
         readings = self._arrays.room(int(np.diff(steps.readings).max(initial=0)))
-        imu = model.samples, np.ascontiguousarray(steps.samples)
+        imu = model.samples, np.array(steps.samples)
         known = self._admission.record, self._report
         flags = filter_steps.unchecked(self._filter, *known, arrivals, imu, readings, model.time, found)
         estimates = model.estimates(found.numbers, found.covariances)

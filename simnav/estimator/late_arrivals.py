@@ -90,8 +90,8 @@ def is_untimely(measurements: Measurements) -> bool:
 
 def are_untimely(steps: Steps) -> bool:
     """Whether one of several packets has a reading from before or after its step."""
-    count = np.diff(steps.readings)
-    first, last = np.repeat([steps.start, *steps.ends[:-1]], count), np.repeat(steps.ends, count)
+    edges, step = np.array([steps.start, *steps.ends]), steps.step
+    first, last = edges[step], edges[step + 1]
     return not bool(((first - _LATE <= steps.time) & (steps.time <= last + _LATE)).all())
 
 

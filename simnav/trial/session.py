@@ -256,8 +256,7 @@ def answers_to(estimator: Estimator, steps: Steps, encode: EstimateEncoder) -> I
     if together is not None:
         yield encode.each(together), 1e-9 * (time.perf_counter_ns() - started) / len(steps)
         return
-    for k in range(len(steps)):
-        measurements = steps[k]
+    for measurements in steps:
         started = time.perf_counter_ns()
         estimate = estimator.update(measurements)
         seconds = 1e-9 * (time.perf_counter_ns() - started)

@@ -16,6 +16,7 @@ from __future__ import annotations
 import json
 import math
 import struct
+from array import array
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
@@ -97,8 +98,8 @@ class PacketEncoder:
         streams = list(data.aids.values())
         self.streams = [Stream(s.name, s.kind, s.value.shape[1], s.channels, s.side.shape[1]) for s in streams]
         parts = [_numbers(s) for s in streams]
-        self._ends, self._start = np.array(ends, dtype=np.float64), float(data.start)
-        edges = self._ends + TIME_TOLERANCE
+        self._ends, self._start = [float(t) for t in ends], float(data.start)
+        edges = np.array(self._ends) + TIME_TOLERANCE
         rows = np.zeros((sum(map(len, parts)), 2 + max([_LEAST, *(p.shape[1] for p in parts)])))
         begin = 0
         for number, (stream, own) in enumerate(zip(streams, parts, strict=True)):
@@ -108,13 +109,13 @@ class PacketEncoder:
         step = np.concatenate([np.searchsorted(edges, s.arrivals) for s in streams] or [np.empty(0, np.intp)])
         order = np.lexsort((rows[:, 1], step))  # stable: ties keep the scenario's order of instruments
         self._rows = rows[order]
-        self._readings = _firsts(step[order], len(edges))
+        self._readings: list[int] = np.searchsorted(step[order], np.arange(len(edges) + 1)).tolist()
         self._imu: tuple[Array, ...] | None = None
-        self._samples = np.zeros(len(edges) + 1, np.int64)
+        self._samples = [0] * (len(edges) + 1)
         if data.imu is not None:
             arrays = (data.imu.time, data.imu.interval, data.imu.angular_rate, data.imu.specific_force)
             self._imu = tuple(np.ascontiguousarray(a, dtype=np.float64) for a in arrays)
-            self._samples[1:] = np.searchsorted(data.imu.time, edges, side="right")
+            self._samples[1:] = np.searchsorted(data.imu.time, edges, side="right").tolist()
 
     def __len__(self) -> int:
         return len(self._ends)
@@ -125,12 +126,12 @@ class PacketEncoder:
 
     def of(self, first: int, last: int) -> list[Any]:
         """The packet of the steps from the first to before the last, likewise."""
-        samples, readings = self._samples[first : last + 1], self._readings[first : last + 1]
-        i, j, a, b = (int(x) for x in (samples[0], samples[-1], readings[0], readings[-1]))
-        start = float(self._ends[first - 1]) if first else self._start
+        i, j, a, b = self._samples[first], self._samples[last], self._readings[first], self._readings[last]
+        start = self._ends[first - 1] if first else self._start
         count, width = _NO_IMU if self._imu is None else j - i, self._rows.shape[1]
-        buffers: list[Any] = [_PACKET.pack(count, b - a, last - first, width, 0, start)]
-        buffers += [self._ends[first:last], samples - i, readings - a]
+        firsts = [x - i for x in self._samples[first : last + 1]] + [x - a for x in self._readings[first : last + 1]]
+        head = _PACKET.pack(count, b - a, last - first, width, 0, start)
+        buffers: list[Any] = [head + struct.pack(_edges(last - first), *self._ends[first:last], *firsts)]
         if self._imu is not None and j > i:
             buffers += [part[i:j] for part in self._imu]
         if b > a:
@@ -138,9 +139,9 @@ class PacketEncoder:
         return buffers
 
 
-def _firsts(step: NDArray[np.intp], count: int) -> NDArray[np.int64]:
-    """(count + 1,) array: the index of the first of some things of each step, and their number, from their steps."""
-    return np.searchsorted(step, np.arange(count + 1)).astype(np.int64)
+def _edges(steps: int) -> str:
+    """The form of the ends of some steps, and of the first sample and the first reading of each."""
+    return f"{steps}d{2 * steps + 2}q"
 
 
 def _numbers(stream: AidStream) -> Array:
@@ -176,15 +177,14 @@ class PacketDecoder:
         """The packet; its arrays are views of the buffer, which should not be used again."""
         n, count, t, width, _, start = _PACKET.unpack_from(packet)
         values = np.frombuffer(packet, dtype=np.float64, offset=_PACKET.size)
-        firsts, i, imu = values[t : 3 * t + 2].view(np.int64), 3 * t + 2, None
+        edges = struct.unpack_from(_edges(t), packet, _PACKET.size)
+        i, imu = len(edges), None
         if n != _NO_IMU:
             parts = (values[i : i + n], values[i + n : i + 2 * n], values[i + 2 * n : i + 5 * n].reshape(n, 3))
             imu = ImuSamples(*parts, values[i + 5 * n : i + 8 * n].reshape(n, 3))
             i += _IMU_WIDTH * n
         rows = values[i : i + width * count].reshape(count, width)
-        return Steps(
-            start, values[:t], imu, firsts[: t + 1], firsts[t + 1 :], rows[:, 0], rows[:, 1], rows[:, 2:], self._streams
-        )
+        return Steps(start, edges[:t], imu, edges[t : 2 * t + 1], edges[2 * t + 1 :], rows, self._streams)
 
 
 # --- answers ------------------------------------------------------------------------------------------
@@ -199,6 +199,7 @@ class EstimateEncoder:
 
     def __init__(self) -> None:
         self._shapes: dict[tuple[tuple[str, tuple[int, ...]], ...], int] = {(): 0}
+        self._of_numbers: dict[tuple[str, ...], int] = {}  # the shapes of diagnostics that are single numbers
 
     def __call__(self, estimate: object) -> bytes:
         """The answer.
@@ -232,19 +233,26 @@ class EstimateEncoder:
         shape, tail = 0, b""
         more: dict[str, Any] = {}
         diagnostics = _with_states(estimate) if estimate.states else estimate.diagnostics
-        if diagnostics:
+        names = tuple(diagnostics)
+        single = set(map(type, diagnostics.values())) == {float}  # nearly always
+        if single and names in self._of_numbers:
+            shape = self._of_numbers[names]
+            parts.append(array("d", diagnostics.values()).tobytes())
+        elif diagnostics:
             signature = []
             for key, value in diagnostics.items():
                 if type(value) is float:
                     signature.append((str(key), ()))
                     parts.append(_DOUBLE.pack(value))
                     continue
-                array = real_array(value, f"diagnostic {key!r}", None)
-                signature.append((str(key), array.shape))
-                parts.append(array.tobytes())
+                numbers = real_array(value, f"diagnostic {key!r}", None)
+                signature.append((str(key), numbers.shape))
+                parts.append(numbers.tobytes())
             shape, new = self._shape(tuple(signature))
             if new:
                 more["shape"] = signature
+            if single and set(map(type, names)) == {str}:
+                self._of_numbers[names] = shape
         flagged = [_flag(item) for item in estimate.flagged]
         if flagged:
             if len(flagged) > 0xFFFF:
