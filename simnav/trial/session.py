@@ -218,8 +218,9 @@ class _LocalSession:
         self.estimator.reset(copy.deepcopy(recording.start), copy.deepcopy(recording.instruments))
 
     def run(self, packets: PacketEncoder, log: TrialLog) -> None:
-        for first in range(0, len(packets), TOGETHER):
-            steps = self._decode(bytearray(b"".join(packets.of(first, min(first + TOGETHER, len(packets))))))
+        size = TOGETHER if type(self.estimator).update_all is not Estimator.update_all else 1
+        for first in range(0, len(packets), size):
+            steps = self._decode(bytearray(b"".join(packets.of(first, min(first + size, len(packets))))))
             for answers, seconds in answers_to(self.estimator, steps, self._encode):
                 for answer in answers:
                     log.put(answer, seconds)
