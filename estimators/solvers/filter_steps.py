@@ -85,7 +85,10 @@ def filter_steps(
                 flag = states.flags[flags]
                 flag[0], flag[1], flag[2] = step, readings.instrument[k], readings.time[k]
                 flags += 1
-        states.numbers[step, :] = dynamics.numbers
-        states.covariances[step, :, :] = dynamics.covariance
+        for i in range(dynamics.numbers.size):
+            states.numbers[step, i] = dynamics.numbers[i]
+        for i in range(dynamics.covariance.shape[0]):
+            for j in range(dynamics.covariance.shape[0]):
+                states.covariances[step, i, j] = dynamics.covariance[i, j]
         since = max(since, until)
     return flags
