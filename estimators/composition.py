@@ -27,9 +27,19 @@ from dataclasses import dataclass, field
 from functools import cache
 from typing import Any, ClassVar
 
+from simnav.estimates import Estimates
 from simnav.estimator import Estimator, Needs, UnsuitableScenario, lacking
-from simnav.estimator.late_arrivals import LateArrivals, Manner, TrueTimes, is_untimely, parts_of, true_times
+from simnav.estimator.late_arrivals import (
+    LateArrivals,
+    Manner,
+    TrueTimes,
+    are_untimely,
+    is_untimely,
+    parts_of,
+    true_times,
+)
 from simnav.estimator.parameters import former_names, under_present_names
+from simnav.steps import Steps
 from simnav.types import Array, Estimate, InitialState, Instruments, Measurements, NavigationStates
 
 from .coarse_alignment import CoarseAlignment
@@ -309,6 +319,15 @@ class Row(Estimator):
         else:
             self.solver, estimate = self._late.update(self.solver, measurements)
         return estimate if self._fix_test is None else self._fix_test.judge(measurements, estimate)
+
+    def update_all(self, steps: Steps) -> Estimates | None:
+        """Take several steps by one call, if the solver does and no reading is late."""
+        if self._late is not None or type(self).update is not Row.update or are_untimely(steps):
+            return None
+        estimates = self.solver.update_all(steps)
+        if estimates is not None and self._fix_test is not None:
+            self._fix_test.judge_all(steps, estimates)
+        return estimates
 
     def smooth(self) -> NavigationStates | None:
         """The trajectory of a solver that smooths; else None."""

@@ -232,7 +232,7 @@ class AdaptiveFactor(NoiseAdaptation):
             return innovation.noise
         if self.target == "P":
             self.inflation = self.prediction.limited(1.0 / factor, innovation)
-        self.report(self._further[innovation.measurement.instrument], factor)
+        self.report_number(innovation.measurement.instrument, factor)
         return innovation.noise if self.target == "P" or factor == 1.0 else noise
 
     def _statistic(self, innovation: Innovation) -> float:

@@ -332,7 +332,7 @@ class InnovationBased(EstimatedNoise):
         m, residual, predicted, nominal, *_ = innovation
         own, noise = self.memory_of(m.instrument), nominal
         found = self.ask(innovation_noise, innovation, np.empty_like(nominal))
-        self.report(self._further[m.instrument], self.said(found))
+        self.report_number(m.instrument, found)
         if found < 0.0:
             elements = own[1][:_HEAD].view(MEMORY)[0].estimate[: nominal.size]
             noise = self.bounded(elements.reshape(nominal.shape), nominal)
@@ -340,9 +340,9 @@ class InnovationBased(EstimatedNoise):
             _remember(*own, residual, predicted, noise)
         return noise
 
-    def said(self, number: float) -> float:
+    def said(self, numbers: Array) -> Array:
         """The length of the window; the number has a sign."""
-        return int(abs(number))
+        return np.floor(np.abs(numbers))
 
 
 class FixedWindow(InnovationBased):

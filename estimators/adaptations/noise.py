@@ -14,6 +14,7 @@ from simnav.types import KINDS, Array, Instruments
 
 from .base import Adaptation, Innovation
 from .choice import Choice, choose_noise
+from .noise_report import NoiseReport
 from .prediction import PredictionTest
 from .scaled_noise import bound, scale
 
@@ -96,16 +97,11 @@ class NoiseAdaptation(Adaptation):
     def reset(self, instruments: Instruments) -> None:
         """Begin a run."""
         self.prediction = PredictionTest(instruments, self.together)
-        self._labels = {n: [f"sigma_{e}.{n}" for e in KINDS[s.kind].errors] for n, s in instruments.items()}
-        self._report: dict[str, float | Array] = {}
-        for name, sheet in instruments.items():
-            self._report.update(zip(self._labels[name], map(float, sheet.sigma)))
-        self._noted: dict[str, tuple[Sequence[float], float]] = {}
-        self._further = {name: f"{self.reported}.{name}" for name in instruments}
+        self.report = NoiseReport(instruments, list(instruments), self.reported, self.said)
         self.instruments, self.index = instruments, {name: i for i, name in enumerate(instruments)}
         self.longer = {name: max(sheet.rate, 1.0) for name, sheet in instruments.items()}
         self.rule_settings = np.array([self.settings_of(longer) for longer in self.longer.values()], dtype=np.float64)
-        begun = [self.begun(longer, len(self._labels[name])) for name, longer in self.longer.items()]
+        begun = [self.begun(n, len(KINDS[instruments[name].kind].errors)) for name, n in self.longer.items()]
         self.rule_first = np.cumsum([0, *map(len, begun)])
         self.rule_memory = np.concatenate([*begun, np.empty(0)])
         self.rule_common = self.begun_together()
@@ -167,7 +163,7 @@ class NoiseAdaptation(Adaptation):
         self.inflation = float(reading.inflation[0])
         if reading.rejected[0]:
             return None
-        self.noted(m.instrument, reading.sigma[0].tolist(), float(reading.reported[0]))
+        self.report.note(row, reading.sigma[0].tolist(), float(reading.reported[0]))
         return prediction.noise
 
     def _ask(
@@ -190,25 +186,17 @@ class NoiseAdaptation(Adaptation):
         """The (m, m) noise to use, or None to reject the measurement; for an adaptation without a rule."""
         raise NotImplementedError(f"{type(self).__name__} has neither a rule nor a method choose")
 
-    def noted(self, name: str, sigma: Sequence[float], number: float) -> None:
-        """Report the sigmas that were chosen for an instrument, and the number of the rule if it is not 0."""
-        if sigma[0] == sigma[0] and (sigma, number) != self._noted.get(name):
-            self._noted[name] = sigma, number
-            self._report.update(zip(self._labels[name], sigma))
-            if number and self.reported:
-                self._report[self._further[name]] = self.said(number)
+    def said(self, numbers: Array) -> Array:
+        """The numbers that a rule returns, as they are reported."""
+        return numbers
 
-    def said(self, number: float) -> float:
-        """The number that a rule returns, as it is reported."""
-        return number
-
-    def report(self, label: str, value: float) -> None:
-        """Set a diagnostic. It keeps its value until the next call."""
-        self._report[label] = value
+    def report_number(self, name: str, number: float) -> None:
+        """Report a number of an instrument. It stays until the next one."""
+        self.report.values[self.index[name], 3] = number
 
     def diagnostics(self) -> dict[str, float | Array]:
         """The sigmas last used, and other reported values."""
-        return self._report
+        return self.report.diagnostics()
 
 
 class WeightedNoise(NoiseAdaptation):

@@ -124,7 +124,7 @@ class EquivalentWeights(WeightedNoise):
         """The noise divided by the weights; the smallest weight is reported."""
         components = standardised(innovation.residual, innovation.predicted, innovation.noise)
         least = max(self.weight(max(map(abs, components))), self.smallest)
-        self.report(self._further[innovation.measurement.instrument], least)
+        self.report_number(innovation.measurement.instrument, least)
         if least == 1.0:
             return innovation.noise
         weights = [max(self.weight(u), self.smallest) for u in components[: len(innovation.residual)]]

@@ -9,6 +9,7 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
+from simnav.estimates import Estimates
 from simnav.estimator.needs import Needs
 from simnav.estimators.algebra.inflation import MotionStates, inflate_motion
 from simnav.geometry.rotation import left_jacobian
@@ -66,6 +67,8 @@ class ErrorModel(ABC):
         Number n of components of the error.
     time : float
         Time of the state [s].
+    numbers : (s,) array
+        The flat state, of a model with `functions`.
     own : mapping of str to MeasurementFunction
         The observed instruments whose kind has a measurement equation of its own.
     many : sequence of ChannelReadings
@@ -74,6 +77,7 @@ class ErrorModel(ABC):
 
     size: int
     time: float
+    numbers: Array
     own: Mapping[str, MeasurementFunction] = MappingProxyType({})
     many: Sequence[ChannelReadings] = ()
     #: Whether `estimate` reports all states of instruments (`simnav.types.Estimate.states`), or only the blocks that
@@ -300,3 +304,20 @@ class ErrorModel(ABC):
     @abstractmethod
     def estimate(self, covariance: Array) -> Estimate:
         """The state as an estimate at the present time."""
+
+    def estimates(self, numbers: Array, covariances: Array) -> Estimates:
+        """`estimate` at several states, for a model with `functions`.
+
+        Parameters
+        ----------
+        numbers : (t, s) array
+            The flat states.
+        covariances : (t, n, n) array
+            Their covariances.
+        """
+        present = self.numbers.copy()
+        found = Estimates.of(
+            self.estimate(covariance) for self.numbers[:], covariance in zip(numbers, covariances, strict=True)
+        )
+        self.numbers[:] = present
+        return found

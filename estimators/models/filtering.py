@@ -264,11 +264,15 @@ class ReadingsOfSteps:
         """Number of components of an instrument."""
         return self._row[instrument][1]
 
+    def room(self, count: int) -> Readings:
+        """Room for so many readings at least; those of the call before are there until they are overwritten."""
+        if count > len(self._readings.time):
+            self._readings = room_for(2 * count)
+        return self._readings
+
     def fill(self, measurements: Sequence[Measurement]) -> Readings:
         """The measurements as arrays; those of the call before are overwritten."""
-        into, count = self._readings, len(measurements)
-        if count > len(into.time):
-            into = self._readings = room_for(2 * count)
+        into = self.room(len(measurements))
         for k, m in enumerate(measurements):
             (into.instrument[k], into.components[k]), into.time[k] = self._row[m.instrument], m.time
             into.value[k, : len(m.value)] = m.value

@@ -40,6 +40,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simnav.compiled import ready
+from simnav.estimates import Estimates
 from simnav.estimator import UnsuitableScenario
 from simnav.estimator.needs import AID, IMU, Needs
 from simnav.estimators.algebra.joseph import joseph_sequence
@@ -92,6 +93,8 @@ __all__ = ["InertialModel", "roll_pitch_yaw"]
 #: Components of the error without calibration states, and without the biases of the IMU.
 _NAV, _MOTION = 15, 9
 _GRAVITY = 9.81
+#: Places in the flat state (`motion_of`).
+_POSITION, _VELOCITY, _DCM, _TIME = slice(0, 3), slice(3, 6), slice(6, 15), 30
 
 
 class InertialModel(ErrorModel):
@@ -471,8 +474,22 @@ class InertialModel(ErrorModel):
             estimate.states = self.blocks.report(values, _MOTION, covariance, self.reports_all)
         return estimate
 
+    def estimates(self, numbers: Array, covariances: Array) -> Estimates:
+        """As `ErrorModel.estimates`."""
+        if self.blocks.brought or self.reports_all or type(self).estimate is not InertialModel.estimate:
+            return super().estimates(numbers, covariances)
+        attitude = np.array([_angles(elements) for elements in numbers[:, _DCM].tolist()])
+        return Estimates(
+            numbers[:, _TIME], numbers[:, _POSITION], numbers[:, _VELOCITY], attitude, covariances[:, :9, :9]
+        )
+
 
 def roll_pitch_yaw(dcm: Array) -> Array:
     """(3,) array: `simnav.geometry.rotation.rpy_from_dcm` of one matrix, without the overhead of stacks."""
-    (c00, _, _), (c10, _, _), (c20, c21, c22) = dcm.tolist()
-    return np.array([atan2(c21, c22), atan2(-c20, hypot(c21, c22)), atan2(c10, c00)])
+    return np.array(_angles(dcm.ravel().tolist()))
+
+
+def _angles(dcm: Sequence[float]) -> tuple[float, float, float]:
+    """Roll, pitch and yaw from the elements of a matrix, row by row."""
+    c00, _, _, c10, _, _, c20, c21, c22 = dcm
+    return atan2(c21, c22), atan2(-c20, hypot(c21, c22)), atan2(c10, c00)

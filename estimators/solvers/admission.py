@@ -4,15 +4,104 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from operator import attrgetter
+from typing import NamedTuple
 
+import numpy as np
+
+from simnav.compiled import kernel
 from simnav.estimators.models.channels import reading_of
+from simnav.estimators.models.filtering import Readings
+from simnav.kernel_types import IntegerVector, Matrix, Vector
+from simnav.records import Record
 from simnav.types import KINDS, Instruments, Measurement, Measurements
 
-__all__ = ["LATE", "Admission", "together"]
+__all__ = ["LATE", "Admission", "Admitted", "Arrivals", "admit", "together"]
 
 #: A measurement that is older than the state by at most this counts as simultaneous [s].
 LATE = 1e-4
 _time = attrgetter("time")
+
+
+class Arrivals(NamedTuple):
+    """The readings of t steps as they arrive.
+
+    Attributes
+    ----------
+    ends : (t,) array
+        End of each step [s].
+    first : (t + 1,) array of int
+        Index of the first reading of each step, and the number of readings.
+    instrument : (k,) array of int
+        Row of the instrument of each; -1 for one that is not observed.
+    time : (k,) array
+        Time of validity [s]; in order within a step.
+    value : (k, 3) array
+        What was measured.
+    """
+
+    ends: Vector
+    first: IntegerVector
+    instrument: IntegerVector
+    time: Vector
+    value: Matrix
+
+
+class Admitted(Record):
+    """What is known of i instruments whose readings are admitted.
+
+    Attributes
+    ----------
+    latest : (i,) array
+        Time of the last reading that was admitted [s].
+    limits : (i, 3) array
+        The value is plausible between the limit and its negative.
+    skipped : (1,) array
+        Number of readings so far that could not be used.
+    """
+
+    latest: Vector
+    limits: Matrix
+    skipped: Vector
+
+
+@kernel
+def admit(
+    admitted: Admitted, components: IntegerVector, arrivals: Arrivals, step: int, since: float, readings: Readings
+) -> int:
+    """Write the readings of a step that are to be used into others, as `Admission.admit` does; their number.
+
+    Parameters
+    ----------
+    admitted : Admitted
+        Updated.
+    components : (i,) array of int
+        Number of components that the model predicts of each instrument.
+    arrivals : Arrivals
+        What arrives.
+    step : int
+        Number of the step.
+    since : float
+        Time of the state [s].
+    readings : Readings
+        Room for all readings of the step.
+    """
+    begin, end, count = since - LATE, arrivals.ends[step] + LATE, 0
+    for k in range(arrivals.first[step], arrivals.first[step + 1]):
+        row, time = arrivals.instrument[k], arrivals.time[k]
+        if row < 0:
+            continue
+        good = begin <= time <= end and time > admitted.latest[row]
+        for a in range(3):
+            good = good and -admitted.limits[row, a] < arrivals.value[k, a] < admitted.limits[row, a]
+        if not good:
+            admitted.skipped[0] += 1.0
+            continue
+        admitted.latest[row] = time
+        readings.instrument[count], readings.components[count], readings.time[count] = row, components[row], time
+        for a in range(3):
+            readings.value[count, a] = arrivals.value[k, a]
+        count += 1
+    return count
 
 
 class Admission:
@@ -29,31 +118,44 @@ class Admission:
 
     Attributes
     ----------
-    skipped : int
-        Number of rejected measurements so far.
+    record : Admitted
+        What it knows, for `admit`.
     """
 
     def __init__(self, instruments: Instruments, observed: Iterable[str]):
-        self._used = dict.fromkeys(observed, float("-inf"))
-        self._plausible = {name: KINDS[instruments[name].kind].plausible for name in self._used}
-        self.skipped = 0
+        self._rows = {name: row for row, name in enumerate(observed)}
+        kinds = [KINDS[instruments[name].kind] for name in self._rows]
+        self._plausible = [kind.plausible for kind in kinds]
+        limits = np.full((len(kinds), 3), np.inf)
+        for row, kind in enumerate(kinds):
+            limits[row, : len(kind.limits)] = kind.limits[:3]
+        self.record = Admitted(latest=np.full(len(kinds), -np.inf), limits=limits, skipped=np.zeros(1))
+
+    @property
+    def skipped(self) -> float:
+        """Number of rejected measurements so far."""
+        return float(self.record.skipped[0])
+
+    @skipped.setter
+    def skipped(self, count: float) -> None:
+        self.record.skipped[0] = count
 
     def admit(self, measurements: Measurements, since: float) -> list[Measurement]:
         """The measurements of a step to be used by a state of time ``since`` [s], in order of their times."""
         admitted = []
-        begin, end, used, plausible = since - LATE, measurements.time + LATE, self._used, self._plausible
+        begin, end, rows, latest = since - LATE, measurements.time + LATE, self._rows, self.record.latest
         for m in sorted(measurements.aids, key=_time):
             time, name, _, value, channel, _ = m
             if channel:
                 m = reading_of(m)
                 name = m.instrument
-            latest = used.get(name)
-            if latest is None:
+            row = rows.get(name)
+            if row is None:
                 continue
-            if not begin <= time <= end or time <= latest or not plausible[name](value):
+            if not begin <= time <= end or time <= latest[row] or not self._plausible[row](value):
                 self.skipped += 1
                 continue
-            used[name] = time
+            latest[row] = time
             admitted.append(m)
         return admitted
 

@@ -19,7 +19,9 @@ from __future__ import annotations
 
 from math import sqrt
 
-__all__ = ["ConsistencyTest", "CostTest", "chi_square_deviate"]
+from simnav.compiled import helper
+
+__all__ = ["IMPROBABLE", "PATIENCE", "CostTest", "chi_square_deviate"]
 
 #: Standard normal deviate beyond which a cost is improbable (one in 30 000).
 IMPROBABLE = 4.0
@@ -27,6 +29,7 @@ IMPROBABLE = 4.0
 PATIENCE = 5
 
 
+@helper
 def chi_square_deviate(value: float, freedom: float) -> float:
     """The standard normal deviate with the same tail probability as a value of chi-square.
 
@@ -47,15 +50,13 @@ def chi_square_deviate(value: float, freedom: float) -> float:
     return deviate
 
 
-class ConsistencyTest:
-    """A sum of squares of unit variance, tested epoch by epoch.
+class CostTest:
+    """The test of the module, epoch by epoch; the sum of squares is twice the cost.
 
     Attributes
     ----------
     variance_factor : float
         The sum over its degrees of freedom, of the last epoch; NaN before the first.
-    inconsistent : bool
-        Whether the sum has been improbable for `PATIENCE` epochs in a row.
     """
 
     def __init__(self) -> None:
@@ -67,15 +68,6 @@ class ConsistencyTest:
         """Whether the sum has been improbable for `PATIENCE` epochs in a row."""
         return self._improbable >= PATIENCE
 
-    def judge(self, squares: float, freedom: float) -> None:
-        """Take the sum of an epoch, and its degrees of freedom, above 0."""
-        self.variance_factor = squares / freedom
-        self._improbable = self._improbable + 1 if chi_square_deviate(squares, freedom) > IMPROBABLE else 0
-
-
-class CostTest(ConsistencyTest):
-    """The test of the module; the sum of squares is twice the cost."""
-
     @property
     def inflation(self) -> float:
         """Factor on the covariance: the variance factor if the window is inconsistent, otherwise 1."""
@@ -84,4 +76,6 @@ class CostTest(ConsistencyTest):
     def add(self, cost: float, freedom: float) -> None:
         """Add the cost of an epoch (half the sum of squares) and its degrees of freedom; 0 degrees are ignored."""
         if freedom > 0.0:
-            self.judge(2.0 * cost, freedom)
+            squares = 2.0 * cost
+            self.variance_factor = squares / freedom
+            self._improbable = self._improbable + 1 if chi_square_deviate(squares, freedom) > IMPROBABLE else 0

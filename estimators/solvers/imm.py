@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from math import ceil, log, sqrt
 from typing import ClassVar
 
@@ -10,13 +10,12 @@ import numpy as np
 
 from simnav.compiled import kernel
 from simnav.estimators.adaptations.choice import Choice, choose_noise, keep_nominal
+from simnav.estimators.adaptations.noise_report import NoiseReport
 from simnav.estimators.adaptations.prediction import PredictionTest
 from simnav.estimators.algebra.mixture import mixture_update
-from simnav.estimators.models.channels import summary
-from simnav.estimators.models.coupling import by_source
 from simnav.estimators.models.filtering import Dynamics, Prediction, Readings
 from simnav.estimators.models.suitable import ModelChoice
-from simnav.types import KINDS, Array, Estimate, InitialState, Instruments, Measurement, Measurements
+from simnav.types import Array, Instruments
 
 from .filter_step import correct
 from .kalman import FilterFunctions, KalmanEstimator
@@ -92,16 +91,6 @@ class ImmEstimator(KalmanEstimator):
         self._variances = np.square(np.array(levels, dtype=np.float64))
         self.transition = _chain(len(levels), stay, stay_high)
 
-    def reset(self, start: InitialState, instruments: Instruments) -> None:
-        """Begin a run."""
-        instruments = by_source(instruments, self._choice, self.label)
-        super().reset(start, instruments)
-        self._report: dict[str, float | Array] = {}
-        self._labels = {n: [f"sigma_{e}.{n}" for e in KINDS[s.kind].errors] for n, s in instruments.items()}
-        for name in self._names:
-            self._report.update(zip(self._labels[name], map(float, instruments[name].sigma)))
-            self._report[f"quiet.{name}"] = float(self._probability[name][0])
-
     def functions(self) -> FilterFunctions:
         """The prediction is tested, and the correction is a mixture."""
         functions = super().functions()
@@ -113,7 +102,6 @@ class ImmEstimator(KalmanEstimator):
         values, vectors = np.linalg.eig(self.transition.T)
         first = np.real(vectors[:, int(np.argmax(np.real(values)))])
         probability, i = np.tile(first / first.sum(), (len(instruments), 1)), len(self._names)
-        self._probability = dict(zip(instruments, probability, strict=True))
         index = {name: k for k, name in enumerate(instruments)}
         return Choice(
             rule=keep_nominal, estimates=False, inflates_disturbed=False,
@@ -131,17 +119,11 @@ class ImmEstimator(KalmanEstimator):
             self.smoother.use(dynamics.correction, self._linearised, prediction.noise)
         return nis
 
-    def _report_choice(self, m: Measurement, sigma: Sequence[float], number: float) -> None:
-        if sigma[0] == sigma[0]:
-            self._report.update(zip(self._labels[m.instrument], sigma))
-            self._report[f"quiet.{m.instrument}"] = number
-
-    def update(self, measurements: Measurements) -> Estimate:
-        """Take one step's measurements."""
-        estimate = super().update(measurements)
-        means = summary(self._report, self._owners) if self._owners else {}
-        estimate.diagnostics = {**estimate.diagnostics, **self._report, **means}
-        return estimate
+    def _reported_noise(self, instruments: Instruments) -> NoiseReport:
+        """The roots of the expected variances, and the probabilities of the lowest level."""
+        report = NoiseReport(instruments, self._names, "quiet", with_zero=True)
+        report.values[:, 3] = self._filter.choice.memories.reshape(len(instruments), -1)[:, 0]
+        return report
 
 
 @kernel(passed=True)

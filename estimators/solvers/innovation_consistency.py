@@ -20,11 +20,13 @@ Source: Y. Bar-Shalom, X. R. Li and T. Kirubarajan, *Estimation with Application
 
 from __future__ import annotations
 
-from collections import deque
+from simnav.compiled import helper
+from simnav.structures import filled, structure
+from simnav.types import Array
 
-from .cost_consistency import ConsistencyTest
+from .cost_consistency import IMPROBABLE, PATIENCE, chi_square_deviate
 
-__all__ = ["InnovationTest"]
+__all__ = ["EPOCHS", "LONG", "TEST", "add_square", "begun_test", "end_epoch", "is_inconsistent"]
 
 #: Number of epochs over which innovations are summed: the default length of a window.
 EPOCHS = 20
@@ -32,47 +34,58 @@ EPOCHS = 20
 LONG = 100
 #: What an epoch counts in it at most, in degrees of freedom.
 BOUND = 2.0
+#: The test: sum and degrees of freedom of the present epoch; those of the last epochs with measurements, of which
+#: there have been so many; of the last ones bounded, with their sums; the last sum over its degrees of freedom; and for
+#: how many epochs in a row each sum has been improbable.
+TEST = structure(
+    total=float, freedom=float, epochs=int, sums=EPOCHS, freedoms=EPOCHS, bounded=LONG, long_freedoms=LONG,
+    long_sum=float, long_freedom=float, variance_factor=float, improbable=int, lasting=int,
+)  # fmt: skip
 
 
-class InnovationTest:
-    """The test of the module: sums of the normalised innovations squared over the last epochs with measurements."""
+def begun_test() -> Array:
+    """The test before the first epoch, as an array."""
+    return filled(TEST, variance_factor=float("nan"))
 
-    def __init__(self) -> None:
-        self._sum, self._freedom = 0.0, 0
-        self._latest, self._lasting = ConsistencyTest(), ConsistencyTest()
-        self._sums: deque[float] = deque(maxlen=EPOCHS)
-        self._freedoms: deque[int] = deque(maxlen=EPOCHS)
-        self._bounded: deque[tuple[float, int]] = deque([(0.0, 0)] * LONG)
-        self._long_sum, self._long_freedom = 0.0, 0
 
-    @property
-    def variance_factor(self) -> float:
-        """The sum over the last `EPOCHS` epochs over its degrees of freedom; NaN before the first."""
-        return self._latest.variance_factor
+@helper
+def add_square(memory: Array, nis: float, freedom: float) -> None:
+    """Add a normalised innovation squared, and its degrees of freedom, to the present epoch."""
+    test = memory.view(TEST)[0]
+    test.total += nis
+    test.freedom += freedom
 
-    @property
-    def inconsistent(self) -> bool:
-        """Whether one of the sums is improbable (`ConsistencyTest.inconsistent`)."""
-        return self._latest.inconsistent or self._lasting.inconsistent
 
-    def add(self, nis: float, freedom: int) -> None:
-        """Add a normalised innovation squared, and its degrees of freedom."""
-        self._sum += nis
-        self._freedom += freedom
+@helper
+def end_epoch(memory: Array) -> None:
+    """Test the sums at the end of an epoch. An epoch without measurements is ignored."""
+    test = memory.view(TEST)[0]
+    freedom = test.freedom
+    if freedom == 0.0:
+        return
+    newest = test.epochs % EPOCHS
+    test.sums[newest], test.freedoms[newest] = test.total, freedom
+    squares, freedoms = 0.0, 0.0
+    for k in range(EPOCHS):  # the oldest first; before there are so many, the first ones are zero
+        at = (newest + 1 + k) % EPOCHS
+        squares += test.sums[at]
+        freedoms += test.freedoms[at]
+    test.variance_factor = squares / freedoms
+    test.improbable = test.improbable + 1 if chi_square_deviate(squares, freedoms) > IMPROBABLE else 0
+    oldest = test.epochs % LONG
+    bounded, its_freedom = test.total if test.total < BOUND * freedom else BOUND * freedom, test.long_freedoms[oldest]
+    test.long_sum += bounded - test.bounded[oldest]
+    test.long_freedom += freedom - its_freedom
+    test.bounded[oldest], test.long_freedoms[oldest] = bounded, freedom
+    if its_freedom > 0.0:  # from then on there are so many epochs
+        test.lasting = test.lasting + 1 if chi_square_deviate(test.long_sum, test.long_freedom) > IMPROBABLE else 0
+    test.epochs += 1
+    test.total, test.freedom = 0.0, 0.0
 
-    def end_epoch(self) -> None:
-        """Test the sums at the end of an epoch. An epoch without measurements is ignored."""
-        freedom = self._freedom
-        if not freedom:
-            return
-        self._sums.append(self._sum)
-        self._freedoms.append(freedom)
-        self._latest.judge(sum(self._sums), sum(self._freedoms))
-        bounded = self._sum if self._sum < BOUND * freedom else BOUND * freedom
-        oldest, its_freedom = self._bounded.popleft()
-        self._bounded.append((bounded, freedom))
-        self._long_sum += bounded - oldest
-        self._long_freedom += freedom - its_freedom
-        if its_freedom:  # from then on there are so many epochs
-            self._lasting.judge(self._long_sum, self._long_freedom)
-        self._sum, self._freedom = 0.0, 0
+
+@helper
+def is_inconsistent(memory: Array) -> bool:
+    """Whether one of the sums has been improbable for `PATIENCE` epochs in a row."""
+    test = memory.view(TEST)[0]
+    found: bool = test.improbable >= PATIENCE or test.lasting >= PATIENCE
+    return found

@@ -98,7 +98,6 @@ class InnovationKeeper(KalmanEstimator):
         measurements: Sequence[Measurement],
         samples: Samples,
         until: float,
-        diagnostics: dict[str, float | Array],
         flagged: list[tuple[str, float]],
     ) -> None:
         """Use measurements as the filter does, as many at once as there is room for, and keep the innovations."""
@@ -106,7 +105,7 @@ class InnovationKeeper(KalmanEstimator):
             part = measurements[first : first + _READINGS]
             last = first + _READINGS >= len(measurements)
             self._room[:, 0] = 0.0
-            super()._use(part, samples, until if last else min(part[-1].time, until), diagnostics, flagged)
+            super()._use(part, samples, until if last else min(part[-1].time, until), flagged)
             for m, row in zip(part, self._room, strict=False):
                 if d := int(row[0]):
                     self.kept.append(KeptInnovation(

@@ -23,10 +23,12 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from simnav.compiled import Kernel, ready
+from simnav.estimates import Estimates
 from simnav.estimators.adaptations.base import Adaptation, Innovation
 from simnav.estimators.adaptations.choice import Choice, choose_noise, no_choice
 from simnav.estimators.adaptations.intersection import weaken_position
 from simnav.estimators.adaptations.noise import NoiseAdaptation
+from simnav.estimators.adaptations.noise_report import NoiseReport
 from simnav.estimators.algebra.joseph import joseph_update, project
 from simnav.estimators.composition import Solver
 from simnav.estimators.models.base import ErrorModel, Linearised
@@ -36,15 +38,21 @@ from simnav.estimators.models.filtering import Dynamics, ModelFunctions, Predict
 from simnav.estimators.models.propagation import Samples
 from simnav.estimators.models.stated_sigmas import with_stated_sigmas
 from simnav.estimators.models.suitable import ModelChoice
-from simnav.types import Array, Estimate, InitialState, Instruments, Measurement, Measurements, NavigationStates
+from simnav.steps import Steps
+from simnav.types import KINDS, Array, Estimate, InitialState, Instruments, Measurement, Measurements, NavigationStates
 
-from .admission import Admission, together
+from .admission import Admission, Arrivals, together
 from .filter_step import Filter, correct, filter_step, inflate_all, use_nominal
-from .innovation_consistency import InnovationTest
+from .filter_steps import StepStates, filter_steps
+from .innovation_consistency import begun_test
 from .iterated import Iteration, absorb_iterated
 from .smoother import Smoother
+from .step_report import TESTS, StepReport, end_report, note_readings
 
 __all__ = ["FilterFunctions", "KalmanEstimator"]
+
+#: Methods of a step; a subclass that has one of its own takes the steps of a run one by one.
+_STEPWISE = ("update", "_use", "_estimate")
 
 
 class FilterFunctions(NamedTuple):
@@ -123,15 +131,20 @@ class KalmanEstimator(Solver):
             self.adaptation.reset(instruments)
         self._names = [name for name, sheet in instruments.items() if self.model.observes(sheet)]
         self._admission = Admission(instruments, self._names)
-        self._innovation_test = InnovationTest()
         self._owners, self._mean_labels = owners(instruments), dict[str, str]()
-        self._keys = {name: (f"innovation.{name}", f"nis.{name}") for name in self._names}
-        self._blank = dict.fromkeys((label for pair in self._keys.values() for label in pair), np.nan)
+        self._blank: dict[str, float | Array] = {}
+        self._labels = [f"{what}.{name}" for name in self._names for what in ("innovation", "nis")] + [*TESTS]
         self._linearised: Linearised | None = None
         self._measurements: Sequence[Measurement] = ()
         self._arrays = ReadingsOfSteps({name: self.model.components(instruments[name]) for name in self._names})
         self._filter = self._assembled(instruments)
         self._compiled, self._iterated = self._filter.compiled, False
+        self._noise_report = self._reported_noise(instruments)
+        self._report = self._begun_report(instruments)
+        self._row = np.empty(len(self._labels) + self._report.chosen.size)
+        told = self.adaptation is None or type(self.adaptation).diagnostics is NoiseAdaptation.diagnostics
+        own = any(getattr(type(self), name) is not getattr(KalmanEstimator, name) for name in _STEPWISE)
+        self._takes_steps = self._compiled and told and not own and not self._owners
         if self.smoother is not None:
             self.smoother.begin(self.model, [instruments[name] for name in self._names])
 
@@ -143,24 +156,23 @@ class KalmanEstimator(Solver):
         """Take one step's measurements, each at its own time."""
         model = self.model
         model.load(measurements.imu)
-        diagnostics: dict[str, float | Array] = dict(self._blank)
+        diagnostics = dict(self._blank)
         flagged: list[tuple[str, float]] = []
         admitted, until, samples = self._admission.admit(measurements, model.time), measurements.time, model.samples
         self._iterations = 0
         for group in self._groups(admitted):
             end = until if group is admitted else min(group[0].time, until)
-            if group is admitted or len(group) == 1 or not self._use_together(group, end, diagnostics):
-                self._use(group, samples, end, diagnostics, flagged)
+            if group is admitted or len(group) == 1 or not self._use_together(group, end):
+                self._use(group, samples, end, flagged)
         if model.time < until:
-            self._use((), samples, until, diagnostics, flagged)
+            self._use((), samples, until, flagged)
+        end_report.unchecked(self._report, self._row)
+        diagnostics.update(zip(self._labels, self._row.tolist()))
         if self._iterations:
             diagnostics["iterations"] = float(self._iterations)
-        diagnostics["skipped"] = float(self._admission.skipped)
-        self._innovation_test.end_epoch()
-        diagnostics["variance_factor"] = self._innovation_test.variance_factor
-        diagnostics["inconsistent"] = float(self._innovation_test.inconsistent)
-        if self.adaptation is not None:
-            diagnostics.update(self.adaptation.diagnostics())
+        chosen = self._noise_report if self.adaptation is None else self.adaptation
+        if chosen is not None:
+            diagnostics.update(chosen.diagnostics())
         if self._owners:
             diagnostics.update(summary(diagnostics, self._owners, self._mean_labels))
         estimate = self._estimate()
@@ -168,6 +180,32 @@ class KalmanEstimator(Solver):
         if self.smoother is not None:
             self.smoother.end_step(measurements.time)
         return estimate
+
+    def update_all(self, steps: Steps) -> Estimates | None:
+        """Take several steps in compiled code, where the whole filter is."""
+        if not self._takes_steps:
+            return None
+        model, n, t = self.model, len(self._labels), len(steps)
+        model.load(steps.imu)
+        rows = {name: row for row, name in enumerate(self._names)}
+        arrivals = Arrivals(
+            np.array(steps.ends), np.array(steps.readings), steps.rows_of(rows), ready(steps.time),
+            ready(steps.rows[:, 2:5]),
+        )  # fmt: skip
+        size = model.size
+        found = StepStates(
+            np.empty((t, len(self.dynamics.numbers))), np.empty((t, size, size)), np.empty((t, len(self._row))),
+            np.empty((len(steps.time), 3)),
+        )  # fmt: skip
+        readings = self._arrays.room(int(np.diff(steps.readings).max(initial=0)))
+        imu = model.samples, np.array(steps.samples)
+        known = self._admission.record, self._report
+        flags = filter_steps.unchecked(self._filter, *known, arrivals, imu, readings, model.time, found)
+        estimates = model.estimates(found.numbers, found.covariances)
+        noise = {} if self._noise_report is None else self._noise_report.table(found.reports[:, n:])
+        estimates.diagnostics = {**dict(zip(self._labels, found.reports.T)), **noise, **estimates.diagnostics}
+        estimates.flagged = [(int(k), self._names[int(row)], time) for k, row, time in found.flags[:flags].tolist()]
+        return estimates
 
     def smooth(self) -> NavigationStates | None:
         """The smoother's trajectory at the ends of all steps; None before the first, and without a smoother."""
@@ -213,6 +251,21 @@ class KalmanEstimator(Solver):
         """The equations of the model as kernels; subclasses may override it."""
         return self.model.functions()
 
+    def _reported_noise(self, instruments: Instruments) -> NoiseReport | None:
+        """Where the noise is reported that `choose_noise` chooses; None if it does not choose."""
+        return self.adaptation.report if self._reports and isinstance(self.adaptation, NoiseAdaptation) else None
+
+    def _begun_report(self, instruments: Instruments) -> StepReport:
+        """What is reported of the steps of a run, before the first."""
+        names, noise = list(instruments), self._noise_report
+        return StepReport(
+            freedom=np.array([len(KINDS[instruments[name].kind].limits) for name in self._names], np.int64),
+            skipped=self._admission.record.skipped, test=begun_test(),
+            chosen=np.empty((0, 4)) if noise is None else noise.values,
+            index=np.array([-1 if noise is None else names.index(name) for name in self._names], np.int64),
+            with_zero=noise is not None and noise.with_zero, innovations=np.full(2 * len(self._names), np.nan),
+        )  # fmt: skip
+
     def _dynamics(self) -> Dynamics:
         """What the functions of the model work on; subclasses may override it."""
         return self.model.dynamics(self.covariance, self._names)
@@ -240,7 +293,6 @@ class KalmanEstimator(Solver):
         measurements: Sequence[Measurement],
         samples: Samples,
         until: float,
-        diagnostics: dict[str, float | Array],
         flagged: list[tuple[str, float]],
     ) -> None:
         """Use measurements in order of their times, propagate to a time, and record what became of each."""
@@ -250,21 +302,9 @@ class KalmanEstimator(Solver):
             filter_step.unchecked(self._filter, readings, samples, count, until)
         else:
             filter_step.function(self._filter.in_python, readings, samples, count, until)
-        nis, size, rejected = readings.nis.tolist(), readings.size.tolist(), readings.rejected.tolist()
-        if self._reports:
-            sigma, reported = readings.sigma.tolist(), readings.reported.tolist()
-        for k, m in enumerate(measurements):
-            if rejected[k]:
-                flagged.append((m.instrument, m.time))
-                continue
-            if self._reports:
-                self._report_choice(m, sigma[k], reported[k])
-            self._note(m, nis[k], size[k], diagnostics)
-
-    def _report_choice(self, m: Measurement, sigma: Sequence[float], number: float) -> None:
-        """Tell the adaptation what a kernel chose for a measurement."""
-        assert isinstance(self.adaptation, NoiseAdaptation)
-        self.adaptation.noted(m.instrument, sigma, number)
+        note_readings.unchecked(self._report, readings, count)
+        if readings.rejected[:count].any():
+            flagged += [(m.instrument, m.time) for m, bad in zip(measurements, readings.rejected.tolist()) if bad]
 
     def propagate(self, dynamics: Dynamics, samples: Samples, until: float) -> None:
         """Advance the state and its covariance to a time, and record the motion for a smoother."""
@@ -335,22 +375,15 @@ class KalmanEstimator(Solver):
         """The measurements in one group, or those of the channels of one instrument at one time in one if quicker."""
         return [measurements] if self._together is None else together(measurements, self._owners)
 
-    def _use_together(self, group: Sequence[Measurement], until: float, diagnostics: dict[str, float | Array]) -> bool:
+    def _use_together(self, group: Sequence[Measurement], until: float) -> bool:
         """Use the measurements of a group; False if they have to be used one by one."""
         self._filter.in_python.propagate(self.dynamics, self.model.samples, until)
         assert self._together is not None
         used = self._together(group, self.covariance, self.dynamics.correction)
         if used is None:
             return False
-        for m, nis, size in zip(group, used[0].tolist(), used[1].tolist(), strict=True):
-            self._note(m, nis, size, diagnostics)
+        readings, count = self._arrays.fill(group), len(group)
+        readings.nis[:count], readings.size[:count] = used
+        readings.rejected[:count], readings.sigma[:count, 0] = False, np.nan
+        note_readings.unchecked(self._report, readings, count)
         return True
-
-    def _note(self, m: Measurement, nis: float, size: float, diagnostics: dict[str, float | Array]) -> None:
-        """Record the diagnostics of a measurement, or that it was skipped (``nis`` below 0)."""
-        if nis < 0.0:
-            self._admission.skipped += 1
-            return
-        self._innovation_test.add(nis, len(m.value))
-        innovation, normalised = self._keys[m.instrument]
-        diagnostics[innovation], diagnostics[normalised] = size, nis

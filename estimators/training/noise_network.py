@@ -158,9 +158,6 @@ class _Noting(LearnedNoise):
             parts.append(np.concatenate([self.memory_of(name)[1], table, rows.view(np.float64)]))
         self.rule_memory, self.rule_first = np.concatenate(parts), np.cumsum([0, *map(len, parts)])
 
-    def noted(self, *told: Any) -> None:  # nothing is reported
-        pass
-
     def sequence(self, name: str) -> Readings:
         """What was noted of an instrument."""
         rows = self.memory_of(name)[1][HIDDEN + self._units + _TABLE :].view(ROW)

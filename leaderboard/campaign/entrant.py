@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from simnav.estimator import find, make
 from simnav.estimator.registry import discover_point
 
-from .request import enlist
+from .request import enlist, file_of
 from .session_class import receive
 
 if TYPE_CHECKING:
@@ -59,6 +59,11 @@ class Entrant:
     version: int = 1
     own: str = ""
     kernels: tuple[str, ...] = ("simnav",)
+
+    @property
+    def ours(self) -> bool:
+        """Whether it comes with simnav, so that it is trusted not to look ahead in what it is handed."""
+        return not (self.own or self.code or self.point or file_of(self.name))
 
     def find(self) -> type[Estimator]:
         """Its class, in the process in which it is run."""

@@ -12,7 +12,9 @@ from simnav.plugins import PluginError
 from simnav.types import Array, Estimate, InitialState, Instruments, Measurements, NavigationStates
 
 if TYPE_CHECKING:
+    from simnav.estimates import Estimates
     from simnav.recording import Recording
+    from simnav.steps import Steps
 
 __all__ = ["Estimator", "EstimatorError", "UnsuitableScenario"]
 
@@ -113,6 +115,20 @@ class Estimator(ABC):
     @abstractmethod
     def update(self, measurements: Measurements) -> Estimate:
         """Process the measurements of one step; return the estimate at the end of the step."""
+
+    def update_all(self, steps: Steps) -> Estimates | None:
+        """Process several steps by one call, with the numbers of `update` step by step.
+
+        None, and nothing done, if they have to be processed one by one, as they are by default. simnav's filters do
+        this where all their functions are kernels; an estimator that is made of them need not define it.
+
+        Parameters
+        ----------
+        steps : Steps
+            At least one step. A campaign hands over several steps only to estimators that come with simnav, because
+            they could otherwise look ahead.
+        """
+        return None
 
     def smooth(self) -> NavigationStates | None:
         """Return the smoothed trajectory at the ends of all steps, after the last update; None without smoothing."""

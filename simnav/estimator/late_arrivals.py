@@ -25,7 +25,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Literal
 
+import numpy as np
+
 from simnav.estimator.contract import Estimator, EstimatorError
+from simnav.steps import Steps
 from simnav.timing import TIME_TOLERANCE
 from simnav.types import Estimate, Instruments, Measurement, Measurements
 
@@ -38,6 +41,7 @@ __all__ = [
     "LateArrivals",
     "Manner",
     "TrueTimes",
+    "are_untimely",
     "is_untimely",
     "manner_of",
     "parts_of",
@@ -82,6 +86,13 @@ def is_untimely(measurements: Measurements) -> bool:
         if not first <= m.time <= last:
             return True
     return False
+
+
+def are_untimely(steps: Steps) -> bool:
+    """Whether one of several packets has a reading from before or after its step."""
+    edges, step = np.array([steps.start, *steps.ends]), steps.step
+    first, last = edges[step], edges[step + 1]
+    return not bool(((first - _LATE <= steps.time) & (steps.time <= last + _LATE)).all())
 
 
 def true_times(recording: Recording) -> TrueTimes:

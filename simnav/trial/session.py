@@ -6,7 +6,7 @@ import copy
 import inspect
 import time
 import traceback
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Protocol
@@ -14,19 +14,26 @@ from typing import Any, Protocol
 from simnav.estimator import Estimator, NeedsError, UnsuitableScenario, lacking, unused_positions
 from simnav.estimator.looking_back import inner_of
 from simnav.recording import Recording
+from simnav.steps import Steps
 from simnav.trial.log import DivergedError, TrialLog
 from simnav.trial.trial import Trial
 from simnav.trial.wire import EstimateEncoder, InvalidOutputError, PacketDecoder, PacketEncoder
 from simnav.types import NavigationStates
 
 __all__ = [
+    "TOGETHER",
     "FailureError",
     "LostError",
     "Session",
+    "answers_to",
     "describe_failure",
     "run_session",
     "run_trial",
 ]
+
+
+#: So many steps are handed over together, where an estimator may have them together.
+TOGETHER = 64
 
 
 class FailureError(Exception):
@@ -211,18 +218,50 @@ class _LocalSession:
         self.estimator.reset(copy.deepcopy(recording.start), copy.deepcopy(recording.instruments))
 
     def run(self, packets: PacketEncoder, log: TrialLog) -> None:
-        for k in range(len(packets)):
-            measurements = self._decode(bytearray(b"".join(packets[k])))
-            started = time.perf_counter_ns()
-            estimate = self.estimator.update(measurements)
-            seconds = 1e-9 * (time.perf_counter_ns() - started)
-            log.add(self._encode(estimate), seconds)
+        size = TOGETHER if type(self.estimator).update_all is not Estimator.update_all else 1
+        for first in range(0, len(packets), size):
+            steps = self._decode(bytearray(b"".join(packets.of(first, min(first + size, len(packets))))))
+            for answers, seconds in answers_to(self.estimator, steps, self._encode):
+                for answer in answers:
+                    log.put(answer, seconds)
+                log.settle()
 
     def smooth(self) -> NavigationStates | None:
         return self.estimator.smooth()
 
     def describe(self, error: BaseException) -> str:
         return describe_failure(error, self.estimator, skip=2)
+
+
+def answers_to(estimator: Estimator, steps: Steps, encode: EstimateEncoder) -> Iterator[tuple[list[bytes], float]]:
+    """The answers of an estimator to some steps: all by one call, if it takes them together, or one by one.
+
+    Parameters
+    ----------
+    estimator : Estimator
+        The estimator.
+    steps : Steps
+        What it receives.
+    encode : EstimateEncoder
+        That of the run.
+
+    Yields
+    ------
+    answers : list of bytes
+        In the form of `simnav.trial.wire`, of successive steps.
+    seconds : float
+        Wall time of each of them [s].
+    """
+    started = time.perf_counter_ns()
+    together = estimator.update_all(steps) if len(steps) > 1 else None
+    if together is not None:
+        yield encode.each(together), 1e-9 * (time.perf_counter_ns() - started) / len(steps)
+        return
+    for measurements in steps:
+        started = time.perf_counter_ns()
+        estimate = estimator.update(measurements)
+        seconds = 1e-9 * (time.perf_counter_ns() - started)
+        yield [encode(estimate)], seconds
 
 
 def describe_failure(error: BaseException, estimator: Estimator, skip: int) -> str:

@@ -3,10 +3,10 @@
 An estimator may run in another process than the one that holds the recording (`simnav.leaderboard.campaign`). Packets
 and answers are sent in this form. The same form is used within one process, so that both give the same bits.
 
-A **packet** is a header (number of IMU samples, of other measurements, of float64 of the latter; start and end of the
-step) and float64 numbers: times, intervals, angular rates and specific forces of the IMU, then for each measurement
-the number of its instrument, its time and its components, and with channels the index of its channel and its side
-information. An **answer** is a header (`ANSWER`), float64 numbers
+A **packet** holds one step or several: a header (`_PACKET`), the ends of the steps, and the first sample and the first
+reading of each; times, intervals, angular rates and specific forces of the IMU; then a row for each reading, with the
+number of its instrument, its time and its numbers (`simnav.steps.Steps`). All but the header are numbers of 8 bytes.
+An **answer** is for one step: a header (`ANSWER`), float64 numbers
 (position, velocity, attitude, covariance, diagnostics, each only where it was given) and, where there is more to say
 than numbers, a tail in JSON: the names and shapes of diagnostics when they first appear, and what was flagged.
 """
@@ -16,15 +16,18 @@ from __future__ import annotations
 import json
 import math
 import struct
+from array import array
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from simnav.estimates import Estimates
 from simnav.recording import AidStream, Block
+from simnav.steps import Steps, Stream
 from simnav.timing import TIME_TOLERANCE
-from simnav.types import Array, Estimate, ImuSamples, Measurement, Measurements
+from simnav.types import Array, Estimate, ImuSamples
 
 __all__ = [
     "ANSWER",
@@ -54,9 +57,12 @@ VECTORS = {"position": slice(0, 3), "velocity": slice(3, 6), "attitude": slice(6
 COVARIANCE = 8
 
 _DOUBLE = struct.Struct("d")
-_PACKET = struct.Struct("<IIIIdd")
+#: Header of a packet: numbers of IMU samples, of readings, of steps, and of the numbers in the row of a reading; 0,
+#: which tells it from other messages; start of the first step.
+_PACKET = struct.Struct("<IIHHId8x")
 _NO_IMU = 0xFFFFFFFF
 _IMU_WIDTH = 8  # float64 of one IMU sample
+_LEAST = 3  # numbers of a reading: `Steps.numbers`
 
 #: Which of the nine components the vectors of each number hold.
 GIVEN_BITS = [sum(7 << 3 * i for i in range(3) if given >> i & 1) for given in range(8)]
@@ -84,59 +90,58 @@ class PacketEncoder:
 
     Attributes
     ----------
-    streams : list of (str, str, int, tuple of str, int)
-        For each aiding instrument its name, kind and number of components, its channels and the number of components of
-        their side information, for `PacketDecoder`.
+    streams : list of Stream
+        The aiding instruments, for `PacketDecoder`.
     """
 
     def __init__(self, data: Block, ends: Array):
         streams = list(data.aids.values())
-        self.streams = [(s.name, s.kind, s.value.shape[1], s.channels, s.side.shape[1]) for s in streams]
-        numbers = [_numbers(s) for s in streams]
-        self._ends = [float(t) for t in ends]
-        self._start = float(data.start)
-        edges = np.asarray(ends) + TIME_TOLERANCE
-        times = np.concatenate([s.stamps for s in streams]) if streams else np.empty(0)
-        step = np.concatenate([np.searchsorted(edges, s.arrivals) for s in streams] or [np.empty(0, np.intp)])
-        order = np.lexsort((times, step))  # stable: ties keep the scenario's order of instruments
-        widths = np.concatenate([np.full(len(n), 2 + n.shape[1]) for n in numbers]) if streams else order
-        first = np.zeros(len(times) + 1, dtype=np.intp)  # where each measurement begins, in order of time
-        np.cumsum(widths[order], out=first[1:])
-        place = np.empty(len(times), dtype=np.intp)
-        place[order] = first[:-1]
-        self._aids = np.empty(int(first[-1]))
+        self.streams = [Stream(s.name, s.kind, s.value.shape[1], s.channels, s.side.shape[1]) for s in streams]
+        parts = [_numbers(s) for s in streams]
+        self._ends, self._start = [float(t) for t in ends], float(data.start)
+        edges = np.array(self._ends) + TIME_TOLERANCE
+        rows = np.zeros((sum(map(len, parts)), 2 + max([_LEAST, *(p.shape[1] for p in parts)])))
         begin = 0
-        for number, (s, own) in enumerate(zip(streams, numbers, strict=True)):
-            at = place[begin : begin + len(s)]
-            begin += len(s)
-            self._aids[at], self._aids[at + 1] = number, s.stamps
-            self._aids[at[:, None] + np.arange(2, 2 + own.shape[1])] = own
-        cut = np.searchsorted(step[order], np.arange(len(edges)), side="right")
-        self._counts = [int(c) for c in np.diff(cut, prepend=0)]
-        self._edges = [int(first[c]) for c in cut]
+        for number, (stream, own) in enumerate(zip(streams, parts, strict=True)):
+            part = rows[begin : begin + len(own)]
+            part[:, 0], part[:, 1], part[:, 2 : 2 + own.shape[1]] = number, stream.stamps, own
+            begin += len(own)
+        step = np.concatenate([np.searchsorted(edges, s.arrivals) for s in streams] or [np.empty(0, np.intp)])
+        order = np.lexsort((rows[:, 1], step))  # stable: ties keep the scenario's order of instruments
+        self._rows = rows[order]
+        self._readings: list[int] = np.searchsorted(step[order], np.arange(len(edges) + 1)).tolist()
         self._imu: tuple[Array, ...] | None = None
+        self._samples = [0] * (len(edges) + 1)
         if data.imu is not None:
-            parts = (data.imu.time, data.imu.interval, data.imu.angular_rate, data.imu.specific_force)
-            self._imu = tuple(np.ascontiguousarray(a, dtype=np.float64) for a in parts)
-            self._cut_imu = [int(c) for c in np.searchsorted(data.imu.time, edges, side="right")]
+            arrays = (data.imu.time, data.imu.interval, data.imu.angular_rate, data.imu.specific_force)
+            self._imu = tuple(np.ascontiguousarray(a, dtype=np.float64) for a in arrays)
+            self._samples[1:] = np.searchsorted(data.imu.time, edges, side="right").tolist()
 
     def __len__(self) -> int:
         return len(self._ends)
 
     def __getitem__(self, k: int) -> list[Any]:
-        """The packet of a step as buffers that follow each other; they are not copies."""
-        start = self._ends[k - 1] if k else self._start
-        a, b = self._edges[k - 1] if k else 0, self._edges[k]
-        samples = _NO_IMU
-        buffers: list[Any] = []
-        if self._imu is not None:
-            i, j = self._cut_imu[k - 1] if k else 0, self._cut_imu[k]
-            samples = j - i
-            if samples:
-                buffers = [part[i:j] for part in self._imu]
+        """The packet of a step as buffers that follow each other; those of measurements are not copies."""
+        return self.of(k, k + 1)
+
+    def of(self, first: int, last: int) -> list[Any]:
+        """The packet of the steps from the first to before the last, likewise."""
+        i, j, a, b = self._samples[first], self._samples[last], self._readings[first], self._readings[last]
+        start = self._ends[first - 1] if first else self._start
+        count, width = _NO_IMU if self._imu is None else j - i, self._rows.shape[1]
+        firsts = [x - i for x in self._samples[first : last + 1]] + [x - a for x in self._readings[first : last + 1]]
+        head = _PACKET.pack(count, b - a, last - first, width, 0, start)
+        buffers: list[Any] = [head + struct.pack(_edges(last - first), *self._ends[first:last], *firsts)]
+        if self._imu is not None and j > i:
+            buffers += [part[i:j] for part in self._imu]
         if b > a:
-            buffers.append(self._aids[a:b])
-        return [_PACKET.pack(samples, self._counts[k], b - a, 0, start, self._ends[k]), *buffers]
+            buffers.append(self._rows[a:b])
+        return buffers
+
+
+def _edges(steps: int) -> str:
+    """The form of the ends of some steps, and of the first sample and the first reading of each."""
+    return f"{steps}d{2 * steps + 2}q"
 
 
 def _numbers(stream: AidStream) -> Array:
@@ -147,51 +152,39 @@ def _numbers(stream: AidStream) -> Array:
 
 
 class PacketDecoder:
-    """From plain packets to `Measurements`.
+    """From plain packets to `Steps`.
 
     Parameters
     ----------
-    streams : sequence of (str, str, int, tuple of str, int)
+    streams : sequence of Stream
         ``streams`` of the `PacketEncoder`.
     """
 
     #: Bytes of a header.
     HEADER = _PACKET.size
 
-    def __init__(self, streams: Iterable[tuple[str, str, int, tuple[str, ...], int]]):
+    def __init__(self, streams: Iterable[Stream]):
         self._streams = list(streams)
 
     @staticmethod
     def size(header: bytes | bytearray) -> int:
         """Bytes of a packet, header included."""
-        samples, _, numbers, _, _, _ = _PACKET.unpack_from(header)
+        samples, readings, steps, width, _, _ = _PACKET.unpack_from(header)
+        numbers = 3 * steps + 2 + width * readings
         return int(_PACKET.size + 8 * (numbers if samples == _NO_IMU else numbers + _IMU_WIDTH * samples))
 
-    def __call__(self, packet: bytearray) -> Measurements:
+    def __call__(self, packet: bytearray) -> Steps:
         """The packet; its arrays are views of the buffer, which should not be used again."""
-        n, count, _, _, start, end = _PACKET.unpack_from(packet)
+        n, count, t, width, _, start = _PACKET.unpack_from(packet)
         values = np.frombuffer(packet, dtype=np.float64, offset=_PACKET.size)
-        imu, i = None, 0
+        edges = struct.unpack_from(_edges(t), packet, _PACKET.size)
+        i, imu = len(edges), None
         if n != _NO_IMU:
-            i = _IMU_WIDTH * n
-            imu = ImuSamples(
-                values[:n], values[n : 2 * n], values[2 * n : 5 * n].reshape(n, 3), values[5 * n : i].reshape(n, 3)
-            )
-        aids = []
-        for _ in range(count):
-            name, kind, width, channels, sides = self._streams[int(values[i])]
-            time, value = float(values[i + 1]), values[i + 2 : i + 2 + width]
-            i += 2 + width
-            if channels:
-                side = values[i + 1 : i + 1 + sides]
-                aids.append(Measurement(time, name, kind, value, channels[int(values[i])], side))
-                i += 1 + sides
-            elif sides:  # what the reading states of its noise
-                aids.append(Measurement(time, name, kind, value, side=values[i : i + sides]))
-                i += sides
-            else:
-                aids.append(Measurement(time, name, kind, value))
-        return Measurements(start, end, imu, aids)
+            parts = (values[i : i + n], values[i + n : i + 2 * n], values[i + 2 * n : i + 5 * n].reshape(n, 3))
+            imu = ImuSamples(*parts, values[i + 5 * n : i + 8 * n].reshape(n, 3))
+            i += _IMU_WIDTH * n
+        rows = values[i : i + width * count].reshape(count, width)
+        return Steps(start, edges[:t], imu, edges[t : 2 * t + 1], edges[2 * t + 1 :], rows, self._streams)
 
 
 # --- answers ------------------------------------------------------------------------------------------
@@ -206,6 +199,7 @@ class EstimateEncoder:
 
     def __init__(self) -> None:
         self._shapes: dict[tuple[tuple[str, tuple[int, ...]], ...], int] = {(): 0}
+        self._of_numbers: dict[tuple[str, ...], int] = {}  # the shapes of diagnostics that are single numbers
 
     def __call__(self, estimate: object) -> bytes:
         """The answer.
@@ -239,23 +233,26 @@ class EstimateEncoder:
         shape, tail = 0, b""
         more: dict[str, Any] = {}
         diagnostics = _with_states(estimate) if estimate.states else estimate.diagnostics
-        if diagnostics:
+        names = tuple(diagnostics)
+        single = set(map(type, diagnostics.values())) == {float}  # nearly always
+        if single and names in self._of_numbers:
+            shape = self._of_numbers[names]
+            parts.append(array("d", diagnostics.values()).tobytes())
+        elif diagnostics:
             signature = []
             for key, value in diagnostics.items():
                 if type(value) is float:
                     signature.append((str(key), ()))
                     parts.append(_DOUBLE.pack(value))
                     continue
-                array = real_array(value, f"diagnostic {key!r}", None)
-                signature.append((str(key), array.shape))
-                parts.append(array.tobytes())
-            found = tuple(signature)
-            if found not in self._shapes:
-                if len(self._shapes) > 0xFFFF:
-                    raise InvalidOutputError("the diagnostics have more than 65535 different sets of names and shapes")
-                self._shapes[found] = len(self._shapes)
-                more["shape"] = found
-            shape = self._shapes[found]
+                numbers = real_array(value, f"diagnostic {key!r}", None)
+                signature.append((str(key), numbers.shape))
+                parts.append(numbers.tobytes())
+            shape, new = self._shape(tuple(signature))
+            if new:
+                more["shape"] = signature
+            if single and set(map(type, names)) == {str}:
+                self._of_numbers[names] = shape
         flagged = [_flag(item) for item in estimate.flagged]
         if flagged:
             if len(flagged) > 0xFFFF:
@@ -268,6 +265,47 @@ class EstimateEncoder:
         if size > 0xFFFFFFFF:
             raise InvalidOutputError("the diagnostics of one step take more than 4 GiB")
         return b"".join([ANSWER.pack(ESTIMATE, given, bits, shape, len(flagged), size, len(tail), stamp), *parts])
+
+    def each(self, estimates: Estimates) -> list[bytes]:
+        """The answers of several steps; the bytes are those of one step after the other."""
+        t, given, parts = len(estimates), 0, []
+        for bit, name in enumerate(VECTORS):
+            if getattr(estimates, name) is not None:
+                given |= 1 << bit
+                parts.append(getattr(estimates, name))
+        bits = GIVEN_BITS[given]
+        if estimates.estimated is not None:
+            bits &= int.from_bytes(np.packbits(estimates.estimated, bitorder="little").tobytes(), "little")
+        if estimates.covariance is not None:
+            given |= COVARIANCE
+            parts.append(estimates.covariance)
+        shape, new = self._shape(tuple((name, a.shape[1:]) for name, a in estimates.diagnostics.items()))
+        table = np.column_stack([*(part.reshape(t, -1) for part in (*parts, *estimates.diagnostics.values()))])
+        flagged: dict[int, list[tuple[str, float]]] = {}
+        for step, source, when in estimates.flagged:
+            flagged.setdefault(step, []).append((source, when))
+        answers = []
+        for k, (time, numbers) in enumerate(zip(estimates.time.tolist(), table, strict=True)):
+            more: dict[str, Any] = {}
+            if new and k == 0:
+                more["shape"] = [(name, a.shape[1:]) for name, a in estimates.diagnostics.items()]
+            if k in flagged:
+                more["flagged"] = flagged[k]
+            tail = json.dumps(more).encode() if more else b""
+            size, flags = numbers.nbytes + len(tail), len(flagged.get(k, ()))
+            answers.append(
+                ANSWER.pack(ESTIMATE, given, bits, shape, flags, size, len(tail), time) + numbers.tobytes() + tail
+            )
+        return answers
+
+    def _shape(self, signature: tuple[tuple[str, tuple[int, ...]], ...]) -> tuple[int, bool]:
+        """The number of a set of diagnostics with their shapes, and whether it is new."""
+        new = signature not in self._shapes
+        if new:
+            if len(self._shapes) > 0xFFFF:
+                raise InvalidOutputError("the diagnostics have more than 65535 different sets of names and shapes")
+            self._shapes[signature] = len(self._shapes)
+        return self._shapes[signature], new
 
 
 def _with_states(estimate: Estimate) -> dict[str, Any]:

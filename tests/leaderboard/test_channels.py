@@ -75,7 +75,7 @@ def test_packets_in_plain_form_are_the_same_measurements(plugins, case):
     for k, packet in enumerate(recording.steps()):
         buffer = bytearray(b"".join(packets[k]))
         assert PacketDecoder.size(buffer) == len(buffer)
-        own = decode(buffer)
+        (own,) = decode(buffer)
         assert [(*m[:3], m.channel, m.source) for m in own.aids] == [(*m[:3], m.channel, m.source) for m in packet.aids]
         for mine, theirs in zip(own.aids, packet.aids, strict=True):
             assert np.array_equal(mine.value, theirs.value)

@@ -19,7 +19,7 @@ from simnav.leaderboard.campaign.request import file_of
 from simnav.leaderboard.campaign.sources import kernel_modules
 from simnav.leaderboard.campaign.training_runs import declared_ranges
 from simnav.leaderboard.results.errors import named
-from simnav.trial import describe_failure
+from simnav.trial import answers_to, describe_failure
 from simnav.trial.wire import VECTORS, EstimateEncoder, InvalidOutputError, PacketDecoder, real_array
 from simnav.types import NavigationStates
 
@@ -125,10 +125,20 @@ class _Session:
         return answer(Up.DONE, facts.encode())
 
     def step(self, packet: bytearray) -> bytes:
+        """The answer to a packet of one step; of several the times that they took, and the answers behind them."""
+        answers: list[bytes] = []
+        seconds: list[float] = []
+        steps = self._decode(packet)
         try:
-            return self._encode(self._estimator.update(self._decode(packet)))
+            for more, each in answers_to(self._estimator, steps, self._encode):
+                answers += more
+                seconds += [each] * len(more)
         except BaseException as error:
-            return self._raised(error)
+            answers.append(self._raised(error))
+        if len(steps) == 1:
+            return answers[0]
+        seconds += [0.0] * (len(steps) - len(seconds))
+        return answer(Up.ANSWERS, b"".join([np.array(seconds).tobytes(), *answers]))
 
     def smooth(self) -> bytes:
         try:

@@ -2,8 +2,9 @@
 
 The worker sends messages with a header of the size of a packet's: packets themselves, and those of `Down` with a body.
 The estimator process gives one answer to each, with the header `simnav.trial.wire.ANSWER`: an estimate, or one of
-`Up` with a body in JSON or in float64. Bodies to the estimator process are pickled, for they come from the harness;
-those from it never are.
+`Up` with a body in JSON or in float64. The answer to a packet of several steps holds the time that each took [s], and
+the answers to them one after the other, up to the first failure. Bodies to the estimator process are pickled, for they
+come from the harness; those from it never are.
 """
 
 from __future__ import annotations
@@ -41,6 +42,7 @@ class Up(IntEnum):
     DONE = 2
     FAILURE = 3
     TRAJECTORY = 4
+    ANSWERS = 5
 
 
 def command(kind: Down, body: bytes = b"") -> bytes:

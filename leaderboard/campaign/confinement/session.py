@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from simnav.leaderboard.campaign.request import file_of
-from simnav.trial import FailureError, LostError
+from simnav.trial import TOGETHER, FailureError, LostError
 from simnav.trial.wire import ANSWER, ESTIMATE, InvalidOutputError, PacketEncoder
 from simnav.types import NavigationStates
 
@@ -32,6 +32,7 @@ from .limits import why_it_died
 from .memory_group import MemoryGroup
 from .messages import LARGEST, Down, Up, command
 from .reachable_kernels import ALL
+from .replies import facts_in, trajectory_in
 from .resource_use import PROCESSES
 
 if TYPE_CHECKING:
@@ -312,7 +313,7 @@ class EstimatorServer:
                     f"the system has {facts['fault']}, but refuses it to estimator processes, so they cannot be "
                     "confined; confinement = 'none' runs estimators that you trust"
                 )
-            session = RemoteSession(write, read, limits)
+            session = RemoteSession(write, read, limits, together=TOGETHER if entrant.ours else 1)
             try:
                 yield session
             except _GoneError:
@@ -361,6 +362,8 @@ class RemoteSession:
         Descriptors of the pipes.
     limits : Limits
         What the process may take.
+    together : int
+        So many steps are handed over in one packet. Whoever is not trusted gets one, and could look ahead in more.
 
     Attributes
     ----------
@@ -374,8 +377,8 @@ class RemoteSession:
         Known when the process is gone [bytes].
     """
 
-    def __init__(self, write: int, read: int, limits: Limits):
-        self.name = ""
+    def __init__(self, write: int, read: int, limits: Limits, together: int = 1):
+        self.name, self._together = "", together
         self.needs: Any = ()
         self.observed: Any = None
         self.limits = limits
@@ -401,7 +404,7 @@ class RemoteSession:
         simnav.trial.FailureError
             If that fails.
         """
-        facts = _facts(self._ask(Down.MAKE, (entrant, _search_path(), words)))
+        facts = facts_in(self._ask(Down.MAKE, (entrant, _search_path(), words)))
         name, needs = facts.get("name"), facts.get("needs")
         self.needs = tuple(tuple(n) if isinstance(n, list) else n for n in needs) if isinstance(needs, list) else needs
         self.name = name[:200] if isinstance(name, str) else ""
@@ -414,21 +417,44 @@ class RemoteSession:
         simnav.trial.FailureError
             If it cannot be found.
         """
-        return _facts(self._ask(Down.DESCRIBE, (entrant, _search_path(), [0])))
+        return facts_in(self._ask(Down.DESCRIBE, (entrant, _search_path(), [0])))
 
     def begin(self, recording: Recording, packets: PacketEncoder) -> None:
         """Hand over start and datasheets."""
         homes = homes_of_kinds(recording.instruments)
-        facts = _facts(self._ask(Down.RESET, (recording.start, recording.instruments, packets.streams, homes)))
+        facts = facts_in(self._ask(Down.RESET, (recording.start, recording.instruments, packets.streams, homes)))
         self.observed = facts.get("observes")
 
     def run(self, packets: PacketEncoder, log: TrialLog) -> None:
-        """Hand over all packets; each is sent when the whole answer to the last one is here.
+        """Hand over all packets."""
+        self._steps = len(packets)
+        if self._together == 1:
+            self._run_one_by_one(packets, log)
+            return
+        for first in range(0, len(packets), self._together):
+            started, last = time.perf_counter(), min(first + self._together, len(packets))
+            self._send(b"".join(packets.of(first, last)))
+            reply = self._receive(LARGEST)
+            seconds, place = [time.perf_counter() - started], 0
+            if reply[0] == Up.ANSWERS:
+                seconds = np.frombuffer(reply, np.float64, last - first, ANSWER.size).tolist()
+                place = ANSWER.size + 8 * len(seconds)
+            try:
+                for each in seconds:
+                    end = place + ANSWER.size + int(_SIZE.unpack_from(reply, place)[0])
+                    if reply[place] != ESTIMATE:
+                        self._refuse(reply[place:end])
+                    log.put(reply[place:end], each)
+                    place = end
+            finally:
+                log.settle()
+
+    def _run_one_by_one(self, packets: PacketEncoder, log: TrialLog) -> None:
+        """Hand over all packets of single steps; each is sent when the whole answer to the last one is here.
 
         Between two steps next to nothing is done, for the estimator finds the caches of the processor as this process
         left them. Packets are encoded, and answers judged, for up to `_STEPS` steps together.
         """
-        self._steps = len(packets)
         write, read, ready, clock = os.write, os.read, self._readable.poll, time.perf_counter
         size_of, header, put = _SIZE.unpack_from, ANSWER.size, log.put
         for first in range(0, len(packets), _STEPS):
@@ -473,7 +499,7 @@ class RemoteSession:
             return None
         if reply[0] != Up.TRAJECTORY:
             self._refuse(reply)
-        return _trajectory(reply[ANSWER.size :])
+        return trajectory_in(reply[ANSWER.size :])
 
     def describe(self, error: BaseException) -> str:
         """What an exception says that was raised here."""
@@ -484,7 +510,7 @@ class RemoteSession:
         if self._silent:
             return
         try:
-            names = _facts(self._ask(Down.END, None)).get("libraries", [])
+            names = facts_in(self._ask(Down.END, None)).get("libraries", [])
         except (FailureError, InvalidOutputError):
             return
         if isinstance(names, list):
@@ -564,32 +590,3 @@ class RemoteSession:
 def _search_path() -> list[str]:
     """Where this process finds modules, for one in another folder: an empty entry is the folder that we are in."""
     return [os.path.abspath(entry) for entry in sys.path]
-
-
-def _facts(reply: bytes) -> dict[str, Any]:
-    """The JSON object in an answer."""
-    try:
-        facts = json.loads(reply[ANSWER.size :] or b"{}")
-    except (ValueError, RecursionError):
-        facts = None
-    if not isinstance(facts, dict):
-        raise InvalidOutputError("the answer is not in the form of an estimate")
-    return facts
-
-
-def _trajectory(body: bytes) -> NavigationStates:
-    """Four arrays: their shapes in JSON, then their numbers."""
-    try:
-        begin = 8 + int.from_bytes(body[:8])
-        shapes = [tuple(map(int, shape)) for shape in json.loads(body[8:begin])]
-        arrays = []
-        for shape in shapes:
-            if any(s < 0 for s in shape):
-                raise ValueError
-            count = int(np.prod(shape, dtype=object)) if shape else 1
-            arrays.append(np.frombuffer(body, np.float64, count, begin).reshape(shape))
-            begin += 8 * count
-        time_, position, velocity, attitude = arrays
-    except (ValueError, TypeError, RecursionError, OverflowError):
-        raise InvalidOutputError("the trajectory is not in the form of arrays") from None
-    return NavigationStates(time_, position, velocity, attitude)

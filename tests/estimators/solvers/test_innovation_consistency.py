@@ -7,7 +7,15 @@ import pytest
 
 import simnav
 from simnav.estimator import make
-from simnav.estimators.solvers.innovation_consistency import EPOCHS, LONG, InnovationTest
+from simnav.estimators.solvers.innovation_consistency import (
+    EPOCHS,
+    LONG,
+    TEST,
+    add_square,
+    begun_test,
+    end_epoch,
+    is_inconsistent,
+)
 from simnav.leaderboard.ranking.runs import Runs
 from simnav.leaderboard.results.result import Result
 from tests.agreement.voyages import turned
@@ -15,12 +23,12 @@ from tests.agreement.voyages import turned
 
 def reports(scale: float, epochs: int, seed: int = 0, each: int = 3) -> list[bool]:
     """What the test says of innovations whose variance is ``scale`` times the one that was claimed."""
-    rng, test, found = np.random.default_rng(seed), InnovationTest(), []
+    rng, test, found = np.random.default_rng(seed), begun_test(), []
     for _ in range(epochs):
         for _ in range(each):
-            test.add(scale * rng.chisquare(3), 3)
-        test.end_epoch()
-        found.append(test.inconsistent)
+            add_square(test, scale * rng.chisquare(3), 3)
+        end_epoch(test)
+        found.append(is_inconsistent(test))
     return found
 
 
@@ -34,26 +42,26 @@ def test_wrong_innovations_are_not():
 
 
 def test_an_epoch_without_measurements_says_nothing():
-    test = InnovationTest()
-    test.end_epoch()
-    assert np.isnan(test.variance_factor)
-    assert not test.inconsistent
+    test = begun_test()
+    end_epoch(test)
+    assert np.isnan(test.view(TEST)[0].variance_factor)
+    assert not is_inconsistent(test)
     for _ in range(EPOCHS):
-        test.add(60.0, 3)
-        test.end_epoch()
-    assert test.inconsistent
-    assert test.variance_factor == 20.0
-    test.end_epoch()
-    assert test.inconsistent
+        add_square(test, 60.0, 3)
+        end_epoch(test)
+    assert is_inconsistent(test)
+    assert test.view(TEST)[0].variance_factor == 20.0
+    end_epoch(test)
+    assert is_inconsistent(test)
 
 
 def after(square: float, epochs: int, seed: int = 0) -> list[bool]:
     """What the test says after some epochs with a square of 4 components, and right ones from then on."""
-    rng, test, found = np.random.default_rng(seed), InnovationTest(), []
+    rng, test, found = np.random.default_rng(seed), begun_test(), []
     for k in range(400):
-        test.add(rng.chisquare(4) if not 100 <= k < 100 + epochs else square, 4)
-        test.end_epoch()
-        found.append(test.inconsistent)
+        add_square(test, rng.chisquare(4) if not 100 <= k < 100 + epochs else square, 4)
+        end_epoch(test)
+        found.append(is_inconsistent(test))
     return found[100:]
 
 

@@ -186,6 +186,24 @@ def test_smoothed_trajectories_cross_too(
     same(there.trial, run_trial(make(str(file)), recording))
 
 
+def test_an_estimator_of_others_gets_one_step_at_a_time(
+    server: EstimatorServer, recording: Recording, tmp_path: Path
+) -> None:
+    """It could look ahead in the others, wherever its arrays come from; our rows get many steps in one packet."""
+    file = tmp_path / "mine.py"
+    ahead = "\n    def update_all(self, steps):\n        raise ValueError(f'{len(steps)} steps')\n"
+    size = "a = measurements.imu.time; diagnostics = {'size': float((a if a.base is None else a.base).size)}"
+    file.write_text(HEAD.format(reset="", update=size) + ahead)
+    there = attempt(server, entrant(str(file)), recording, Limits(60.0, 1 << 30))
+    assert there.trial is not None
+    assert there.status == "ok", there.reason
+    assert there.trial.diagnostics["size"].max() < 2 * there.trial.diagnostics["size"].min()
+    assert "60 steps" in run_trial(make(str(file)), recording).reason  # who runs it here trusts it
+    assert entrant("ekf").ours
+    assert not entrant(str(file)).ours
+    assert not replace(entrant("ekf"), own="somebody's").ours
+
+
 def test_an_estimator_has_the_linear_algebra_of_the_one_who_starts_it(
     recording: Recording, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

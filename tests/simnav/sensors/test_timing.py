@@ -127,7 +127,7 @@ def test_wire_steps_and_environment_deliver_the_same():
     wanted = steps_of(recording)
     encoder = PacketEncoder(recording.data, recording.data.truth.time)
     decode = PacketDecoder(encoder.streams)
-    decoded = [decode(bytearray(b"".join(encoder[k]))) for k in range(len(encoder))]
+    decoded = [packet for k in range(len(encoder)) for packet in decode(bytearray(b"".join(encoder[k])))]
     assert [[(m.instrument, m.time, *m.value) for m in packet] for packet in decoded] == wanted
     runs = SteppedRuns(1)
     runs.begin(0, Simulator(scenario, 3))

@@ -1,0 +1,89 @@
+"""What a filter reports of its steps: the innovation of each instrument, its tests, and the noise that was chosen."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from simnav.compiled import kernel
+from simnav.estimators.models.filtering import Readings
+from simnav.kernel_types import IntegerVector, Matrix, Vector
+from simnav.records import Record
+
+from .innovation_consistency import TEST, add_square, end_epoch, is_inconsistent
+
+__all__ = ["TESTS", "StepReport", "end_report", "note_readings"]
+
+#: What a row of a report holds behind the innovations.
+TESTS = ("skipped", "variance_factor", "inconsistent")
+
+
+class StepReport(Record):
+    """What is reported of i instruments of a filter.
+
+    Attributes
+    ----------
+    freedom : (i,) array of int
+        Number of components of a reading.
+    skipped : (1,) array
+        Number of readings so far that could not be used.
+    test : array
+        The test of the innovations (`simnav.estimators.solvers.innovation_consistency`).
+    chosen : (j, 4) array
+        `simnav.estimators.adaptations.noise_report.NoiseReport.values`.
+    index : (i,) array of int
+        Row of each instrument in it; -1 where nothing is chosen.
+    with_zero : bool
+        Whether a number of 0 is reported.
+    innovations : (2 i,) array
+        Norm and normalised square of the last innovation of each instrument in a step; NaN where there is none.
+    """
+
+    freedom: IntegerVector
+    skipped: Vector
+    test: Vector
+    chosen: Matrix
+    index: IntegerVector
+    with_zero: bool
+    innovations: Vector
+
+
+@kernel
+def note_readings(report: StepReport, readings: Readings, count: int) -> None:
+    """Note what became of some readings."""
+    for k in range(count):
+        if readings.rejected[k]:
+            continue
+        row = readings.instrument[k]
+        at = report.index[row]
+        if at >= 0 and readings.sigma[k, 0] == readings.sigma[k, 0]:
+            for a in range(3):
+                report.chosen[at, a] = readings.sigma[k, a]
+            if readings.reported[k] != 0.0 or report.with_zero:
+                report.chosen[at, 3] = readings.reported[k]
+        if readings.nis[k] < 0.0:
+            report.skipped[0] += 1.0
+            continue
+        add_square(report.test, readings.nis[k], report.freedom[row])
+        report.innovations[2 * row], report.innovations[2 * row + 1] = readings.size[k], readings.nis[k]
+
+
+@kernel
+def end_report(report: StepReport, row: Vector) -> None:
+    """Test the innovations at the end of a step, and write all that is reported of it into a row.
+
+    Parameters
+    ----------
+    report : StepReport
+        Updated.
+    row : (2 i + 3 + 4 j,) array
+        Overwritten: the innovations, `TESTS`, and the chosen noise.
+    """
+    end_epoch(report.test)
+    n, (j, width) = report.innovations.size, report.chosen.shape
+    for a in range(n):
+        row[a], report.innovations[a] = report.innovations[a], np.nan
+    row[n], row[n + 1] = report.skipped[0], report.test.view(TEST)[0].variance_factor
+    row[n + 2] = 1.0 if is_inconsistent(report.test) else 0.0
+    for a in range(j):
+        for b in range(width):
+            row[n + 3 + width * a + b] = report.chosen[a, b]
