@@ -81,7 +81,7 @@ size_m = 30.0"""
             stream = (recording := record(parse(text), seed)).data.aids["gnss"]
             noisy = (stream.time > 10.1) & (stream.time < 19.9)
             found.append(np.mean(1.0 / information(recording, stream)[noisy]))
-        # The noise of the mean over the 20 readings of the step, by what is subtracted: 0 in the mean, but not negative.
+        # The noise of the mean over 20 readings, by what is subtracted: 0 in the mean, but not negative.
         allowed = k * 8.0 / 20.0 if square == 0.0 else 0.25 * k * square
         assert abs(np.mean(found) - (9.0 + k * square)) < allowed
 
