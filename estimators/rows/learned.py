@@ -6,16 +6,18 @@ Each is ``ekf`` (``ship-ekf`` without an IMU) or the window of the robust rows, 
 from simnav.estimator import register
 from simnav.estimators.adaptations.learned_noise import LearnedNoise
 from simnav.estimators.composition import piece
+from simnav.estimators.models.inertial import InertialModel
 from simnav.estimators.models.suitable import Suitable
 from simnav.estimators.solvers.iterated import poor_heading
 from simnav.estimators.solvers.kalman import KalmanEstimator
+from simnav.estimators.solvers.missing_velocity import MissingVelocityEstimator, PredictedVelocity
 from simnav.estimators.solvers.window import WindowEstimator
 from simnav.estimators.weightings.fault_isolation import FaultIsolation
 from simnav.estimators.weightings.learned_weights import LearnedWeights
 
 from .network_row import NetworkRow
 
-__all__ = ["NetEkf", "NetFgo"]
+__all__ = ["BeamsEkf", "NetEkf", "NetFgo"]
 
 
 @register("net-ekf")
@@ -53,4 +55,22 @@ class NetFgo(
     is lost. On a ship without an IMU it had up to 5.2 times the error of ``ship-ekf`` (``random-ships``).
 
     Source: ours (``estimators/training/factor_network.py``).
+    """
+
+
+@register("beams-ekf")
+class BeamsEkf(
+    NetworkRow,
+    solver=MissingVelocityEstimator,
+    model=InertialModel,
+    velocity=PredictedVelocity,
+    iteration=poor_heading,
+):
+    """EKF that is told a velocity by a recurrent network while its DVL gives none.
+
+    TEXT
+
+    Source: ours (``estimators/training/velocity_network.py``), in the manner of N. Cohen and I. Klein, *BeamsNet: a
+    data-driven approach enhancing Doppler velocity log measurements for autonomous underwater vehicle navigation*,
+    Engineering Applications of Artificial Intelligence 114, 2022.
     """

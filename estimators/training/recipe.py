@@ -138,8 +138,8 @@ class Recipe:
         checked = self.gather(voyages(self.families, "validation", few))
         gathered = time.perf_counter() - begin
         sizes = [int(size) for size in options.sizes.split(",") if size]
-        plan = [(options.voyages, options.seed + k) for k in range(options.seeds)]
-        plan += [(size, options.seed) for size in sizes if size < options.voyages]
+        plan = [(size, options.seed) for size in (options.voyages, *sizes)]
+        plan += [(options.voyages, options.seed + k) for k in range(1, options.seeds)]
         curves, files = list[dict[str, Any]](), dict[str, str]()
         for size, seed in plan:
             first = (size, seed) == plan[0]
