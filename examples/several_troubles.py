@@ -4,7 +4,8 @@ A rule is linear in what the filter tells of an instrument (`SEEN`). There is on
 for headings, whatever the instrument, so that the same numbers fit families with other instruments; and one for the
 process noise. The cross-entropy method draws the numbers of many policies, lets all of them act on a voyage of each
 family at once, and fits the distribution to the best eighth. What counts is the gain over the plain filter on the same
-voyage, by the likelihood of the true position, in a scale in which no voyage counts much more than others.
+voyage, by the likelihood of the true position, between -1 and 1: so a loss where nothing is wrong counts as much as a
+gain where much is wrong. With gains without bounds the policy had four times the error of ``ekf`` on clean voyages.
 Run it; it takes less than half an hour on one core::
 
     python examples/several_troubles.py --output policy.npz
@@ -24,8 +25,9 @@ from simnav.estimators.learning.policy import Policy, record_of_training
 from simnav.estimators.learning.vector import FilterTaskVectorEnv
 from simnav.types import KINDS
 
-#: Receivers; outages with bad fixes behind them; disturbed IMUs, DVLs and fixes; compasses and logs without an IMU.
-FAMILIES = ("training-gnss-faults", "training-outages", "training-motion", "training-ships")
+#: Receivers; outages with bad fixes behind them; disturbed IMUs, DVLs and fixes; compasses and logs without an IMU; and
+#: nothing wrong.
+FAMILIES = ("training-gnss-faults", "training-outages", "training-motion", "training-ships", "training-clean")
 ROLES = ("fix", "velocity", "heading")
 SEEN = ("mean_innovation", "size_of_mean", "setting", "innovation[0]")  # and the sigma of the position, and a constant
 NUMBERS = len(ROLES) * (len(SEEN) + 2) + len(ROLES) + 1
@@ -63,7 +65,7 @@ def policy_of(numbers, told):
     )
 
 
-def train(families=FAMILIES, *, generations=25, population=48, voyages=16, length=None, seed=0, after=None):
+def train(families=FAMILIES, *, generations=25, population=40, voyages=16, length=None, seed=0, after=None):
     """The policy, and the mean gain of the mean policy in each generation; ``after`` is told of every generation."""
     options = {"reward": "likelihood", "voyages": voyages, "steps": length, "memory_gb": 6.0}  # most stays unused
     made = [FilterTaskVectorEnv(family, "Tuning", population, **options) for family in families]
@@ -90,7 +92,7 @@ def train(families=FAMILIES, *, generations=25, population=48, voyages=16, lengt
                 [10_000 * seed + generation] * population,
             )
             count = length or envs.options.scenario.epochs
-            gains += np.arcsinh((returns - returns[1]) / count) / len(families)
+            gains += np.tanh((returns - returns[1]) / count) / len(families)
             steps += population * count
         best = drawn[np.argsort(gains)[-population // 8 :]]
         mean = best.mean(axis=0)

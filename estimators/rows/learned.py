@@ -34,7 +34,14 @@ class NetEkf(NetworkRow, solver=KalmanEstimator, model=Suitable, iteration=poor_
     Source: ours (``estimators/training/noise_network.py``), in the manner of G. Revach, N. Shlezinger, X. Ni et al.,
     *KalmanNet: neural network aided Kalman filtering for partially known dynamics*, IEEE Trans. Signal Processing 70,
     2022, and of N. Cohen and I. Klein, *Adaptive Kalman-informed transformer*, 2025.
+
+    Versions
+    --------
+    2
+        The network learned anew: before, its target counted a noise step twice.
     """
+
+    version = 2
 
 
 @register("net-fgo")
@@ -55,7 +62,14 @@ class NetFgo(
     is lost. On a ship without an IMU it had up to 5.2 times the error of ``ship-ekf`` (``random-ships``).
 
     Source: ours (``estimators/training/factor_network.py``).
+
+    Versions
+    --------
+    2
+        The network learned anew: before, its target counted a noise step twice.
     """
+
+    version = 2
 
 
 @register("beams-ekf")

@@ -61,6 +61,6 @@ class BeamsEkf(
         *,
         calibrate: bool = True,
         file: str = "",
-        lasting: float = 30.0,
+        lasting: float = 10.0,
         iterate_above_deg: float | None = None,
     ) -> None: ...

@@ -55,7 +55,7 @@ class PredictedVelocity:
         If the time is not positive.
     """
 
-    def __init__(self, file: str = "", lasting: float = 30.0):
+    def __init__(self, file: str = "", lasting: float = 10.0):
         if not lasting > 0.0:
             raise ValueError(f"lasting = {lasting:g}: it must be positive")
         path = Path(file).expanduser() if file else VelocityNetwork.shipped()

@@ -109,6 +109,8 @@ class Recipe:
         ``train(data, checked, epochs, seed)`` from such items of training and validation.
     rows : tuple of str
         Rows beside which its row is compared.
+    altered : callable, optional
+        What is done to the voyages on which rows are compared.
     """
 
     about: str
@@ -120,6 +122,7 @@ class Recipe:
     gather: Callable[[Iterable[Recording]], list[Any]]
     train: Callable[[Sequence[Any], Sequence[Any], int, int], Fitted]
     rows: tuple[str, ...] = ("iae", "gnc-fgo")
+    altered: Callable[[Recording], Recording] | None = None
 
     def command(self, name: str, arguments: Sequence[str] | None = None) -> None:
         """Train, and write the network and the curves."""
@@ -162,7 +165,8 @@ class Recipe:
         numbers = range(FIRST_COMPARED * n, FIRST_COMPARED * n + options.compared)
         rows: dict[str, Callable[[], Estimator]] = {row: lambda row=row: make(row) for row in self.rows}
         rows |= {run: lambda file=file: make(self.row, file=file) for run, file in files.items()}
-        compared = error_over_plain(rows, voyages(self.families, "validation", numbers))
+        seen = voyages(self.families, "validation", numbers)
+        compared = error_over_plain(rows, seen if self.altered is None else map(self.altered, seen))
         document = {
             "row": self.row, "loss": self.loss, "families": list(self.families), "curves": curves,
             "others": {row: compared[row] for row in self.rows},

@@ -37,7 +37,7 @@ from simnav.types import Array, Measurements
 
 from .recipe import Fitted, Recipe, recorded
 
-__all__ = ["FAMILIES", "Silenced", "fit", "gather", "silent_times", "train"]
+__all__ = ["FAMILIES", "Silenced", "fit", "gather", "lost", "silenced", "silent_times", "train"]
 
 #: Whole voyages with faults, poor and MEMS IMUs, clean voyages, and receivers that are silent.
 FAMILIES = ("training-voyages", "training-poor-imu-faults", "training-mems", "training-clean", "training-outages")
@@ -79,6 +79,21 @@ def silenced(packet: Measurements, name: str, times: Sequence[tuple[float, float
     """A packet without the readings of an instrument at some times."""
     kept = [m for m in packet if m.instrument != name or not any(a <= m.time < b for a, b in times)]
     return replace(packet, aids=kept)
+
+
+def lost(recording: Recording) -> Recording:
+    """A voyage whose DVL is silenced (`silent_times`), and with it all that gives a position; itself without a DVL."""
+    sheet, aids = VelocityNetwork.dvl_of(recording.instruments), dict(recording.data.aids)
+    if sheet is None:
+        return recording
+    times = silent_times(recording.duration, np.random.default_rng([recording.seed, _TIMES]))
+    for name, stream in aids.items():
+        if name == sheet.name or recording.instruments[name].gives_position:
+            heard = np.ones(len(stream), np.bool_)
+            for begin, end in times:
+                heard &= (stream.time < begin) | (stream.time >= end)
+            aids[name] = stream.rows(np.flatnonzero(heard))
+    return replace(recording, data=replace(recording.data, aids=aids))
 
 
 def gather(recordings: Iterable[Recording]) -> list[list[Silenced]]:
@@ -180,7 +195,7 @@ def train(data: Sequence[Sequence[Silenced]], checked: Sequence[Sequence[Silence
 
 RECIPE_OF_ROW = Recipe(
     "Train the network that predicts the velocity without a DVL.", "beams-ekf", "negative log likelihood", FAMILIES,
-    600, 30, gather, train,
+    600, 20, gather, train, altered=lost,
 )  # fmt: skip
 
 if __name__ == "__main__":

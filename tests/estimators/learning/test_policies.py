@@ -9,6 +9,7 @@ import simnav
 from simnav.environment.seeds import FIRST_TRAINING_SEED, require_disjoint, training_seed
 from simnav.estimators.learning import policy as policies
 from simnav.estimators.learning.environment import FilterTaskEnv
+from simnav.estimators.learning.features import observation_size
 from simnav.estimators.learning.policy import Policy, PolicyError, record_of_training
 from simnav.estimators.learning.policy_estimator import PolicyEstimator
 from simnav.scenario import load
@@ -113,6 +114,20 @@ def test_a_policy_sees_the_first_receiver_and_leaves_the_others_alone(tmp_path):
     assert "sigma_north.second" not in trial.diagnostics
 
 
+def test_a_policy_for_several_kinds_is_asked_about_those_that_are_there(tmp_path):
+    size = observation_size(2, 1)
+    weights = np.zeros((3, size)), np.array([0.5, -0.5, 0.0])
+    about = {"task": "Tuning", "kinds": ["gnss_position", "magnetic_compass"], "most": 1, "instruments": "all"}
+    Policy([weights], trained_on=TOLD, **about).save(tmp_path / "policy.npz")
+    recording = record(load("gnss-noise-step").model_copy(update={"duration": 8.0, "faults": ()}), 1)
+    assert not recording.instruments.of_kind("magnetic_compass")
+    trial = run_trial(PolicyEstimator(str(tmp_path / "policy.npz")), recording)
+    assert trial.status == "ok", trial.reason
+    sigma = trial.diagnostics["sigma_north.gnss"] / recording.instruments["gnss"].sigma[0]
+    np.testing.assert_allclose(sigma, np.sqrt(30.0))
+    assert not [name for name in trial.diagnostics if "compass" in name]
+
+
 def test_layers_that_do_not_follow_each_other():
     with pytest.raises(PolicyError, match=r"layer 1 has a weight of shape \(2, 5\).*should take 6 numbers"):
         Policy(
@@ -138,10 +153,12 @@ def test_training_and_scoring_never_meet():
 def test_the_policy_that_comes_along_says_what_it_learned_from():
     estimator = simnav.make("policy-ekf")
     told = estimator.policy.trained_on
-    assert load(told["scenario"]).training
+    families = [versioned.rpartition("-v")[0] for versioned in told["scenario"].split(", ")]
+    assert all(load(family).training for family in families)
     assert told["first_seed"] == FIRST_TRAINING_SEED
     estimator.policy.require_unseen(range(1000))
     words = " ".join(type(estimator).__doc__.split())
-    assert f"on {told['voyages']} training voyages of ``{told['scenario'].rpartition('-v')[0]}``" in words
+    assert f"on {told['voyages']} training voyages" in words
+    assert all(f"``{family}``" in words for family in families)
     assert f"{told['steps']:,} steps".replace(",", " ") in words
     assert "simnav" in told["versions"]
