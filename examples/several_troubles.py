@@ -1,4 +1,4 @@
-"""A policy of Tuning for several instruments and troubles: what comes with the row ``policy-ekf``.
+"""A policy of Tuning for several instruments and troubles, for the row ``policy-ekf``.
 
 A rule is linear in what the filter tells of an instrument (`SEEN`). There is one for fixes, one for velocities and one
 for headings, whatever the instrument, so that the same numbers fit families with other instruments; and one for the

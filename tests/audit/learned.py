@@ -39,7 +39,7 @@ GROUPS: dict[str, tuple[str, ...]] = {
     "Fixes noisy or jumping": ("gnss-jumps", "gnss-noise", "gnss-noise-step"),
     "Fixes that lie slowly": ("gnss-multipath", "gnss-spoofing", "lasting-bias"),
     "Outage": ("gnss-outage", "fishing-vessel"),
-    "The DVL silent": ("lawnmower-beams", "survey-without-bottom-lock", "under-ice-transit"),
+    "The DVL silent": ("lawnmower-beams", "survey-without-bottom-lock"),
     "Velocity aid wrong": ("auv-soft-mud", "dvl-in-bubbles", "ferry-in-the-wind"),
     "Start or heading wrong": ("poor-heading", "wrong-start"),
     "A datasheet wrong": ("one-wrong-datasheet", "wrong-datasheet"),

@@ -153,12 +153,10 @@ def test_training_and_scoring_never_meet():
 def test_the_policy_that_comes_along_says_what_it_learned_from():
     estimator = simnav.make("policy-ekf")
     told = estimator.policy.trained_on
-    families = [versioned.rpartition("-v")[0] for versioned in told["scenario"].split(", ")]
-    assert all(load(family).training for family in families)
+    assert load(told["scenario"]).training
     assert told["first_seed"] == FIRST_TRAINING_SEED
     estimator.policy.require_unseen(range(1000))
     words = " ".join(type(estimator).__doc__.split())
-    assert f"on {told['voyages']} training voyages" in words
-    assert all(f"``{family}``" in words for family in families)
+    assert f"on {told['voyages']} training voyages of ``{told['scenario'].rpartition('-v')[0]}``" in words
     assert f"{told['steps']:,} steps".replace(",", " ") in words
     assert "simnav" in told["versions"]
