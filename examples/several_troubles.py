@@ -60,9 +60,7 @@ def matrices(drawn, kinds, names, columns):
 def policy_of(numbers, told):
     """The policy as plain arrays, for one instrument of each kind and one measurement a step."""
     weight, constant = matrices(numbers[None], DECIDED, DECIDED, observation_names(list(DECIDED), 1))
-    return Policy(
-        [(weight[0], constant[0])], task="Tuning", kinds=DECIDED, most=1, instruments="all", trained_on=told
-    )
+    return Policy([(weight[0], constant[0])], task="Tuning", kinds=DECIDED, most=1, instruments="all", trained_on=told)
 
 
 def train(families=FAMILIES, *, generations=25, population=40, voyages=16, length=None, seed=0, after=None):
