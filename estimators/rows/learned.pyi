@@ -18,6 +18,7 @@ __all__ = ["BeamsEkf", "NetEkf", "NetFgo"]
 
 @register("net-ekf")
 class NetEkf(NetworkRow, solver=KalmanEstimator, model=Suitable, iteration=poor_heading, adaptation=LearnedNoise):
+    version = 2
     def __init__(
         self,
         *,
@@ -34,6 +35,7 @@ class NetFgo(
     weighting=LearnedWeights,
     isolation=FaultIsolation,
 ):
+    version = 2
     def __init__(
         self,
         *,
