@@ -134,8 +134,55 @@ def draw_sweep() -> None:
     save(fig, DOCS / "figures" / "sweep", formats=("png",))
 
 
+def draw_learning() -> None:
+    """What the recipes of learned rows wrote: losses against steps, and the error of the row against voyages."""
+    for file in sorted((DOCS / "figures").glob("learning-*.json")):
+        found = json.loads(file.read_text(encoding="utf-8"))
+        style, rng = Style((found["row"], *found["others"])), np.random.default_rng(0)
+        whole = found["curves"][0]["voyages"]
+        with styled():
+            fig = figure(9.0, 3.1)
+            losses, errors_ = fig.subplots(1, 2)
+            for curve in (c for c in found["curves"] if c["voyages"] == whole):
+                steps = curve["steps_per_epoch"] * np.arange(1, len(curve["validation"]) + 1)
+                first = curve is found["curves"][0]
+                for name, line in (("training", "--"), ("validation", "-")):
+                    colour = "0.6" if name == "training" else style.colour(found["row"])
+                    losses.plot(steps, curve[name], line, color=colour, lw=1.4, label=name if first else None)
+            losses.set_xlabel("Steps of the optimizer")
+            losses.set_ylabel("Loss")
+            losses.set_title(f"{found['row']}, {whole} voyages: {found['loss']}", fontsize=8)
+            losses.legend(fontsize=7)
+            for curve, ratios in zip(found["curves"], found["rows"], strict=True):
+                mean, low, high = _geometric_mean(ratios, rng)
+                bars = [[mean - low], [high - mean]]
+                errors_.errorbar(curve["voyages"], mean, bars, fmt="o", ms=4, color=style.colour(found["row"]))
+            for name, ratios in found["others"].items():
+                mean, *_ = _geometric_mean(ratios, rng)
+                errors_.axhline(mean, color=style.colour(name), lw=1.4, label=name)
+            errors_.axhline(1.0, color="0.15", lw=1.0, label="ekf")
+            sizes = sorted({curve["voyages"] for curve in found["curves"]})
+            errors_.set_xscale("log")
+            errors_.set_xlim(0.7 * sizes[0], 1.4 * sizes[-1])
+            errors_.set_xticks(sizes, [str(size) for size in sizes])
+            errors_.minorticks_off()
+            errors_.set_xlabel("Voyages of the training")
+            errors_.set_ylabel("Error over that of ekf")
+            errors_.set_title(f"{len(found['rows'][0])} validation voyages, 95 % intervals")
+            errors_.legend(fontsize=7)
+            save(fig, file.with_suffix(""), formats=("png",))
+
+
+def _geometric_mean(ratios: list[float | None], rng: np.random.Generator) -> tuple[float, float, float]:
+    """The geometric mean of ratios, with a bootstrap interval of 95 % over voyages."""
+    logs = np.log([r for r in ratios if r is not None])
+    means = rng.choice(logs, (2000, len(logs))).mean(axis=1)
+    return float(np.exp(logs.mean())), *(float(x) for x in np.exp(np.quantile(means, [0.025, 0.975])))
+
+
 if __name__ == "__main__":
     draw()
     draw_first_estimator()
     draw_parts()
     draw_sweep()
+    draw_learning()

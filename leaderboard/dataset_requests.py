@@ -8,7 +8,6 @@ from dataclasses import KW_ONLY
 from simnav.leaderboard.campaign.options import PathLike
 
 from .calls import option, request
-from .dataset.splits import SPLITS
 from .requests import PROGRESS, Bar, ScenarioLike
 
 __all__ = ["DatasetRequest"]
@@ -18,7 +17,8 @@ __all__ = ["DatasetRequest"]
 class DatasetRequest:
     """Write recordings of random voyages to learn from, as Parquet, in splits train, validation and test.
 
-    Truth and labels of split test are not written. What is there is kept: started again, the call continues, also with
+    Truth and labels of split test are not written, and its seeds follow from a key, so that nobody else can simulate
+    them. What is there is kept: started again, the call continues, also with
     a larger size.
     """
 
@@ -37,16 +37,18 @@ class DatasetRequest:
         help="Voyages of split train; validation and test have a tenth of that, at least one.",
         least=1,
     )
-    splits: str | Iterable[str] = option(
+    splits: str | Iterable[str] | None = option(
         "--split",
-        default=SPLITS,
+        default=None,
         cli=str,
-        cli_default=",".join(SPLITS),
         metavar="NAMES",
-        help="Splits to write, separated by commas.",
+        help="Splits to write, separated by commas; by default train and validation, and test with a key.",
     )
     sealed: PathLike | None = option(
-        "--sealed", default=None, metavar="KEYFILE", help="Derive the seeds of split test from the secret in this file."
+        "--sealed",
+        default=None,
+        metavar="KEYFILE",
+        help="Key file from which the seeds of split test are derived; there is no such split without one.",
     )
     workers: int = option(default=2, help="Number of processes.", least=1)
     progress: Bar = option(default=None, help=PROGRESS, hidden=True)

@@ -11,7 +11,7 @@ from simnav.leaderboard.results.errors import RequestError, mistakes
 
 from .arguments import absolute, scenario_of
 from .calls import call, whole_number
-from .dataset.splits import named_splits, require_family, sizes
+from .dataset.splits import OPEN, SPLITS, named_splits, require_family, require_key, sizes
 from .dataset_requests import DatasetRequest
 from .requests import ScenarioLike
 
@@ -36,7 +36,8 @@ def dataset(request: DatasetRequest) -> DatasetReport:
     Raises
     ------
     RequestError
-        If the family is unknown or ranked, there is no such split, or the folder holds something else: one sentence.
+        If the family is unknown or ranked, there is no such split, a key is missing, or the folder holds something
+        else: one sentence.
     """
     from simnav.leaderboard.campaign.seal import read_seal
 
@@ -44,8 +45,12 @@ def dataset(request: DatasetRequest) -> DatasetReport:
 
     family, workers = _family(request.family), whole_number("workers", request.workers, 1)
     wanted = sizes(whole_number("size", request.size, 1))
-    asked = {split: wanted[split] for split in named_splits(request.splits)}
-    return make(family, asked, absolute(request.output), read_seal(request.sealed), workers, request.progress)
+    seal = read_seal(request.sealed)
+    by_default = SPLITS if seal.secret else OPEN
+    splits = named_splits(by_default if request.splits is None else request.splits)
+    require_key(splits, seal)
+    asked = {split: wanted[split] for split in splits}
+    return make(family, asked, absolute(request.output), seal, workers, request.progress)
 
 
 def voyages(
@@ -63,7 +68,7 @@ def voyages(
         Numbers of the voyages in the split. Default: 0, 1, 2 and so on, without end. Processes that share the work
         take ``itertools.count(number_of_this_process, number_of_processes)``.
     sealed : path, optional
-        Key file from which the seeds of split ``test`` are derived.
+        Key file from which the seeds of split ``test`` are derived; this split needs one.
 
     Returns
     -------
@@ -73,7 +78,7 @@ def voyages(
     Raises
     ------
     RequestError
-        If the family is unknown or ranked, or there is no such split: one sentence.
+        If the family is unknown or ranked, there is no such split, or a key is missing: one sentence.
 
     Examples
     --------
@@ -85,8 +90,9 @@ def voyages(
 
     from .dataset.voyages import recordings
 
-    found, seal = _family(family), read_seal(sealed)
-    return recordings(found, _split(split), count() if numbers is None else _whole(numbers), seal)
+    found, name, seal = _family(family), _split(split), read_seal(sealed)
+    require_key([name], seal)
+    return recordings(found, name, count() if numbers is None else _whole(numbers), seal)
 
 
 def read_voyages(folder: PathLike, split: str = "train", numbers: Iterable[int] | None = None) -> Iterator[Recording]:

@@ -46,8 +46,8 @@ class PolicyEstimator(Estimator):
 
     @property
     def needs(self) -> Needs:
-        """What the plain filter needs, and an instrument of each kind that the policy is asked about."""
-        return (*Suitable().needs, *self.policy.kinds)
+        """What the plain filter needs, and an instrument of a kind that the policy is asked about."""
+        return (*Suitable().needs, tuple(self.policy.kinds))
 
     @property
     def learned_from(self) -> Sequence[tuple[int, int]]:
@@ -55,9 +55,10 @@ class PolicyEstimator(Estimator):
         return self.policy.learned_from
 
     def reset(self, start: InitialState, instruments: Instruments) -> None:
-        """Begin a run; UnsuitableScenario where an instrument is lacking.
+        """Begin a run; UnsuitableScenario where there is no instrument of its kinds.
 
         The policy is asked about the first instrument, or channel, of each of its kinds; all others keep their noise.
+        Of a kind that is not there it sees what it saw in training: zeros.
         """
         policy, instruments = self.policy, by_channel(instruments)
         self._fix_test = FixTest(instruments)
@@ -65,10 +66,10 @@ class PolicyEstimator(Estimator):
         self._filter.reset(start, instruments)
         names: list[str] = []
         for kind in policy.kinds:
-            name = next((n for n in self._filter.watched if instruments[n].kind == kind and n not in names), None)
-            if name is None:
-                raise UnsuitableScenario(f"{policy.source}: it was trained for a {kind}; there is none")
-            names.append(name)
+            own = (n for n in self._filter.watched if instruments[n].kind == kind and n not in names)
+            names.append(next(own, f"no {kind}"))
+        if not set(names) & set(instruments):
+            raise UnsuitableScenario(f"{policy.source}: it was trained for {', '.join(policy.kinds)}; there is none")
         kinds, every = policy.kinds, list(instruments)
         layout = Layout(every, names, kinds, policy.most, self._filter.model.size, 0.0)
         self._instruments, self._layout = instruments, layout
@@ -113,6 +114,8 @@ class PolicyEstimator(Estimator):
         """The sigmas in use, as the adaptive filters report theirs."""
         used: dict[str, float | Array] = {}
         for i, name in enumerate(self._layout.names):
+            if name not in self._instruments:
+                continue
             sheet, factor = self._instruments[name], float(self._filters.decision.scale[0, i, 0])
             for component, sigma in zip(KINDS[sheet.kind].errors, sheet.sigma.tolist(), strict=True):
                 used[f"sigma_{component}.{name}"] = factor * sigma

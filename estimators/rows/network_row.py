@@ -12,13 +12,13 @@ __all__ = ["NetworkRow"]
 
 
 class NetworkRow(Row):
-    """A row with a network in its adaptation or weighting."""
+    """A row with a network in its adaptation or weighting, or for the velocity."""
 
     @property
     def network(self) -> Network:
         """The network."""
-        solver: Any = self.solver
-        piece: Any = solver.adaptation or solver.weighting
+        own = vars(self.solver)
+        piece: Any = next(own[name] for name in ("adaptation", "weighting", "velocity") if own.get(name) is not None)
         found: Network = piece.network
         return found
 

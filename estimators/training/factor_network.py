@@ -14,12 +14,9 @@ Run it; it takes less than half an hour on one core::
 
 from __future__ import annotations
 
-import argparse
-import json
 import time
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -40,9 +37,9 @@ from simnav.recording import Recording
 from simnav.types import Array
 
 from .information import information
-from .voyages import streams_of, versions, voyages
+from .recipe import Fitted, Recipe, recorded
 
-__all__ = ["FAMILIES", "Noted", "fit", "gather", "main", "train"]
+__all__ = ["FAMILIES", "Noted", "fit", "gather", "train"]
 
 FAMILIES = ("training-voyages", "training-ships", "training-gnss-faults", "training-clean", "training-outages")
 #: One of so many epochs of a window is noted: neighbouring ones hardly differ.
@@ -93,7 +90,7 @@ class _Noting(LearnedWeights):
 
 
 def gather(recordings: Iterable[Recording]) -> list[Noted]:
-    """Run the window over voyages, and note inputs and targets."""
+    """Run the window over voyages, and note inputs and targets of each."""
     found = []
     for k, recording in enumerate(recordings):
         noting = _Noting(recording, leads=k // len(FAMILIES) % 2 == 1)
@@ -102,15 +99,14 @@ def gather(recordings: Iterable[Recording]) -> list[Noted]:
         for packet in recording.steps():
             solver.update(packet)
         kinds = tuple(sorted({s.kind for s in recording.data.aids.values() if not s.channels}))
-        if noting.inputs:
-            found.append(Noted(np.concatenate(noting.inputs), np.concatenate(noting.targets), kinds))
+        nothing = np.empty((0, NUMBER_OF_INPUTS), np.float32), np.empty(0, np.float32)
+        inputs, targets = np.concatenate([nothing[0], *noting.inputs]), np.concatenate([nothing[1], *noting.targets])
+        found.append(Noted(inputs, targets, kinds))
     return found
 
 
-def fit(
-    data: Sequence[Noted], checked: Sequence[Noted], epochs: int, seed: int
-) -> tuple[dict[str, Array], list[float], list[float], float]:
-    """Train, with PyTorch; the arrays of the best epoch, the errors of each epoch, and processor time per epoch [s]."""
+def fit(data: Sequence[Noted], checked: Sequence[Noted], epochs: int, seed: int) -> Fitted:
+    """Train a network; needs PyTorch. The network of the best epoch on the validation is returned."""
     import torch
 
     torch.set_num_threads(1)
@@ -122,6 +118,7 @@ def fit(
     )  # fmt: skip
 
     def joined(parts: Sequence[Noted]) -> list[Any]:
+        parts = [p for p in parts if len(p.target)]
         weight = np.concatenate([np.full(len(p.target), 1.0 / len(p.target), np.float32) for p in parts])
         arrays = np.concatenate([p.inputs for p in parts]), np.concatenate([p.target for p in parts]), weight
         return [torch.from_numpy(a) for a in arrays]
@@ -152,7 +149,9 @@ def fit(
         training.append(total / len(y))
         if validation[-1] < best[0]:
             best = validation[-1], _arrays(layers)
-    return best[1], training, validation, (time.process_time() - begin) / epochs
+    kinds = tuple(sorted({kind for part in data for kind in part.kinds}))
+    seconds = (time.process_time() - begin) / epochs
+    return Fitted(Network(RECIPE, VERSION, best[1], kinds), steps, training, validation, seconds)
 
 
 def _arrays(layers: Any) -> dict[str, Array]:
@@ -167,40 +166,15 @@ def _arrays(layers: Any) -> dict[str, Array]:
     return arrays
 
 
-def train(
-    data: Sequence[Noted], checked: Sequence[Noted], size: int, epochs: int, seed: int
-) -> tuple[Network, dict[str, Any]]:
-    """Train on what was noted on the first ``size`` voyages of `FAMILIES`; the network, and its learning curve."""
-    arrays, training, validation, seconds = fit(data, checked, epochs, seed)
-    record = {
-        "families": list(FAMILIES), "voyages": size, "streams": streams_of(FAMILIES, "train", size),
-        "seed": seed, "epochs": epochs, "seconds_per_epoch": round(seconds, 2),
-        "validation": round(min(validation), 6), "versions": versions(),
-    }  # fmt: skip
-    kinds = tuple(sorted({kind for part in data for kind in part.kinds}))
-    curve = {"training": training, "validation": validation, "seconds_per_epoch": seconds}
-    return Network(RECIPE, VERSION, arrays, kinds, record), curve
+def train(data: Sequence[Noted], checked: Sequence[Noted], epochs: int, seed: int) -> Fitted:
+    """Train on what was noted on the first voyages of `FAMILIES`, and add the record of the training."""
+    return recorded(fit(data, checked, epochs, seed), FAMILIES, len(data), seed)
 
 
-def main(arguments: Sequence[str] | None = None) -> None:
-    """Train, and write the network and its learning curve."""
-    parser = argparse.ArgumentParser(description="Train the network that weighs the factors of a window.")
-    parser.add_argument("--voyages", type=int, default=300)
-    parser.add_argument("--epochs", type=int, default=20)
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--output", type=Path, default=Path("factor_network.npz"))
-    options = parser.parse_args(arguments)
-    begin, few = time.perf_counter(), max(options.voyages // 10, len(FAMILIES))
-    data = gather(voyages(FAMILIES, "train", range(options.voyages)))
-    checked = gather(voyages(FAMILIES, "validation", range(few)))
-    network, curve = train(data, checked, options.voyages, options.epochs, options.seed)
-    network.save(options.output)
-    options.output.with_suffix(".json").write_text(json.dumps(curve), encoding="utf-8")
-    print(
-        f"{options.output}: {network.parameters} parameters, squared error {min(curve['validation']):.4f} on "
-        f"validation, {curve['seconds_per_epoch']:.1f} s per epoch, {time.perf_counter() - begin:.0f} s in all"
-    )
-
+RECIPE_OF_ROW = Recipe(
+    "Train the network that weighs the factors of a window.", "net-fgo",
+    "squared error of the logarithm of the information", FAMILIES, 300, 4, gather, train,
+)  # fmt: skip
 
 if __name__ == "__main__":
-    main()
+    RECIPE_OF_ROW.command("factor_network")

@@ -15,12 +15,9 @@ Run it; it takes less than half an hour on one core::
 
 from __future__ import annotations
 
-import argparse
-import json
 import time
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
-from pathlib import Path
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -50,9 +47,9 @@ from simnav.structures import filled, length, structure
 from simnav.types import Array, Instruments
 
 from .information import information
-from .voyages import streams_of, versions, voyages
+from .recipe import Fitted, Recipe, recorded
 
-__all__ = ["FAMILIES", "Fitted", "Readings", "fit", "gather", "main", "train"]
+__all__ = ["FAMILIES", "Readings", "fit", "gather", "train"]
 
 #: Whole voyages with and without an IMU, faults of receivers, outages, poor IMUs, and nothing wrong.
 FAMILIES = (
@@ -82,16 +79,6 @@ class Readings:
     kind: str
     inputs: Any
     target: Any
-
-
-@dataclass(frozen=True, eq=False)
-class Fitted:
-    """A network, the mean squared errors on training and validation in each epoch, and processor time per epoch [s]."""
-
-    network: Network
-    training: list[float]
-    validation: list[float]
-    seconds: float
 
 
 #: A row of the table of an instrument: time and target of a reading, whether it was noted, and its inputs.
@@ -238,7 +225,7 @@ def fit(
             best = validation[-1], _arrays(layer, output)
     seconds = (time.process_time() - begin) / max(epochs, 1)
     kinds = tuple(sorted({s.kind for s in data}))
-    return Fitted(Network(RECIPE, VERSION, best[1], kinds), training, validation, seconds)
+    return Fitted(Network(RECIPE, VERSION, best[1], kinds), -(-len(data) // BATCH), training, validation, seconds)
 
 
 def _arrays(layer: Any, output: Any) -> dict[str, Array]:
@@ -279,34 +266,13 @@ def train(data: Sequence[Sequence[Readings]], checked: Sequence[Sequence[Reading
         As for `fit`.
     """
     fitted = fit([r for voyage in data for r in voyage], [r for voyage in checked for r in voyage], epochs, seed)
-    record = {
-        "families": list(FAMILIES), "voyages": len(data), "streams": streams_of(FAMILIES, "train", len(data)),
-        "seed": seed, "epochs": epochs, "seconds_per_epoch": round(fitted.seconds, 2),
-        "validation": round(min(fitted.validation), 6), "versions": versions(),
-    }  # fmt: skip
-    return replace(fitted, network=replace(fitted.network, trained_on=record))
+    return recorded(fitted, FAMILIES, len(data), seed)
 
 
-def main(arguments: Sequence[str] | None = None) -> None:
-    """Train, and write the network and its learning curve."""
-    parser = argparse.ArgumentParser(description="Train the network that sets the noise of each reading.")
-    parser.add_argument("--voyages", type=int, default=1000)
-    parser.add_argument("--epochs", type=int, default=20)
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--output", type=Path, default=Path("noise_network.npz"))
-    options = parser.parse_args(arguments)
-    begin, few = time.perf_counter(), max(options.voyages // 10, len(FAMILIES))
-    data = gather(voyages(FAMILIES, "train", range(options.voyages)))
-    checked = gather(voyages(FAMILIES, "validation", range(few)))
-    fitted = train(data, checked, options.epochs, options.seed)
-    fitted.network.save(options.output)
-    curve = {"training": fitted.training, "validation": fitted.validation, "seconds_per_epoch": fitted.seconds}
-    options.output.with_suffix(".json").write_text(json.dumps(curve), encoding="utf-8")
-    print(
-        f"{options.output}: {fitted.network.parameters} parameters, squared error {min(fitted.validation):.4f} on "
-        f"validation, {fitted.seconds:.1f} s per epoch, {time.perf_counter() - begin:.0f} s in all"
-    )
-
+RECIPE_OF_ROW = Recipe(
+    "Train the network that sets the noise of each reading.", "net-ekf",
+    "squared error of the logarithm of the information", FAMILIES, 1000, 14, gather, train,
+)  # fmt: skip
 
 if __name__ == "__main__":
-    main()
+    RECIPE_OF_ROW.command("noise_network")

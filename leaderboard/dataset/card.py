@@ -43,7 +43,7 @@ def card(family: Scenario, manifest: Manifest, splits: Mapping[str, SplitReport]
         "|---|---|---|---|---|",
         *(
             f"| {name} | {split.voyages} | {split.duration / 3600.0:.1f} | {split.size / 1e6:.1f} | "
-            f"{'a secret key' if name == TEST and manifest.sealed else FIRST_SEEDS[name]} |"
+            f"{'a secret key' if name == TEST else FIRST_SEEDS[name]} |"
             for name, split in splits.items()
         ),
         "",
@@ -54,12 +54,8 @@ def card(family: Scenario, manifest: Manifest, splits: Mapping[str, SplitReport]
         "of simnav's own estimators has the same random numbers.",
         "",
         f"Split `{TEST}` has neither truth nor labels. simnav scores it: `simnav score {family.name} ESTIMATES.csv "
-        f"--seed SEED{' --sealed KEYFILE' if manifest.sealed else ''}`, with the seed of the voyage. "
-        + (
-            f"Its seeds follow from a key, of which {manifest.sealed} is the hash."
-            if manifest.sealed
-            else "Its seeds are public, so anybody can simulate its truth. For a contest write it with `--sealed`."
-        ),
+        "--seed SEED --sealed KEYFILE`, with the seed of the voyage."
+        + (f" Its seeds follow from a key, of which {manifest.sealed} is the hash." if manifest.sealed else ""),
         "",
         f"An estimator that learned from a split says so: `learned_from` in `{FILE}` is the value of its attribute "
         "of that name. simnav then refuses to score it on these voyages.",

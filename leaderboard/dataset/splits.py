@@ -3,7 +3,8 @@
 The random streams of a training family start from numbers that no ranked scenario reaches, sealed or not
 (`simnav.scenario.TRAINING_ROOT`). Within a family the splits have ranges of seeds of their own. Those of `TEST` are
 below `FIRST_TRAINING_SEED`, as of all that is scored, and above all seeds that parameters of simnav were chosen on. The
-others are above all seeds of learning agents.
+others are above all seeds of learning agents. The seeds of `TEST` follow from a key: from public ones anybody could
+simulate its truth.
 """
 
 from __future__ import annotations
@@ -11,17 +12,32 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 from simnav.environment.seeds import FIRST_TRAINING_SEED
-from simnav.leaderboard.campaign.seal import PUBLIC, Seal
+from simnav.leaderboard.campaign.seal import Seal
 from simnav.leaderboard.results.errors import MOST_RUNS, RequestError
 from simnav.scenario import Scenario
 from simnav.spec import closest
 
-__all__ = ["FIRST_SEEDS", "SPLITS", "TEST", "TRAIN", "named_splits", "require_family", "seed_of", "sizes", "streams_of"]
+__all__ = [
+    "FIRST_SEEDS",
+    "OPEN",
+    "SPLITS",
+    "TEST",
+    "TRAIN",
+    "named_splits",
+    "require_family",
+    "require_key",
+    "seed_of",
+    "sizes",
+    "streams_of",
+]
 
 TRAIN, VALIDATION, TEST = "train", "validation", "test"
 
 #: Names of the splits.
 SPLITS = (TRAIN, VALIDATION, TEST)
+
+#: Those with truth and labels, whose seeds are public.
+OPEN = (TRAIN, VALIDATION)
 
 #: Seed of the first voyage of each split; the others count up.
 FIRST_SEEDS = {TRAIN: 2 * FIRST_TRAINING_SEED, VALIDATION: 3 * FIRST_TRAINING_SEED, TEST: FIRST_TRAINING_SEED // 2}
@@ -65,6 +81,21 @@ def named_splits(given: str | Iterable[str]) -> list[str]:
     return [split for split in SPLITS if split in found]
 
 
+def require_key(splits: Iterable[str], seal: Seal) -> None:
+    """Check that there is a key where split `TEST` is asked for.
+
+    Raises
+    ------
+    RequestError
+        If there is none.
+    """
+    if TEST in splits and not seal.secret:
+        raise RequestError(
+            f"split {TEST} needs 'sealed', a key file: from public seeds anybody could simulate its truth; "
+            "'simnav campaign seal KEYFILE' makes one"
+        )
+
+
 def sizes(size: int) -> dict[str, int]:
     """The number of voyages of each split of a data set with so many voyages to train on.
 
@@ -84,7 +115,7 @@ def sizes(size: int) -> dict[str, int]:
     return {TRAIN: size, VALIDATION: few, TEST: few}
 
 
-def seed_of(family: Scenario, split: str, number: int, seal: Seal = PUBLIC) -> int:
+def seed_of(family: Scenario, split: str, number: int, seal: Seal) -> int:
     """The seed of a voyage.
 
     Parameters

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
-from simnav.leaderboard.campaign.seal import PUBLIC, Seal
+from simnav.leaderboard.campaign.seal import Seal
 from simnav.leaderboard.results.hidden import without_truth
 from simnav.recording import Recording
 from simnav.scenario import Scenario
@@ -16,7 +16,7 @@ from .splits import FIRST_SEEDS, TEST, seed_of
 __all__ = ["recordings"]
 
 
-def recordings(family: Scenario, split: str, numbers: Iterable[int], seal: Seal = PUBLIC) -> Iterator[Recording]:
+def recordings(family: Scenario, split: str, numbers: Iterable[int], seal: Seal) -> Iterator[Recording]:
     """Record voyages of a split.
 
     Parameters

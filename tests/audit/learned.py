@@ -27,7 +27,7 @@ from simnav.trial import run_trial
 
 __all__ = ["FIRST", "GROUPS", "LEARNED", "WORSE", "error", "errors", "parts", "rows"]
 
-LEARNED = ("net-ekf", "net-fgo", "policy-ekf")
+LEARNED = ("net-ekf", "net-fgo", "beams-ekf", "policy-ekf")
 OTHERS = ("iae", "gnc-fgo", "solution-separation", "oracle")
 PLAIN = ("ekf", "ship-ekf")
 FIRST, WORSE = 1000, 1.05
@@ -39,6 +39,7 @@ GROUPS: dict[str, tuple[str, ...]] = {
     "Fixes noisy or jumping": ("gnss-jumps", "gnss-noise", "gnss-noise-step"),
     "Fixes that lie slowly": ("gnss-multipath", "gnss-spoofing", "lasting-bias"),
     "Outage": ("gnss-outage", "fishing-vessel"),
+    "The DVL silent": ("lawnmower-beams", "survey-without-bottom-lock"),
     "Velocity aid wrong": ("auv-soft-mud", "dvl-in-bubbles", "ferry-in-the-wind"),
     "Start or heading wrong": ("poor-heading", "wrong-start"),
     "A datasheet wrong": ("one-wrong-datasheet", "wrong-datasheet"),

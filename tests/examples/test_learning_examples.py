@@ -73,6 +73,24 @@ def test_the_cross_entropy_method_on_other_tasks(example, tmp_path, task, length
         runs_as_an_estimator(policy, tmp_path / "policy.npz")
 
 
+def test_one_policy_for_several_troubles(example, tmp_path):
+    """It learns rules by role, which are the same numbers whatever instruments a family has."""
+    example("cross_entropy")
+    module = example("several_troubles")
+    families, gains = ("training-gnss-faults", "training-ships"), []
+    options = {"generations": 4, "population": 16, "voyages": 1, "length": 120, "seed": 2}
+    policy, curve = module.train(families, after=lambda generation, gain, p: gains.append(gain), **options)
+    assert curve == gains
+    assert curve[0] == 0.0 < curve[-1]  # it begins as the plain filter
+    assert policy.trained_on["voyages"] == 2
+    path = tmp_path / "policy.npz"
+    policy.save(path)
+    for scenario in ("training-gnss-faults", "training-ships"):
+        run = record(load(scenario).model_copy(update={"duration": 20.0, "faults": ()}), 3)
+        trial = run_trial(PolicyEstimator(str(path)), run)
+        assert trial.status == "ok", trial.reason
+
+
 def test_learning_curves_over_training_seeds(example, tmp_path):
     curve, agent = example("learning_curve"), example("cross_entropy")
     options = {"generations": 5, "population": 8, "repeats": 1, "voyages": 1, "length": 20}

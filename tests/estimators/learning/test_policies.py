@@ -9,6 +9,7 @@ import simnav
 from simnav.environment.seeds import FIRST_TRAINING_SEED, require_disjoint, training_seed
 from simnav.estimators.learning import policy as policies
 from simnav.estimators.learning.environment import FilterTaskEnv
+from simnav.estimators.learning.features import observation_size
 from simnav.estimators.learning.policy import Policy, PolicyError, record_of_training
 from simnav.estimators.learning.policy_estimator import PolicyEstimator
 from simnav.scenario import load
@@ -111,6 +112,20 @@ def test_a_policy_sees_the_first_receiver_and_leaves_the_others_alone(tmp_path):
     assert trial.status == "ok", trial.reason
     assert "sigma_north.gnss" in trial.diagnostics
     assert "sigma_north.second" not in trial.diagnostics
+
+
+def test_a_policy_for_several_kinds_is_asked_about_those_that_are_there(tmp_path):
+    size = observation_size(2, 1)
+    weights = np.zeros((3, size)), np.array([0.5, -0.5, 0.0])
+    about = {"task": "Tuning", "kinds": ["gnss_position", "magnetic_compass"], "most": 1, "instruments": "all"}
+    Policy([weights], trained_on=TOLD, **about).save(tmp_path / "policy.npz")
+    recording = record(load("gnss-noise-step").model_copy(update={"duration": 8.0, "faults": ()}), 1)
+    assert not recording.instruments.of_kind("magnetic_compass")
+    trial = run_trial(PolicyEstimator(str(tmp_path / "policy.npz")), recording)
+    assert trial.status == "ok", trial.reason
+    sigma = trial.diagnostics["sigma_north.gnss"] / recording.instruments["gnss"].sigma[0]
+    np.testing.assert_allclose(sigma, np.sqrt(30.0))
+    assert not [name for name in trial.diagnostics if "compass" in name]
 
 
 def test_layers_that_do_not_follow_each_other():

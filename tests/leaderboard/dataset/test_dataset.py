@@ -80,16 +80,23 @@ def test_the_splits_have_seeds_of_their_own():
     assert min(min(ranges["train"]), min(ranges["validation"])) > training_seed(MOST_RUNS)
     # No ranked run, sealed or not, starts from such a number.
     assert SHIPS.root(min(ranges["test"])) > 2**63
-    assert {split: next(simnav.voyages(SHIPS, split)).seed for split in SPLITS} == FIRST_SEEDS
 
 
 @pytest.fixture(scope="module")
-def made(tmp_path_factory) -> Path:
+def key(tmp_path_factory) -> Path:
+    """A key file."""
+    path = tmp_path_factory.mktemp("secret") / "key"
+    simnav.seal(path)
+    return path
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory, key) -> Path:
     """A small data set, of two parts."""
     folder = tmp_path_factory.mktemp("data") / "ships"
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(parts, "PART", 3)
-        report = simnav.dataset(SHIPS, folder, size=4, workers=1)
+        report = simnav.dataset(SHIPS, folder, size=4, sealed=key, workers=1)
     assert {name: (s.voyages, s.duration) for name, s in report.splits.items()} == {
         "train": (4, 120.0), "validation": (1, 30.0), "test": (1, 30.0),
     }  # fmt: skip
@@ -104,10 +111,11 @@ def _small_parts(monkeypatch):
 
 
 @pytest.mark.usefixtures("_small_parts")
-def test_a_stream_has_the_voyages_of_the_files(made):
+def test_a_stream_has_the_voyages_of_the_files(made, key):
     for split in SPLITS:
         read = list(simnav.read_voyages(made, split))
-        for one, streamed in zip(read, simnav.voyages(SHIPS, split), strict=False):
+        assert read[0].seed == FIRST_SEEDS[split]
+        for one, streamed in zip(read, simnav.voyages(SHIPS, split, sealed=key), strict=False):
             same(one, streamed, {})
     (third, first) = simnav.read_voyages(made, numbers=[3, 0])
     assert [third.seed, first.seed] == [FIRST_SEEDS["train"] + 3, FIRST_SEEDS["train"]]
@@ -132,41 +140,51 @@ def test_the_test_split_tells_neither_truth_nor_labels(made):
 
 
 @pytest.mark.usefixtures("_small_parts")
-def test_the_test_split_is_scored_by_simnav(made, tmp_path):
+def test_the_test_split_is_scored_by_simnav(made, key, tmp_path):
     (hidden,) = simnav.read_voyages(made, "test")
     trial = run_trial(simnav.make("gnss-only"), hidden)
     rows = np.column_stack([trial.time, np.degrees(trial.position[:, :2])])
     np.savetxt(tmp_path / "mine.csv", rows, "%.17g", ",", header="time_s,latitude_deg,longitude_deg", comments="")
-    scored = simnav.score_files(SHIPS, [tmp_path / "mine.csv"], seed=hidden.seed)
-    ran = simnav.run(SHIPS, "gnss-only", seed=hidden.seed)
+    scored = simnav.score_files(SHIPS, [tmp_path / "mine.csv"], seed=hidden.seed, sealed=key)
+    ran = simnav.run(SHIPS, "gnss-only", seed=read_seal(key).seed(SHIPS.id, hidden.seed))
     errors = [report.to_dict()["estimators"][0]["scores"]["horizontal_rmse"] for report in (scored, ran)]
     assert errors[0] == pytest.approx(errors[1], rel=1e-9)
 
 
-def test_sealed_seeds_follow_from_the_key(tmp_path):
-    simnav.seal(tmp_path / "key")
-    (sealed,) = islice(simnav.voyages(SHIPS, "test", sealed=tmp_path / "key"), 1)
+def test_sealed_seeds_follow_from_the_key(made, key, tmp_path):
+    (sealed,) = islice(simnav.voyages(SHIPS, "test", sealed=key), 1)
     number = FIRST_SEEDS["test"]
-    expected = record(SHIPS, read_seal(tmp_path / "key").seed(SHIPS.id, number))
+    expected, public = record(SHIPS, read_seal(key).seed(SHIPS.id, number)), record(SHIPS, number)
     assert sealed.seed == number
     np.testing.assert_array_equal(sealed.data.aids["gnss"].value, expected.data.aids["gnss"].value)
-    open_one, train = next(simnav.voyages(SHIPS, "test")), next(simnav.voyages(SHIPS, sealed=tmp_path / "key"))
-    assert not np.array_equal(open_one.start.position, sealed.start.position)
-    assert train.seed == FIRST_SEEDS["train"]
-    simnav.dataset(SHIPS, tmp_path / "set", size=1, splits="test", sealed=tmp_path / "key", workers=1)
-    text = (tmp_path / "set" / "README.md").read_text()
+    assert not np.array_equal(public.start.position, sealed.start.position)
+    assert next(simnav.voyages(SHIPS, sealed=key)).seed == FIRST_SEEDS["train"]
+    text = (made / "README.md").read_text()
     assert "--sealed KEYFILE" in text
-    assert read_seal(tmp_path / "key").hash in text
-    with pytest.raises(RequestError, match=r"the seeds of split test there are sealed by the key .*, and not public"):
-        simnav.dataset(SHIPS, tmp_path / "set", size=1, splits="test", workers=1)
+    assert read_seal(key).hash in text
+    simnav.seal(tmp_path / "other")
+    with pytest.raises(RequestError, match=r"the seeds of split test there are sealed by the key .*, and not seale"):
+        simnav.dataset(SHIPS, made, size=1, splits="test", sealed=tmp_path / "other", workers=1)
+
+
+def test_there_is_no_test_split_without_a_key(tmp_path):
+    message = (
+        "split test needs 'sealed', a key file: from public seeds anybody could simulate its truth; 'simnav campaign"
+    )
+    with pytest.raises(RequestError, match=message):
+        simnav.dataset(SHIPS, tmp_path / "set", size=1, splits="train,test", workers=1)
+    with pytest.raises(RequestError, match=message):
+        simnav.voyages(SHIPS, "test")
+    assert not (tmp_path / "set").exists()
+    assert set(simnav.dataset(SHIPS, tmp_path / "set", size=1, workers=1).splits) == {"train", "validation"}
 
 
 @pytest.mark.usefixtures("_small_parts")
-def test_it_continues_where_it_was_and_grows(made, tmp_path):
+def test_it_continues_where_it_was_and_grows(made, key, tmp_path):
     folder, whole = tmp_path / "set", files(made)
     assert simnav.dataset(SHIPS, folder, size=2, splits=["train"], workers=1).written == 2
     assert simnav.dataset(SHIPS, folder, size=4, splits="validation, train", workers=1).written == 5  # 2 of them anew
-    assert simnav.dataset(SHIPS, folder, size=4, workers=1).written == 1
+    assert simnav.dataset(SHIPS, folder, size=4, sealed=key, workers=1).written == 1
     assert files(folder) == whole
     (folder / "train" / "00001" / "voyages.parquet").write_bytes(b"half")
     assert simnav.dataset(SHIPS, folder, size=1, workers=1).written == 1  # the larger size counts
@@ -189,10 +207,12 @@ def test_a_part_that_was_stopped_leaves_nothing(tmp_path, monkeypatch):
         next(simnav.read_voyages(tmp_path / "set"))
 
 
-def test_two_processes_write_the_same_files(made, tmp_path, monkeypatch):
+def test_two_processes_write_the_same_files(made, key, tmp_path, monkeypatch):
     monkeypatch.setattr(parts, "PART", 3)
     told = []
-    report = simnav.dataset(SHIPS, tmp_path / "set", size=4, workers=2, progress=lambda *done: told.append(done))
+    report = simnav.dataset(
+        SHIPS, tmp_path / "set", size=4, sealed=key, workers=2, progress=lambda *done: told.append(done)
+    )
     assert files(tmp_path / "set") == files(made)
     assert report.written == 6
     assert told[-1] == (6, 6)
@@ -287,9 +307,18 @@ def test_what_is_not_there_cannot_be_read(made, tmp_path):
 
 
 def test_the_command(tmp_path):
-    words = ["dataset", "training-ships", "--size", "2", "--split", "train,test", "--output", str(tmp_path / "set")]
+    words = [
+        "dataset",
+        "training-ships",
+        "--size",
+        "2",
+        "--split",
+        "train,validation",
+        "--output",
+        str(tmp_path / "set"),
+    ]
     said = json.loads(CliRunner().invoke(cli.app, [*words, "--workers", "1", "--json"]).stdout)
-    assert {name: split["voyages"] for name, split in said["splits"].items()} == {"train": 2, "test": 1}
+    assert {name: split["voyages"] for name, split in said["splits"].items()} == {"train": 2, "validation": 1}
     assert said["bytes_per_second_of_voyage"] == pytest.approx(
         sum(s["size"] for s in said["splits"].values()) / (3 * 600.0)
     )
