@@ -3,10 +3,12 @@
 from simnav.estimator import register
 from simnav.estimators.adaptations.variational_bayes import VariationalBayes
 from simnav.estimators.composition import Row
+from simnav.estimators.models.doubted_fixes import DoubtedFixes
 from simnav.estimators.models.suitable import Suitable
 from simnav.estimators.solvers.heading_bank import HeadingBank
 from simnav.estimators.solvers.iterated import poor_heading
 from simnav.estimators.solvers.mid_value import MidValueSelection
+from simnav.estimators.solvers.multiple_hypothesis import MultipleHypothesis
 from simnav.estimators.solvers.solution_separation import SolutionSeparation
 from simnav.estimators.weightings.fault_isolation import FaultIsolation
 from simnav.estimators.weightings.graduated_non_convexity import GraduatedNonConvexity
@@ -90,3 +92,8 @@ class MidValue(
     """
 
     version = 4
+
+
+@register("mh-ekf")
+class MultipleHypothesisEkf(Row, solver=MultipleHypothesis, model=DoubtedFixes):
+    """PROTOTYPE."""
