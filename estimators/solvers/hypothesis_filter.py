@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+import dataclasses
 from copy import deepcopy
 from math import log, pi
 
@@ -12,6 +13,7 @@ from simnav.compiled import kernel
 from simnav.estimators.algebra.cholesky import factorise
 from simnav.estimators.algebra.mixture import mixture_update
 from simnav.estimators.adaptations.choice import Choice
+from simnav.estimators.adaptations.prediction import PredictionTest
 from simnav.estimators.models.filtering import Dynamics, Prediction, Readings
 from simnav.kernel_types import Matrix
 from simnav.types import Estimate, Measurement, Measurements
@@ -75,25 +77,33 @@ class HypothesisFilter(ImmEstimator):
 
     evidence: float = 0.0
 
-    together: int = 3
+    highest_rate: float = 1.0
+
+    def reset(self, start, instruments):
+        super().reset(start, instruments)
+        self._shares = {n: min(1.0, self.highest_rate / s.rate) for n, s in self.model.instruments.items()}
 
     def choice(self, instruments):
-        own = super().choice(instruments)
-        from simnav.estimators.adaptations.prediction import PredictionTest
-        import dataclasses
-        return dataclasses.replace(own, tested=PredictionTest(instruments, together=self.together).tested(self.model.size))
+        return dataclasses.replace(super().choice(instruments), tested=PredictionTest(instruments, together=0).tested(0))
 
     def functions(self) -> FilterFunctions:
         """The correction is a mixture that reports its evidence."""
         return super().functions()._replace(correct=correct_with_evidence)
 
     def _report_choice(self, m: Measurement, sigma: Sequence[float], number: float) -> None:
-        self.evidence += number
+        self.evidence += self._shares[m.instrument] * number
 
     def update(self, measurements: Measurements) -> Estimate:
         """Take one step's measurements."""
-        self.evidence = 0.0
+        self.evidence = self.surprise = self.freedom = 0.0
         return super().update(measurements)
+
+    def _note(self, m, nis, size, diagnostics):
+        super()._note(m, nis, size, diagnostics)
+        if nis >= 0.0:
+            share = self._shares[m.instrument]
+            self.surprise += share * nis
+            self.freedom += share * len(m.value)
 
     def quiet(self) -> dict[str, float]:
         """Probability by instrument that its noise is that of its datasheet."""
@@ -107,14 +117,5 @@ class HypothesisFilter(ImmEstimator):
         mine, theirs = self._filter.choice, other._filter.choice
         mine.memories[...] = theirs.memories
         mine.last[...] = theirs.last
-        for name, value in _arrays(theirs.tested):
-            getattr(mine.tested, name)[...] = value
-        for name, value in _arrays(theirs.tested.courses):
-            getattr(mine.tested.courses, name)[...] = value
+        self._admission._used.update(other._admission._used)
         self._innovation_test = deepcopy(other._innovation_test)
-
-
-def _arrays(record: object) -> list[tuple[str, np.ndarray]]:
-    """The arrays of a record or a named tuple."""
-    names = getattr(record, "numba_fields", None) or record._fields
-    return [(n, v) for n in names if isinstance(v := getattr(record, n), np.ndarray)]
