@@ -3,7 +3,7 @@
 from simnav.estimator import register
 from simnav.estimators.adaptations.variational_bayes import VariationalBayes
 from simnav.estimators.composition import Row
-from simnav.estimators.models.doubted_fixes import DoubtedFixes
+from simnav.estimators.models.doubted_instruments import DoubtedInstruments
 from simnav.estimators.models.suitable import Suitable
 from simnav.estimators.solvers.heading_bank import HeadingBank
 from simnav.estimators.solvers.iterated import poor_heading
@@ -95,5 +95,5 @@ class MidValue(
 
 
 @register("mh-ekf")
-class MultipleHypothesisEkf(Row, solver=MultipleHypothesis, model=DoubtedFixes):
+class MultipleHypothesisEkf(Row, solver=MultipleHypothesis, model=DoubtedInstruments):
     """PROTOTYPE."""

@@ -1,60 +1,62 @@
-"""The filter of one hypothesis: it can be copied from another one, and says how probable the measurements were to it."""
+"""The filter of one hypothesis: it can be copied from another one, and says how probable the measurements were to it.
+
+It is the filter of `simnav.estimators.solvers.imm`: the noise of each instrument switches between levels, so that gross
+errors and a larger noise need no hypothesis of their own. The density of an innovation over all levels is the evidence
+of the hypothesis. The errors of an instrument are alike from one reading to the next, but for its white noise, so a
+thousand readings say less than their number. An instrument of more than `FULL` readings per second counts as one of
+that rate.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-import dataclasses
-from copy import deepcopy
-from math import log, pi
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
 from simnav.compiled import kernel
-from simnav.estimators.algebra.cholesky import factorise
-from simnav.estimators.algebra.mixture import mixture_update
 from simnav.estimators.adaptations.choice import Choice
 from simnav.estimators.adaptations.prediction import PredictionTest
+from simnav.estimators.algebra.mixture import mixture_update
+from simnav.estimators.models.doubted_instruments import DoubtingModel
 from simnav.estimators.models.filtering import Dynamics, Prediction, Readings
-from simnav.kernel_types import Matrix
-from simnav.types import Estimate, Measurement, Measurements
+from simnav.estimators.models.propagation import Samples
+from simnav.types import Array, Estimate, ImuSamples, InitialState, Instruments, Measurement
 
-from .filter_step import correct
+from .filter_step import filter_step
 from .imm import ImmEstimator
 from .kalman import FilterFunctions
 
-__all__ = ["HypothesisFilter"]
+__all__ = ["FULL", "HypothesisFilter", "Step"]
+
+#: Readings of an instrument per second that count fully as evidence.
+FULL = 1.0
 
 
-@kernel
-def log_density(nis: float, spread: Matrix) -> float:
-    """Logarithm of the Gaussian density of an innovation, by its NIS and its (m, m) covariance; 0 if that is singular."""
-    m = spread.shape[0]
-    L, pivot, determinant = np.zeros((m, m)), np.empty(m), 0.0
-    for r in range(m):
-        for c in range(r + 1):
-            L[r, c] = spread[r, c]
-    if not factorise(L, m, 1e-14, pivot):
-        return 0.0
-    for r in range(m):
-        determinant += log(pivot[r])
-    return -0.5 * (nis + determinant + m * log(2.0 * pi))
+class Step(NamedTuple):
+    """What a filter uses in one step.
+
+    Attributes
+    ----------
+    imu : ImuSamples or None
+        The samples of the IMU.
+    readings : sequence of Measurement
+        The admitted measurements, in order of their times.
+    until : float
+        End of the step [s].
+    """
+
+    imu: ImuSamples | None
+    readings: Sequence[Measurement]
+    until: float
 
 
 @kernel(passed=True)
 def correct_with_evidence(
     dynamics: Dynamics, choice: Choice, readings: Readings, k: int, prediction: Prediction
 ) -> float:
-    """Correct as `correct_by_mixture`, and report the logarithm of the density of the innovation."""
-    d = prediction.innovation.size
-    if readings.wrong[k]:
-        readings.sigma[k, 0] = np.nan
-        nis = correct(dynamics, choice, readings, k, prediction)
-        spread = np.empty((d, d))
-        for a in range(d):
-            for b in range(d):
-                spread[a, b] = prediction.predicted[a, b] + prediction.noise[a, b]
-        readings.reported[k] = log_density(nis, spread) if nis >= 0.0 else 0.0
-        return nis
+    """Correct the covariance by a mixture of levels, and report the logarithm of the density of the innovation."""
     i = choice.index[readings.instrument[k]]
     probability, count = choice.memories[choice.first[i] : choice.first[i + 1]], choice.first[i + 1] - choice.first[i]
     levels, transition = choice.settings[i, :count], choice.settings[i, count:].reshape((count, count))
@@ -67,55 +69,86 @@ def correct_with_evidence(
 
 
 class HypothesisFilter(ImmEstimator):
-    """The filter of the module: `ImmEstimator`, whose noise of each instrument switches between levels.
+    """The filter of the module.
 
     Attributes
     ----------
     evidence : float
         Logarithm of the density of the measurements of the last step.
+    nis, freedom : float
+        Sum of the normalised innovations squared of the last step, and of their degrees of freedom, by the noise of the
+        datasheets. An instrument of a high rate counts as for the evidence.
+    notes : list of (Measurement, float, float)
+        The measurements used in the last step, with the normalised innovation squared and the norm of the innovation.
     """
 
-    evidence: float = 0.0
+    model: DoubtingModel
 
-    highest_rate: float = 1.0
-
-    def reset(self, start, instruments):
+    def reset(self, start: InitialState, instruments: Instruments) -> None:
+        """Begin a run."""
         super().reset(start, instruments)
-        self._shares = {n: min(1.0, self.highest_rate / s.rate) for n, s in self.model.instruments.items()}
+        sheets = self.model.instruments
+        self._shares = np.array([min(1.0, FULL / sheets[name].rate) for name in self._names])
+        self._clear()
 
-    def choice(self, instruments):
-        return dataclasses.replace(super().choice(instruments), tested=PredictionTest(instruments, together=0).tested(0))
+    def _clear(self) -> None:
+        self.evidence = self.nis = self.freedom = 0.0
+        self.notes: list[tuple[Measurement, float, float]] = []
 
     def functions(self) -> FilterFunctions:
         """The correction is a mixture that reports its evidence."""
         return super().functions()._replace(correct=correct_with_evidence)
 
-    def _report_choice(self, m: Measurement, sigma: Sequence[float], number: float) -> None:
-        self.evidence += self._shares[m.instrument] * number
+    def choice(self, instruments: Instruments) -> Choice:
+        """As of `ImmEstimator`, but without tests of the prediction: that the IMU is wrong is another hypothesis."""
+        return replace(super().choice(instruments), tested=PredictionTest(instruments, together=0).tested(0))
 
-    def update(self, measurements: Measurements) -> Estimate:
+    def advance(self, step: Step) -> None:
         """Take one step's measurements."""
-        self.evidence = self.surprise = self.freedom = 0.0
-        return super().update(measurements)
+        self.model.load(step.imu)
+        self._clear()
+        self._advance(step.readings, step.until, {}, [])
 
-    def _note(self, m, nis, size, diagnostics):
-        super()._note(m, nis, size, diagnostics)
-        if nis >= 0.0:
-            share = self._shares[m.instrument]
-            self.surprise += share * nis
-            self.freedom += share * len(m.value)
+    def estimate(self) -> Estimate:
+        """The estimate at the end of the step."""
+        return self._estimate()
 
-    def quiet(self) -> dict[str, float]:
-        """Probability by instrument that its noise is that of its datasheet."""
-        return {name: float(self._probability[name][0]) for name in self._names}
+    def quiet(self, name: str) -> float:
+        """Probability that the noise of an instrument is that of its datasheet."""
+        return float(self._probability[name][0])
 
     def take_over(self, other: HypothesisFilter) -> None:
         """Copy the state of another filter of the same run, with all that it keeps."""
         self.model.take_over(other.model)
-        self.model.take_over_doubt(other.model)
+        self.model.take_over_doubts(other.model)
         self.covariance[...] = other.covariance
         mine, theirs = self._filter.choice, other._filter.choice
-        mine.memories[...] = theirs.memories
-        mine.last[...] = theirs.last
-        self._admission._used.update(other._admission._used)
-        self._innovation_test = deepcopy(other._innovation_test)
+        mine.memories[...], mine.last[...] = theirs.memories, theirs.last
+
+    def _use(
+        self,
+        measurements: Sequence[Measurement],
+        samples: Samples,
+        until: float,
+        diagnostics: dict[str, float | Array],
+        flagged: list[tuple[str, float]],
+    ) -> None:
+        """Use measurements in order of their times, propagate to a time, and add their evidence."""
+        self._measurements, count = measurements, len(measurements)
+        readings = self._arrays.fill(measurements)
+        if self._compiled:
+            filter_step.unchecked(self._filter, readings, samples, count, until)
+        else:
+            filter_step.function(self._filter.in_python, readings, samples, count, until)
+        if not count:
+            return
+        nis = readings.nis[:count]
+        share = np.where(nis >= 0.0, self._shares[readings.instrument[:count]], 0.0)
+        self.evidence += float(share @ readings.reported[:count])
+        self.nis += float(share @ nis)
+        self.freedom += float(share @ readings.components[:count])
+        self.notes += zip(measurements, nis.tolist(), readings.size[:count].tolist(), strict=True)
+
+    def _note(self, m: Measurement, nis: float, size: float, diagnostics: dict[str, float | Array]) -> None:
+        """Keep what became of a reading of a channel that was used together with others."""
+        self.notes.append((m, nis, size))

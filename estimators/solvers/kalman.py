@@ -145,14 +145,8 @@ class KalmanEstimator(Solver):
         model.load(measurements.imu)
         diagnostics: dict[str, float | Array] = dict(self._blank)
         flagged: list[tuple[str, float]] = []
-        admitted, until, samples = self._admission.admit(measurements, model.time), measurements.time, model.samples
         self._iterations = 0
-        for group in self._groups(admitted):
-            end = until if group is admitted else min(group[0].time, until)
-            if group is admitted or len(group) == 1 or not self._use_together(group, end, diagnostics):
-                self._use(group, samples, end, diagnostics, flagged)
-        if model.time < until:
-            self._use((), samples, until, diagnostics, flagged)
+        self._advance(self._admission.admit(measurements, model.time), measurements.time, diagnostics, flagged)
         if self._iterations:
             diagnostics["iterations"] = float(self._iterations)
         diagnostics["skipped"] = float(self._admission.skipped)
@@ -234,6 +228,23 @@ class KalmanEstimator(Solver):
         if isinstance(own, NoiseAdaptation) and own.ruled:
             return own.choice(self._names, self.model.size)
         return no_choice()
+
+    def _advance(
+        self,
+        admitted: Sequence[Measurement],
+        until: float,
+        diagnostics: dict[str, float | Array],
+        flagged: list[tuple[str, float]],
+    ) -> None:
+        """Use the admitted measurements of a step, and propagate to its end."""
+        model = self.model
+        samples = model.samples
+        for group in self._groups(admitted):
+            end = until if group is admitted else min(group[0].time, until)
+            if group is admitted or len(group) == 1 or not self._use_together(group, end, diagnostics):
+                self._use(group, samples, end, diagnostics, flagged)
+        if model.time < until:
+            self._use((), samples, until, diagnostics, flagged)
 
     def _use(
         self,

@@ -11,32 +11,36 @@ from typing import ClassVar
 import numpy as np
 
 from simnav.estimators.composition import Solver
-from simnav.estimators.models.doubted_fixes import Doubt
+from simnav.estimators.models.coupling import by_source
+from simnav.estimators.models.doubted_instruments import Doubt
 from simnav.estimators.models.suitable import ModelChoice
 from simnav.types import Array, Estimate, InitialState, Instruments, Measurements
 
+from .admission import Admission
 from .hypotheses import uncertain_start
-from .hypothesis_filter import HypothesisFilter
-from .state_difference import difference, displaced
+from .hypothesis_filter import HypothesisFilter, Step
+from .innovation_consistency import InnovationTest
+from .state_difference import differences, displaced
 
 __all__ = ["MultipleHypothesis"]
-
-SOUND = "sound"
 
 
 @dataclass
 class Branch:
     """One hypothesis."""
 
-    doubts: dict
+    doubts: Mapping[str, str]
     filter: HypothesisFilter
-    weight: float = -np.inf
-    since: float = 0.0
-    estimate: Estimate | None = None
+    weight: float
+    since: float
 
     @property
     def kind(self):
         return "+".join(self.doubts.values()) or "sound"
+
+
+P = dict(drift=4.0, drift_time=100.0, wild=15.0, wild_time=40.0, log=0.5, log_time=30.0, log_jump=1.0, gyro=0.1, accel=0.1, imu_jump=2.0, imu_walk=0.2,
+    turn=5.0, turn_time=60.0, rare_imu=10.0, rare_compass=2.0, rare_drift=1.0, rare_wild=1.0, rare_log=1.0, speak=7.0)
 
 
 class MultipleHypothesis(Solver):
@@ -47,26 +51,21 @@ class MultipleHypothesis(Solver):
 
     def __init__(
         self, model: ModelChoice, *, period: float = 5.0, onset: float = 2000.0, end: float = 100.0, watch: float = 20.0,
-        start: float = 0.02, filters: int = 8, same: int = 3, alarm: float = 3.0, least: float = 20.0,
-        drift: float = 4.0, drift_time: float = 100.0,
-        wild: float = 15.0, wild_time: float = 40.0, log: float = 0.5, log_time: float = 30.0, log_jump: float = 1.0,
-        gyro: float = 0.1, accel: float = 0.1, imu_jump: float = 2.0, imu_walk: float = 0.2,
-        turn: float = 5.0, turn_time: float = 60.0, rate: float = 1.0,
-        kinds: str = "drift,wild,log,imu,compass",
+        start: float = 0.02, filters: int = 6, same: int = 2, alarm: float = 3.0, least: float = 12.0,
     ):  # fmt: skip
         self._choice = model
         self.period, self.onset, self.end, self.start, self.filters = period, onset, end, start, int(filters)
-        self.watch, self.same, self.alarm, self.least, self.rate = watch, int(same), alarm, least, rate
-        known = {"drift": Doubt("fix", drift, drift_time, 0.0), "wild": Doubt("fix", wild, wild_time, wild),
-            "log": Doubt("log", log, log_time, log_jump), "imu": Doubt("imu", imu_walk, 0.0, imu_jump, radians(gyro), accel),
-            "compass": Doubt("compass", radians(turn), turn_time, radians(turn))}
-        self.all_kinds = {k: known[k] for k in kinds.split(",") if k}
+        self.watch, self.same, self.alarm, self.least = watch, int(same), alarm, least
+        self.all_kinds = {"drift": Doubt("fix", P["drift"], P["drift_time"], 0.0), "wild": Doubt("fix", P["wild"], P["wild_time"], P["wild"]),
+            "log": Doubt("log", P["log"], P["log_time"], P["log_jump"]), "imu": Doubt("imu", P["imu_walk"], 0.0, P["imu_jump"], radians(P["gyro"]), P["accel"]),
+            "compass": Doubt("compass", radians(P["turn"]), P["turn_time"], radians(P["turn"]))}
         self.regular = ("drift", "wild")
 
     def reset(self, start: InitialState, instruments: Instruments) -> None:
+        instruments = by_source(instruments, self._choice, self.label)
+
         def made(own: InitialState) -> HypothesisFilter:
             one = HypothesisFilter(copy.deepcopy(self._choice))
-            one.highest_rate = self.rate
             one.row, one.reports_all = self.label, self.reports_all
             one.reset(own, instruments)
             return one
@@ -74,82 +73,96 @@ class MultipleHypothesis(Solver):
         self.branches = [Branch({}, made(start), log(1.0 - self.start), start.time)]
         if self.start:
             self.branches.append(Branch({}, made(uncertain_start(start)), log(self.start), start.time))
-        self._free = [made(start) for _ in range(self.filters + 1 - len(self.branches))]
+        self._spare = [made(start) for _ in range(self.filters + 1 - len(self.branches))]
         self._anchor = Branch({}, made(start), 0.0, start.time)
-        self._anchor.filter.take_over(self.branches[0].filter)
-        possible = self.branches[0].filter.model.doubtful
-        self.kinds = {k: d for k, d in self.all_kinds.items() if d.group in possible}
+        first = self.branches[0].filter
+        self._anchor.filter.take_over(first)
+        self.kinds = {k: d for k, d in self.all_kinds.items() if d.group in first.model.doubtful}
         self._next = start.time + self.period
         self._regular = start.time + self.watch
-        self._packets, self._norm, self._surprise, self._freedom = [], 0.0, 0.0, 0.0
+        self._begin_period()
+        self._admission = Admission(instruments, first._names)
+        self._innovation_test = InnovationTest()
+        self._keys = {n: (f"innovation.{n}", f"nis.{n}") for n in first._names}
         self.history = []
+
+    def _begin_period(self):
+        self._steps, self._norm, self._nis, self._freedom = [], 0.0, 0.0, 0.0
 
     def update(self, measurements: Measurements) -> Estimate:
         alive = self.branches
+        step = Step(measurements.imu, self._admission.admit(measurements, alive[0].filter.model.time), measurements.time)
         for b in alive:
-            b.estimate = b.filter.update(measurements)
+            b.filter.advance(step)
             b.weight += b.filter.evidence
-        best = max(b.weight for b in alive)
-        total = best + log(sum(exp(b.weight - best) for b in alive))
-        self._norm += total
-        for b in alive:
-            b.weight -= total
-        alive.sort(key=lambda b: -b.weight)
+        self._norm += self._normalise()
         lead = alive[0]
-        self._surprise += lead.filter.surprise
+        self._nis += lead.filter.nis
         self._freedom += lead.filter.freedom
-        self._packets.append(measurements)
+        self._steps.append(step)
+        notes = lead.filter.notes
         if measurements.time >= self._next - 1e-6:
             self._next = measurements.time + self.period
             self._branch(measurements.time)
-        alive.sort(key=lambda b: -b.weight)
-        estimate = _mean(alive)
-        estimate.diagnostics = dict(alive[0].estimate.diagnostics)
-        estimate.flagged = alive[0].estimate.flagged
+        estimate = self._mean()
+        diagnostics = {k: np.nan for p in self._keys.values() for k in p}
+        for m, nis, size in notes:
+            if nis < 0.0:
+                self._admission.skipped += 1
+            else:
+                self._innovation_test.add(nis, len(m.value))
+                a, b = self._keys[m.instrument]
+                diagnostics[a], diagnostics[b] = size, nis
+        self._innovation_test.end_epoch()
+        diagnostics["variance_factor"] = self._innovation_test.variance_factor
+        diagnostics["inconsistent"] = float(self._innovation_test.inconsistent)
+        diagnostics["skipped"] = float(self._admission.skipped)
         for g in ("fix", "log", "imu", "compass"):
-            estimate.diagnostics["doubt." + g] = sum(exp(b.weight) for b in alive if g in b.doubts)
+            diagnostics["doubt." + g] = sum(exp(b.weight) for b in alive if g in b.doubts)
+        estimate.diagnostics = diagnostics
         self.history.append((measurements.time, [(b.kind, b.weight, b.since) for b in alive]))
         return estimate
 
+    def _normalise(self):
+        self.branches.sort(key=lambda b: -b.weight)
+        best = self.branches[0].weight
+        total = best + log(sum(exp(b.weight - best) for b in self.branches))
+        for b in self.branches:
+            b.weight -= total
+        return total
+
     @property
     def covariance(self) -> Array:
-        return max(self.branches, key=lambda b: b.weight).filter.covariance
+        return self.branches[0].filter.covariance
 
     def _branch(self, time: float) -> None:
         """Hypotheses are begun from the anchor."""
         anchor = self._anchor
-        alarmed = self._freedom > 0 and self._surprise - self._freedom > self.alarm * (2.0 * self._freedom) ** 0.5
+        alarmed = self._freedom > 0 and self._nis - self._freedom > self.alarm * (2.0 * self._freedom) ** 0.5
         regular = time >= self._regular - 1e-6
         if regular:
             self._regular = time + self.watch
-        born = []
         for name, doubt in self.kinds.items():
             if (alarmed or (regular and name in self.regular)) and name not in anchor.doubts.values():
                 interval = self.watch if name in self.regular and not alarmed else self.period
-                born.append(self._child(time, interval / self.onset, doubt, name))
+                self._child(time, interval / self.onset / P["rare_" + name], doubt, name)
         for group in anchor.doubts:
-            born.append(self._child(time, self.period / self.end, None, group))
-        for child in born:
-            self._admit(child)
+            self._child(time, self.period / self.end, None, group)
         best = max(b.weight for b in self.branches)
         for b in [b for b in self.branches if b.weight < best - self.least]:
             self._drop(b)
-        total = log(sum(exp(b.weight) for b in self.branches))
-        for b in self.branches:
-            b.weight -= total
-        lead = max(self.branches, key=lambda b: b.weight)
+        self._normalise()
+        lead = self.branches[0]
         anchor.filter.take_over(lead.filter)
         anchor.doubts, anchor.weight = lead.doubts, lead.weight
-        self._packets, self._norm, self._surprise, self._freedom = [], 0.0, 0.0, 0.0
+        self._begin_period()
 
     def _drop(self, b):
         self.branches.remove(b)
-        self._free.append(b.filter)
+        self._spare.append(b.filter)
 
     def _child(self, time, p, doubt, name):
-        if not self._free:
-            self._drop(min(self.branches, key=lambda b: b.weight))
-        anchor, f = self._anchor, self._free.pop()
+        anchor, f = self._anchor, self._spare.pop()
         f.take_over(anchor.filter)
         if doubt is None:
             f.model.believe(f.covariance, name)
@@ -158,32 +171,28 @@ class MultipleHypothesis(Solver):
             f.model.doubt(f.covariance, doubt)
             doubts = {**anchor.doubts, doubt.group: name}
         child = Branch(doubts, f, anchor.weight + log(min(p, 0.5)) - self._norm, time - self.period)
-        for packet in self._packets:
-            child.estimate = f.update(packet)
+        for step in self._steps:
+            f.advance(step)
             child.weight += f.evidence
         self.branches.append(child)
-        return child
-
-    def _admit(self, child):
-        """Keep the number of filters, and of those with the same doubts, within their limits."""
-        if child not in self.branches:
-            return
         alike = [b for b in self.branches if b.doubts == child.doubts]
         if len(alike) > self.same:
             self._drop(min(alike, key=lambda b: b.weight))
         elif len(self.branches) > self.filters:
             self._drop(min(self.branches, key=lambda b: b.weight))
 
-
-def _mean(branches: list[Branch]) -> Estimate:
-    first = branches[0]
-    kept = [b for b in branches if b.weight > -10.0]
-    if len(kept) == 1:
-        return copy.copy(first.estimate)
-    apart = np.stack([difference(b.estimate, first.estimate) for b in kept])
-    weights = np.exp([b.weight for b in kept]); weights /= weights.sum()
-    mean = weights @ apart
-    covariance = np.zeros((9, 9))
-    for w, b, d in zip(weights, kept, apart - mean, strict=True):
-        covariance += w * (b.estimate.covariance + np.outer(d, d))
-    return displaced(first.estimate, mean, covariance)
+    def _mean(self) -> Estimate:
+        kept = [b for b in self.branches if b.weight > self.branches[0].weight - P["speak"]]
+        first = kept[0].filter.estimate()
+        if len(kept) == 1:
+            return first
+        estimates = [first, *(b.filter.estimate() for b in kept[1:])]
+        apart = differences(estimates, first)
+        weights = np.exp([b.weight for b in kept])
+        weights /= weights.sum()
+        mean = weights @ apart
+        apart -= mean
+        covariance = (weights[:, None] * apart).T @ apart
+        for w, one in zip(weights.tolist(), estimates, strict=True):
+            covariance += w * one.covariance
+        return displaced(first, mean, covariance)

@@ -21,7 +21,7 @@ from .propagation import IMU_NOISE
 from .ship import ShipModel
 from .suitable import Suitable
 
-__all__ = ["Doubt", "DoubtedFixes"]
+__all__ = ["Doubt", "DoubtedInstruments", "DoubtingModel"]
 
 _PLACE = 1e-4
 _INERTIAL = 15
@@ -52,7 +52,7 @@ def with_places(instruments: Instruments) -> Instruments:
     return Instruments(sheets, instruments.imu, instruments.step)
 
 
-class _Doubting(ErrorModel):
+class DoubtingModel(ErrorModel):
     def _find(self, covariance: Array, first: int) -> None:
         places = self.bias_at
         self.first = first
@@ -93,14 +93,14 @@ class _Doubting(ErrorModel):
         covariance[:, at] = 0.0
         covariance[at, at] = variance
 
-    def take_over_doubt(self, other) -> None:
+    def take_over_doubts(self, other) -> None:
         for mine, theirs in zip(self._rates(), other._rates(), strict=True):
             mine[...] = theirs
         if isinstance(self, _Inertial):
             self._noise[...] = other._noise
 
 
-class _Inertial(_Doubting, InertialModel):
+class _Inertial(DoubtingModel, InertialModel):
     def begin(self, start: InitialState, instruments: Instruments) -> Array:
         covariance = super().begin(start, with_places(instruments))
         self._decay, self._density = self._decay.copy(), self._density.copy()
@@ -124,7 +124,7 @@ class _Inertial(_Doubting, InertialModel):
         return self.calibration
 
 
-class _Ship(_Doubting, ShipModel):
+class _Ship(DoubtingModel, ShipModel):
     def begin(self, start: InitialState, instruments: Instruments) -> Array:
         covariance = super().begin(start, with_places(instruments))
         self._find(covariance, 0)
@@ -137,7 +137,7 @@ class _Ship(_Doubting, ShipModel):
         return self.x
 
 
-class DoubtedFixes(Suitable):
+class DoubtedInstruments(Suitable):
     def choose(self, instruments: Instruments, name: str) -> ErrorModel:
         model = _Ship() if instruments.imu is None else _Inertial()
         return model.choose(instruments, name)
