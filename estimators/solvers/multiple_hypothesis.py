@@ -87,7 +87,7 @@ class MultipleHypothesis(Solver):
         self.history = []
 
     def _begin_period(self):
-        self._steps, self._norm, self._nis, self._freedom = [], 0.0, 0.0, 0.0
+        self._steps, self._norm, self._nis, self._freedom, self._excess = [], 0.0, 0.0, 0.0, []
 
     def update(self, measurements: Measurements) -> Estimate:
         alive = self.branches
@@ -100,6 +100,7 @@ class MultipleHypothesis(Solver):
         self._nis += lead.filter.nis
         self._freedom += lead.filter.freedom
         self._steps.append(step)
+        self._excess.append(lead.filter.nis - lead.filter.freedom - self.alarm * (2.0 * lead.filter.freedom) ** 0.5)
         notes = lead.filter.notes
         if measurements.time >= self._next - 1e-6:
             self._next = measurements.time + self.period
@@ -143,7 +144,7 @@ class MultipleHypothesis(Solver):
         if regular:
             self._regular = time + self.watch
         for name, doubt in self.kinds.items():
-            if (alarmed or (regular and name in self.regular)) and name not in anchor.doubts.values():
+            if alarmed or (regular and name in self.regular and name not in anchor.doubts.values()):
                 interval = self.watch if name in self.regular and not alarmed else self.period
                 self._child(time, interval / self.onset / P["rare_" + name], doubt, name)
         for group in anchor.doubts:
@@ -168,10 +169,14 @@ class MultipleHypothesis(Solver):
             f.model.believe(f.covariance, name)
             doubts = {g: k for g, k in anchor.doubts.items() if g != name}
         else:
-            f.model.doubt(f.covariance, doubt)
             doubts = {**anchor.doubts, doubt.group: name}
         child = Branch(doubts, f, anchor.weight + log(min(p, 0.5)) - self._norm, time - self.period)
-        for step in self._steps:
+        onset = (next((k for k, x in enumerate(self._excess) if x > 0), 0),)
+        if name == "log":
+            onset = (onset[0], onset[0] + 1)
+        for k, step in enumerate(self._steps):
+            if doubt is not None and k in onset:
+                f.model.doubt(f.covariance, doubt)
             f.advance(step)
             child.weight += f.evidence
         self.branches.append(child)
