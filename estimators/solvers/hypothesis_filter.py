@@ -32,6 +32,7 @@ __all__ = ["FULL", "HypothesisFilter", "Step"]
 
 #: Readings of an instrument per second that count fully as evidence.
 FULL = 1.0
+LARGEST = 0.1
 
 
 class Step(NamedTuple):
@@ -124,6 +125,12 @@ class HypothesisFilter(ImmEstimator):
         self.covariance[...] = other.covariance
         mine, theirs = self._filter.choice, other._filter.choice
         mine.memories[...], mine.last[...] = theirs.memories, theirs.last
+
+    def loosen(self, factor: float) -> None:
+        first = self.dynamics.first_variances.copy()
+        attitude = self.model.moving[1]
+        first[attitude] = np.maximum(first[attitude], LARGEST**2)
+        self.model.loosen(self.covariance, factor**2, first)
 
     def _use(
         self,

@@ -40,7 +40,7 @@ class Branch:
 
 
 P = dict(drift=4.0, drift_time=100.0, wild=15.0, wild_time=40.0, log=0.5, log_time=30.0, log_jump=1.0, gyro=0.1, accel=0.1, imu_jump=2.0, imu_walk=0.2,
-    turn=5.0, turn_time=60.0, rare_imu=10.0, rare_compass=2.0, rare_drift=1.0, rare_wild=1.0, rare_log=1.0, speak=7.0)
+    turn=5.0, turn_time=60.0, rare_imu=10.0, rare_compass=2.0, rare_drift=1.0, rare_wild=1.0, rare_log=1.0, speak=7.0, lost=10.0, rare_lost=10.0)
 
 
 class MultipleHypothesis(Solver):
@@ -58,7 +58,7 @@ class MultipleHypothesis(Solver):
         self.watch, self.same, self.alarm, self.least = watch, int(same), alarm, least
         self.all_kinds = {"drift": Doubt("fix", P["drift"], P["drift_time"], 0.0), "wild": Doubt("fix", P["wild"], P["wild_time"], P["wild"]),
             "log": Doubt("log", P["log"], P["log_time"], P["log_jump"]), "imu": Doubt("imu", P["imu_walk"], 0.0, P["imu_jump"], radians(P["gyro"]), P["accel"]),
-            "compass": Doubt("compass", radians(P["turn"]), P["turn_time"], radians(P["turn"]))}
+            "compass": Doubt("compass", radians(P["turn"]), P["turn_time"], radians(P["turn"])), "lost": Doubt("", P["lost"], 0.0, 0.0)}
         self.regular = ("drift", "wild")
 
     def reset(self, start: InitialState, instruments: Instruments) -> None:
@@ -77,7 +77,7 @@ class MultipleHypothesis(Solver):
         self._anchor = Branch({}, made(start), 0.0, start.time)
         first = self.branches[0].filter
         self._anchor.filter.take_over(first)
-        self.kinds = {k: d for k, d in self.all_kinds.items() if d.group in first.model.doubtful}
+        self.kinds = {k: d for k, d in self.all_kinds.items() if d.group in first.model.doubtful or not d.group}
         self._next = start.time + self.period
         self._regular = start.time + self.watch
         self._begin_period()
@@ -169,14 +169,17 @@ class MultipleHypothesis(Solver):
             f.model.believe(f.covariance, name)
             doubts = {g: k for g, k in anchor.doubts.items() if g != name}
         else:
-            doubts = {**anchor.doubts, doubt.group: name}
+            doubts = {**anchor.doubts, doubt.group: name} if doubt.group else anchor.doubts
         child = Branch(doubts, f, anchor.weight + log(min(p, 0.5)) - self._norm, time - self.period)
-        onset = (next((k for k, x in enumerate(self._excess) if x > 0), 0),)
+        onset = (next((k for k, x in enumerate(self._excess) if x > max(0.0, 0.3 * max(self._excess))), 0),)
         if name == "log":
             onset = (onset[0], onset[0] + 1)
         for k, step in enumerate(self._steps):
             if doubt is not None and k in onset:
-                f.model.doubt(f.covariance, doubt)
+                if doubt.group:
+                    f.model.doubt(f.covariance, doubt)
+                else:
+                    f.loosen(doubt.sigma)
             f.advance(step)
             child.weight += f.evidence
         self.branches.append(child)
