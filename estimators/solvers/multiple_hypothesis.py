@@ -39,8 +39,8 @@ class Branch:
         return "+".join(self.doubts.values()) or "sound"
 
 
-P = dict(drift=4.0, drift_time=100.0, wild=15.0, wild_time=40.0, log=0.5, log_time=30.0, log_jump=1.0, gyro=0.1, accel=0.1, imu_jump=2.0, imu_walk=0.2,
-    turn=5.0, turn_time=60.0, rare_imu=10.0, rare_compass=2.0, rare_drift=1.0, rare_wild=1.0, rare_log=1.0, speak=7.0, lost=10.0, rare_lost=10.0)
+P = dict(drift=4.0, drift_time=100.0, wild=15.0, wild_time=40.0, log=0.5, log_time=1000.0, log_jump=1.0, gyro=0.3, accel=0.1, imu_jump=1.0, imu_walk=0.2,
+    turn=5.0, turn_time=60.0, rare_imu=30.0, rare_compass=2.0, rare_drift=1.0, rare_wild=1.0, rare_log=1.0, speak=7.0, lost=0.2, rare_lost=30.0)
 
 
 class MultipleHypothesis(Solver):
