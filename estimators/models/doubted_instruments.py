@@ -1,18 +1,24 @@
-"""Models whose instruments can be doubted and believed again in mid-run.
+"""Models whose instruments can be doubted, and believed again, in mid-run.
 
-PROTOTYPE
+A fix that is reflected, drawn aside or off by a constant has an error that lasts, and so has a log that reports zero or
+a compass whose ring is out of step. Taken for white noise it pulls the estimate along. As a state it is made observable
+by the other instruments and by what was known before. Here every fix, log and compass has bias states, also where its
+datasheet has none. While the instruments of a group are believed, their biases are those of the datasheets; while they
+are doubted, those of a `BiasDoubt`. The states have the same places, so that the same compiled functions work on both,
+and a filter changes its hypothesis without being begun anew. Likewise the noise and the biases of the IMU (`ImuDoubt`).
+
+Source: B. Friedland, *Treatment of bias in recursive filtering*, IEEE TAC 14(4), 1969; A. S. Willsky and H. L. Jones,
+*A generalized likelihood ratio approach to the detection and estimation of jumps in linear systems*, IEEE TAC 21(1),
+1976.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
-from math import radians
-from typing import NamedTuple
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from simnav.types import KINDS, Array, InitialState, Instruments
-from simnav.structures import filled
+from simnav.types import Array, Datasheet, InitialState, Instruments
 
 from .base import ErrorModel
 from .equations import equation_of
@@ -21,29 +27,180 @@ from .propagation import IMU_NOISE
 from .ship import ShipModel
 from .suitable import Suitable
 
-__all__ = ["Doubt", "DoubtedInstruments", "DoubtingModel"]
+__all__ = ["IMU", "AttitudeDoubt", "BiasDoubt", "DoubtedInstruments", "DoubtingModel", "ImuDoubt", "group_of"]
 
+#: Group of the IMU.
+IMU = "imu"
+#: Sigma of a bias over that of the noise, where a datasheet has no bias: it only keeps a place for the state.
 _PLACE = 1e-4
-_INERTIAL = 15
+#: Index of the first state behind motion and IMU in the error of the inertial model; places of both biases of the IMU.
+_INERTIAL, _GYROSCOPE, _ACCELEROMETER = 15, np.arange(9, 12), np.arange(12, 15)
 
 
-class Doubt(NamedTuple):
+@dataclass(frozen=True)
+class BiasDoubt:
+    """The error that the instruments of a group are suspected of, in each component: a Gauss-Markov process.
+
+    Attributes
+    ----------
+    group : str
+        "fix", "log" or "compass".
+    sigma : float
+        Stationary standard deviation [m, m/s or rad].
+    time : float
+        Correlation time [s].
+    jump : float
+        Standard deviation of what is added at the onset, in the same unit.
+    """
+
     group: str
     sigma: float
     time: float
+    jump: float = 0.0
+
+    def begin(self, model: DoubtingModel, covariance: Array) -> None:
+        """Doubt the instruments of the group; the (n, n) covariance is updated."""
+        own = model.places[self.group]
+        decay, density = model.rates()
+        decay[own.rates], density[own.rates] = 1.0 / self.time, 2.0 * self.sigma**2 / self.time
+        covariance[own.states, own.states] += self.jump**2
+
+
+@dataclass(frozen=True)
+class ImuDoubt:
+    """The error that the IMU is suspected of: noise, and biases that jump and wander.
+
+    Attributes
+    ----------
+    rate, force : float
+        Density of the white noise of gyroscopes [rad/s/sqrt(Hz)] and accelerometers [m/s^2/sqrt(Hz)], at least.
+    jump : float
+        Sigma of the jump of the biases at the onset, over these densities.
+    walk : float
+        Density of the random walk of the biases over these densities [1/sqrt(s)], at least.
+    """
+
+    rate: float
+    force: float
     jump: float
-    gyro: float = 0.0
-    accel: float = 0.0
+    walk: float
+    group: str = IMU
+
+    def begin(self, model: DoubtingModel, covariance: Array) -> None:
+        """Doubt the IMU; the (n, n) covariance is updated."""
+        own = model.imu_noise.view(IMU_NOISE)[0]
+        for triad, density, at in (
+            ("gyroscope", self.rate, _GYROSCOPE), ("accelerometer", self.force, _ACCELEROMETER),
+        ):  # fmt: skip
+            own[triad] = max(own[triad], density**2)
+            own[f"{triad}_walk"] = max(own[f"{triad}_walk"], (self.walk * density) ** 2)
+            covariance[at, at] += (self.jump * density) ** 2
 
 
-def group_of(sheet) -> str:
+@dataclass(frozen=True)
+class AttitudeDoubt:
+    """The attitude is suspected to be wrong, by a disturbance that is over or from the start.
+
+    Attributes
+    ----------
+    level, heading : float
+        Standard deviations that are added [rad].
+    """
+
+    level: float
+    heading: float
+    group: str = ""
+
+    def begin(self, model: DoubtingModel, covariance: Array) -> None:
+        """Doubt the attitude; the (n, n) covariance is updated."""
+        attitude = model.moving[1]
+        at = np.arange(attitude.start, attitude.stop)
+        covariance[at, at] += np.square((self.level, self.level, self.heading))[: len(at)]
+
+
+@dataclass(frozen=True)
+class _Places:
+    """The biases of a group: places among the states and the rates, and what the datasheets say of them."""
+
+    states: Array
+    rates: Array
+    variance: Array
+    decay: Array
+    density: Array
+
+
+def group_of(sheet: Datasheet) -> str:
+    """Group of an instrument: "fix", "log", "compass", or empty for one that is not doubted."""
     if sheet.role == "fix":
         return "fix"
     equation = equation_of(sheet)
     return "log" if equation.is_log else "compass" if equation.is_heading else ""
 
 
-def with_places(instruments: Instruments) -> Instruments:
+class DoubtingModel(ErrorModel):
+    """What the models of this module have in common.
+
+    Attributes
+    ----------
+    places : dict of str to _Places
+        The biases of each group that can be doubted.
+    groups : dict of str to tuple of str
+        The instruments of each group that can be doubted.
+    """
+
+    instruments: Instruments
+    bias_at: dict[str, int]
+    imu_noise: Array
+
+    def rates(self) -> tuple[Array, Array]:
+        """Inverse correlation times [1/s] and noise densities of the biases."""
+        raise NotImplementedError
+
+    def biases(self) -> Array:
+        """The array that holds the values of the biases, with the places of their rates."""
+        raise NotImplementedError
+
+    def find_biases(self, covariance: Array, first: int) -> None:
+        """Find the biases in a model that has begun; those of the error's index ``first`` have the first rates."""
+        self.places: dict[str, _Places] = {}
+        self.groups: dict[str, tuple[str, ...]] = {}
+        for sheet in self.instruments.values():
+            if (group := group_of(sheet)) and sheet.name in self.bias_at and self.observes(sheet):
+                self.groups[group] = (*self.groups.get(group, ()), sheet.name)
+        decay, density = self.rates()
+        for group, names in self.groups.items():
+            at = [self.bias_at[n] + k for n in names for k in range(self.components(self.instruments[n]))]
+            states = np.array(at, dtype=np.intp)
+            own = states - first
+            self.places[group] = _Places(
+                states, own, covariance.diagonal()[states].copy(), decay[own].copy(), density[own].copy()
+            )
+
+    def believe(self, covariance: Array, group: str) -> None:
+        """Give the instruments of a group the errors of their datasheets again; updates the (n, n) covariance.
+
+        Nothing is then known of the biases of fixes, logs and compasses. Those of the IMU stay as they were estimated.
+        """
+        if group == IMU:
+            self.imu_noise[...] = self.stated_noise
+            return
+        own, (decay, density) = self.places[group], self.rates()
+        decay[own.rates], density[own.rates] = own.decay, own.density
+        self.biases()[own.rates] = 0.0
+        covariance[own.states] = 0.0
+        covariance[:, own.states] = 0.0
+        covariance[own.states, own.states] = own.variance
+
+    def take_over_doubts(self, other: DoubtingModel) -> None:
+        """Copy of another model which instruments are doubted."""
+        for mine, theirs in zip((*self.rates(), self.imu_noise), (*other.rates(), other.imu_noise), strict=True):
+            mine[...] = theirs
+
+    stated_noise: Array
+
+
+def _with_biases(instruments: Instruments) -> Instruments:
+    """The datasheets, with a bias for every instrument that can be doubted."""
     sheets = []
     for sheet in instruments.values():
         if group_of(sheet) and not (sheet.processes or np.any(sheet.bias_instability) or np.any(sheet.bias)):
@@ -52,92 +209,50 @@ def with_places(instruments: Instruments) -> Instruments:
     return Instruments(sheets, instruments.imu, instruments.step)
 
 
-class DoubtingModel(ErrorModel):
-    def _find(self, covariance: Array, first: int) -> None:
-        places = self.bias_at
-        self.first = first
-        self.groups: dict[str, Array] = {}
-        for name, sheet in self.instruments.items():
-            g = group_of(sheet)
-            if g and name in places and self.observes(sheet):
-                self.groups.setdefault(g, []).extend(places[name] + k for k in range(self.components(sheet)))
-        decay, density = self._rates()
-        self.groups = {g: np.array(at, dtype=np.intp) for g, at in self.groups.items()}
-        self.known = {
-            g: (covariance.diagonal()[at].copy(), decay[at - first].copy(), density[at - first].copy())
-            for g, at in self.groups.items()
-        }
-
-    @property
-    def doubtful(self) -> set[str]:
-        return set(self.groups) | ({"imu"} if isinstance(self, _Inertial) else set())
-
-    def doubt(self, covariance: Array, doubt: Doubt) -> None:
-        if doubt.group == "imu":
-            self._doubt_imu(covariance, doubt)
-            return
-        at = self.groups[doubt.group]
-        decay, density = self._rates()
-        decay[at - self.first], density[at - self.first] = 1.0 / doubt.time, 2.0 * doubt.sigma**2 / doubt.time
-        covariance[at, at] += doubt.jump**2
-
-    def believe(self, covariance: Array, group: str) -> None:
-        if group == "imu":
-            self._noise[...] = self._stated
-            return
-        at, (variance, d, q) = self.groups[group], self.known[group]
-        decay, density = self._rates()
-        decay[at - self.first], density[at - self.first] = d, q
-        self._values()[at - self.first] = 0.0
-        covariance[at] = 0.0
-        covariance[:, at] = 0.0
-        covariance[at, at] = variance
-
-    def take_over_doubts(self, other) -> None:
-        for mine, theirs in zip(self._rates(), other._rates(), strict=True):
-            mine[...] = theirs
-        if isinstance(self, _Inertial):
-            self._noise[...] = other._noise
-
-
 class _Inertial(DoubtingModel, InertialModel):
+    """The inertial model."""
+
     def begin(self, start: InitialState, instruments: Instruments) -> Array:
-        covariance = super().begin(start, with_places(instruments))
-        self._decay, self._density = self._decay.copy(), self._density.copy()
-        self._stated = self._noise.copy()
-        self._find(covariance, _INERTIAL)
+        """Set the state; UnsuitableScenario without an IMU."""
+        covariance = super().begin(start, _with_biases(instruments))
+        self._decay, self._density = self._decay.copy(), self._density.copy()  # not those of the blocks
+        self.imu_noise, self.stated_noise = self._noise, self._noise.copy()
+        self.find_biases(covariance, _INERTIAL)
+        self.groups[IMU] = (IMU,) if instruments.imu is None else (instruments.imu.name,)
         return covariance
 
-    def _doubt_imu(self, covariance, doubt):
-        own = self._noise.view(IMU_NOISE)[0]
-        own["gyroscope"] = max(own["gyroscope"], doubt.gyro**2)
-        own["accelerometer"] = max(own["accelerometer"], doubt.accel**2)
-        own["gyroscope_walk"] = max(own["gyroscope_walk"], (doubt.gyro * doubt.sigma)**2)
-        own["accelerometer_walk"] = max(own["accelerometer_walk"], (doubt.accel * doubt.sigma)**2)
-        covariance[range(9, 12), range(9, 12)] += (doubt.gyro * doubt.jump) ** 2
-        covariance[range(12, 15), range(12, 15)] += (doubt.accel * doubt.jump) ** 2
-
-    def _rates(self):
+    def rates(self) -> tuple[Array, Array]:
+        """As `DoubtingModel.rates`."""
         return self._decay, self._density
 
-    def _values(self):
+    def biases(self) -> Array:
+        """As `DoubtingModel.biases`."""
         return self.calibration
 
 
 class _Ship(DoubtingModel, ShipModel):
+    """The ship model."""
+
     def begin(self, start: InitialState, instruments: Instruments) -> Array:
-        covariance = super().begin(start, with_places(instruments))
-        self._find(covariance, 0)
+        """Set the state; UnsuitableScenario without a position and a speed."""
+        covariance = super().begin(start, _with_biases(instruments))
+        self.imu_noise = self.stated_noise = np.empty(0)
+        self.find_biases(covariance, 0)
         return covariance
 
-    def _rates(self):
+    def rates(self) -> tuple[Array, Array]:
+        """As `DoubtingModel.rates`."""
         return self.decay, self.density
 
-    def _values(self):
+    def biases(self) -> Array:
+        """As `DoubtingModel.biases`."""
         return self.x
 
 
 class DoubtedInstruments(Suitable):
+    """The inertial model where there is an IMU, else the ship model, with instruments that can be doubted."""
+
     def choose(self, instruments: Instruments, name: str) -> ErrorModel:
+        """A new model; UnsuitableScenario where neither will do."""
         model = _Ship() if instruments.imu is None else _Inertial()
         return model.choose(instruments, name)

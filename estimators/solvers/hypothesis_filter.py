@@ -32,7 +32,6 @@ __all__ = ["FULL", "HypothesisFilter", "Step"]
 
 #: Readings of an instrument per second that count fully as evidence.
 FULL = 1.0
-LARGEST = 0.1
 
 
 class Step(NamedTuple):
@@ -114,9 +113,10 @@ class HypothesisFilter(ImmEstimator):
         """The estimate at the end of the step."""
         return self._estimate()
 
-    def quiet(self, name: str) -> float:
-        """Probability that the noise of an instrument is that of its datasheet."""
-        return float(self._probability[name][0])
+    @property
+    def names(self) -> Sequence[str]:
+        """The instruments that it observes."""
+        return self._names
 
     def take_over(self, other: HypothesisFilter) -> None:
         """Copy the state of another filter of the same run, with all that it keeps."""
@@ -125,12 +125,6 @@ class HypothesisFilter(ImmEstimator):
         self.covariance[...] = other.covariance
         mine, theirs = self._filter.choice, other._filter.choice
         mine.memories[...], mine.last[...] = theirs.memories, theirs.last
-
-    def loosen(self, factor: float) -> None:
-        attitude = self.model.moving[1]
-        if attitude.stop - attitude.start == 3:
-            at = np.arange(attitude.start, attitude.stop)
-            self.covariance[at, at] += np.array([0.2, 0.2, 1.0]) ** 2 * factor**2
 
     def _use(
         self,

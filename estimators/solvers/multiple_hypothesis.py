@@ -1,67 +1,224 @@
-"""PROTOTYPE"""
+"""Several hypotheses of what is wrong, each with a filter and a probability.
+
+One hypothesis says that all is well. The others say that the fixes are off, that the log is, the compass or the IMU,
+several of them, or that the start or the attitude was wrong. Each is a filter over the same measurements in which the
+errors of the doubted instruments are states of another process (`simnav.estimators.models.doubted_instruments`). The
+evidence of a hypothesis is the density of the innovations of its filter; its probability is multiplied by it in each
+step and normalised. A hypothesis that allows for more predicts less sharply. So where nothing is wrong the one that all
+is well has the largest evidence, and where fixes and dead reckoning part, however slowly, the sum over many innovations
+decides. The estimate is the mean of all filters, weighted by their probabilities, and its covariance has the spread
+between them.
+
+**Anchors.** Every `period` seconds the most probable filter is copied: this is the anchor. A hypothesis is begun from
+the anchor, with the measurements since then once more, so that it was not led astray by a fault before its detection.
+Its onset is at the first step since the anchor at which the leading filter was surprised, otherwise at the anchor. A
+jump of a log of many readings a second may be in the middle of a step, so its process jumps in the next step, too.
+
+**What is begun when.** Slow errors of fixes surprise nobody, so hypotheses on fixes begin every `WATCH` seconds in any
+case. All kinds begin when the leading filter has had larger innovations than its datasheets allow since the anchor. If
+the leading hypothesis doubts a group of instruments, one more says that they are well again from the anchor on: so a
+wrong decision is undone, too. What is less probable than exp(-`LEAST`) times the leading one is dropped, as are the
+least probable of more than `filters`, and of more than `ALIKE` with the same doubts.
+
+**Prior probabilities.** A fault of each kind begins once in `onset` seconds, or more rarely by the factor of the kind
+(`KINDS`), and lasts for `end` seconds, in the mean. The start is wrong with the probability `WRONG_START`.
+
+Gross errors and a noise beyond the datasheet need no hypothesis: in each filter the noise of every instrument switches
+between levels (`simnav.estimators.solvers.hypothesis_filter`).
+
+Sources: D. T. Magill, *Optimal adaptive estimation of sampled stochastic processes*, IEEE TAC 10(4), 1965; A. S.
+Willsky and H. L. Jones, *A generalized likelihood ratio approach to the detection and estimation of jumps in linear
+systems*, IEEE TAC 21(1), 1976; Y. Bar-Shalom, X. R. Li and T. Kirubarajan, *Estimation with Applications to Tracking
+and Navigation*, 2001, section 11.6 (hypotheses that branch, are pruned and merged).
+"""
 
 from __future__ import annotations
 
 import copy
 from collections.abc import Mapping
 from dataclasses import dataclass
-from math import exp, log, radians
-from typing import ClassVar
+from math import exp, inf, log, nan, radians, sqrt
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
+from simnav.estimators.algebra.chi_square import chi_square_limits
 from simnav.estimators.composition import Solver
+from simnav.estimators.models.channels import owners, summary
 from simnav.estimators.models.coupling import by_source
-from simnav.estimators.models.doubted_instruments import Doubt
+from simnav.estimators.models.doubted_instruments import AttitudeDoubt, BiasDoubt, ImuDoubt
 from simnav.estimators.models.suitable import ModelChoice
-from simnav.types import Array, Estimate, InitialState, Instruments, Measurements
+from simnav.types import Array, Estimate, InitialState, Instruments, Measurement, Measurements
 
 from .admission import Admission
 from .hypotheses import uncertain_start
 from .hypothesis_filter import HypothesisFilter, Step
 from .innovation_consistency import InnovationTest
+from .kalman import KalmanEstimator
 from .state_difference import differences, displaced
 
-__all__ = ["MultipleHypothesis"]
+__all__ = ["KINDS", "Kind", "MultipleHypothesis"]
 
 
-@dataclass
-class Branch:
-    """One hypothesis."""
+class Kind(NamedTuple):
+    """A kind of hypothesis.
 
-    doubts: Mapping[str, str]
-    filter: HypothesisFilter
-    weight: float
+    Attributes
+    ----------
+    doubt : BiasDoubt, ImuDoubt or AttitudeDoubt
+        What is doubted, and the error that is suspected.
+    rare : float
+        Mean time between such faults, over `onset`.
+    watched : bool
+        Whether it is begun at regular times, too.
+    """
+
+    doubt: BiasDoubt | ImuDoubt | AttitudeDoubt
+    rare: float = 1.0
+    watched: bool = False
+
+
+#: The kinds of hypotheses. Sizes and times were chosen on training families.
+KINDS: Mapping[str, Kind] = {
+    "drifting fixes": Kind(BiasDoubt("fix", sigma=4.0, time=100.0), watched=True),
+    "jumping fixes": Kind(BiasDoubt("fix", sigma=15.0, time=40.0, jump=15.0), watched=True),
+    "log": Kind(BiasDoubt("log", sigma=0.5, time=1000.0, jump=1.0)),
+    "compass": Kind(BiasDoubt("compass", sigma=radians(5.0), time=60.0, jump=radians(5.0)), rare=2.0),
+    "imu": Kind(ImuDoubt(rate=radians(0.3), force=0.1, jump=1.0, walk=0.2), rare=30.0),
+    "attitude": Kind(AttitudeDoubt(level=0.04, heading=0.2), rare=30.0),
+}
+#: Time between hypotheses that are begun in any case [s].
+WATCH = 20.0
+#: Prior probability that the start is wrong.
+WRONG_START = 0.02
+#: The leading filter is surprised where the sum of its normalised innovations squared is so many sigmas too large.
+SURPRISED = 3.0
+#: A step is the onset if its excess is above this part of the largest one since the anchor.
+ONSET = 0.3
+#: Hypotheses whose log probability is smaller than the largest one by this are dropped, and do not speak.
+LEAST, SILENT = 12.0, 7.0
+#: Largest number of hypotheses with the same doubts.
+ALIKE = 2
+#: A measurement less probable than this by the leading hypothesis is flagged as a gross error.
+GROSS = 0.99999
+#: Tolerance of times [s].
+_SAME_TIME = 1e-6
+
+
+class _Doubted(NamedTuple):
+    """By which kind of hypothesis a group is doubted, and since when [s]."""
+
+    kind: str
     since: float
 
+
+@dataclass(eq=False)
+class _Hypothesis:
+    """A filter with what it doubts.
+
+    Attributes
+    ----------
+    doubts : mapping of str to _Doubted
+        The groups of instruments that are doubted.
+    filter : HypothesisFilter
+        Its filter.
+    weight : float
+        Logarithm of its probability.
+    """
+
+    doubts: Mapping[str, _Doubted]
+    filter: HypothesisFilter
+    weight: float
+
     @property
-    def kind(self):
-        return "+".join(self.doubts.values()) or "sound"
+    def kinds(self) -> dict[str, str]:
+        """By group the kind of the doubt."""
+        return {group: doubted.kind for group, doubted in self.doubts.items()}
 
 
-P = dict(drift=4.0, drift_time=100.0, wild=15.0, wild_time=40.0, log=0.5, log_time=1000.0, log_jump=1.0, gyro=0.3, accel=0.1, imu_jump=1.0, imu_walk=0.2,
-    turn=5.0, turn_time=60.0, rare_imu=30.0, rare_compass=2.0, rare_drift=1.0, rare_wild=1.0, rare_log=1.0, speak=7.0, lost=0.2, rare_lost=30.0)
+class _Period:
+    """The steps since the anchor, what was taken off all weights, and the excess of the leading filter.
+
+    The excess of a step is the sum of the normalised innovations squared beyond its expected value and `SURPRISED`
+    sigmas of it.
+    """
+
+    def __init__(self, start: float) -> None:
+        self.start, self.steps = start, list[Step]()
+        self.excess: list[float] = []
+        self.taken = self.nis = self.freedom = 0.0
+
+    def add(self, step: Step, taken: float, lead: HypothesisFilter) -> None:
+        """Add a step."""
+        self.steps.append(step)
+        self.taken += taken
+        self.nis += lead.nis
+        self.freedom += lead.freedom
+        self.excess.append(_excess(lead.nis, lead.freedom))
+
+    def begin(self, k: int) -> float:
+        """Time at which a step begins [s]."""
+        return self.steps[k - 1].until if k else self.start
+
+    @property
+    def surprising(self) -> bool:
+        """Whether the innovations are larger than the datasheets allow."""
+        return _excess(self.nis, self.freedom) > 0.0
+
+    @property
+    def onset(self) -> int:
+        """The step at which a fault began; the first one, if none is surprising."""
+        limit = ONSET * max(self.excess)
+        return next((k for k, x in enumerate(self.excess) if x > 0.0 and x > limit), 0)
+
+
+def _excess(nis: float, freedom: float) -> float:
+    return nis - freedom - SURPRISED * sqrt(2.0 * freedom)
 
 
 class MultipleHypothesis(Solver):
-    """The solver."""
+    """The solver of the module.
+
+    Diagnostics: ``doubt.NAME`` is the probability that an instrument (or the IMU) is wrong, and ``since.NAME`` since
+    when, by the most probable hypothesis that doubts it [s]; NaN while the probability is below 0.5. ``hypotheses`` is
+    the number of filters. Innovations and NIS are those of the most probable filter. Measurements of an instrument that
+    is wrong with a probability above 0.5 are flagged, and single gross errors.
+
+    Parameters
+    ----------
+    model : ModelChoice
+        The model of each filter (`simnav.estimators.models.doubted_instruments`).
+    period : float
+        Time between anchors [s].
+    onset : float
+        Mean time between faults of the most frequent kind [s].
+    end : float
+        Mean length of a fault [s].
+    filters : int
+        Largest number of filters.
+    """
 
     pieces: ClassVar[tuple[str, ...]] = ("model",)
     sets_aside: ClassVar[bool] = True
+    refuses: ClassVar[Mapping[str, str]] = {
+        **KalmanEstimator.refuses,
+        "adaptation": "an adapted noise would decide the evidence of a hypothesis",
+        "iteration": "the evidence is that of one linearisation",
+        "smoother": "a filter that is dropped leaves no trajectory",
+    }
 
     def __init__(
-        self, model: ModelChoice, *, period: float = 5.0, onset: float = 2000.0, end: float = 100.0, watch: float = 20.0,
-        start: float = 0.02, filters: int = 6, same: int = 2, alarm: float = 3.0, least: float = 12.0,
-    ):  # fmt: skip
-        self._choice = model
-        self.period, self.onset, self.end, self.start, self.filters = period, onset, end, start, int(filters)
-        self.watch, self.same, self.alarm, self.least = watch, int(same), alarm, least
-        self.all_kinds = {"drift": Doubt("fix", P["drift"], P["drift_time"], 0.0), "wild": Doubt("fix", P["wild"], P["wild_time"], P["wild"]),
-            "log": Doubt("log", P["log"], P["log_time"], P["log_jump"]), "imu": Doubt("imu", P["imu_walk"], 0.0, P["imu_jump"], radians(P["gyro"]), P["accel"]),
-            "compass": Doubt("compass", radians(P["turn"]), P["turn_time"], radians(P["turn"])), "lost": Doubt("", P["lost"], 0.0, 0.0)}
-        self.regular = ("drift", "wild")
+        self, model: ModelChoice, *, period: float = 5.0, onset: float = 2000.0, end: float = 100.0, filters: int = 6
+    ):
+        for name, value in (("period", period), ("onset", onset), ("end", end)):
+            if not 0.0 < value < inf:
+                raise ValueError(f"{name} = {value:g} s: it must be above 0 and finite")
+        if filters < 2:
+            raise ValueError(f"filters = {filters}: it must be 2 or more, or there is nothing to decide")
+        self._choice, self.period, self.onset, self.end, self.filters = model, period, onset, end, filters
 
     def reset(self, start: InitialState, instruments: Instruments) -> None:
+        """Begin a run; UnsuitableScenario if the model lacks an instrument."""
         instruments = by_source(instruments, self._choice, self.label)
 
         def made(own: InitialState) -> HypothesisFilter:
@@ -70,137 +227,179 @@ class MultipleHypothesis(Solver):
             one.reset(own, instruments)
             return one
 
-        self.branches = [Branch({}, made(start), log(1.0 - self.start), start.time)]
-        if self.start:
-            self.branches.append(Branch({}, made(uncertain_start(start)), log(self.start), start.time))
-        self._spare = [made(start) for _ in range(self.filters + 1 - len(self.branches))]
-        self._anchor = Branch({}, made(start), 0.0, start.time)
-        first = self.branches[0].filter
+        first = made(start)
+        self._hypotheses = [
+            _Hypothesis({}, first, log(1.0 - WRONG_START)),
+            _Hypothesis({}, made(uncertain_start(start)), log(WRONG_START)),
+        ]
+        # One more than may stay: the last one is begun before it is known which is dropped.
+        self._spare = [made(start) for _ in range(self.filters - 1)]
+        self._anchor = _Hypothesis({}, made(start), 0.0)
         self._anchor.filter.take_over(first)
-        self.kinds = {k: d for k, d in self.all_kinds.items() if d.group in first.model.doubtful or not d.group}
-        self._next = start.time + self.period
-        self._regular = start.time + self.watch
-        self._begin_period()
-        self._admission = Admission(instruments, first._names)
+        self._groups: Mapping[str, tuple[str, ...]] = first.model.groups
+        possible = {*self._groups, *([""] if first.model.moving[1].stop > 0 else [])}
+        self._kinds = {name: kind for name, kind in KINDS.items() if kind.doubt.group in possible}
+        self._period = _Period(start.time)
+        self._next, self._watch = start.time + self.period, start.time + WATCH
+        self._admission = Admission(instruments, first.names)
         self._innovation_test = InnovationTest()
-        self._keys = {n: (f"innovation.{n}", f"nis.{n}") for n in first._names}
-        self.history = []
+        self._gross, self._owners = chi_square_limits(GROSS), owners(instruments)
+        self._blank = {f"{label}.{name}": nan for name in first.names for label in ("innovation", "nis")}
+        self._blank |= {f"since.{name}": nan for names in self._groups.values() for name in names}
 
-    def _begin_period(self):
-        self._steps, self._norm, self._nis, self._freedom, self._excess = [], 0.0, 0.0, 0.0, []
+    @property
+    def best(self) -> HypothesisFilter:
+        """The filter of the most probable hypothesis."""
+        return self._hypotheses[0].filter
+
+    @property
+    def covariance(self) -> Array:
+        """(n, n) covariance of the most probable filter."""
+        return self.best.covariance
 
     def update(self, measurements: Measurements) -> Estimate:
-        alive = self.branches
-        step = Step(measurements.imu, self._admission.admit(measurements, alive[0].filter.model.time), measurements.time)
-        for b in alive:
-            b.filter.advance(step)
-            b.weight += b.filter.evidence
-        self._norm += self._normalise()
-        lead = alive[0]
-        self._nis += lead.filter.nis
-        self._freedom += lead.filter.freedom
-        self._steps.append(step)
-        self._excess.append(lead.filter.nis - lead.filter.freedom - self.alarm * (2.0 * lead.filter.freedom) ** 0.5)
-        notes = lead.filter.notes
-        if measurements.time >= self._next - 1e-6:
-            self._next = measurements.time + self.period
-            self._branch(measurements.time)
+        """Take one step's measurements, each at its own time."""
+        admitted = self._admission.admit(measurements, self.best.model.time)
+        step = Step(measurements.imu, admitted, measurements.time)
+        for h in self._hypotheses:
+            h.filter.advance(step)
+            h.weight += h.filter.evidence
+        taken = self._normalise()
+        lead = self.best
+        self._period.add(step, taken, lead)
+        notes = lead.notes
+        if step.until >= self._next - _SAME_TIME:
+            self._next = step.until + self.period
+            self._reconsider(step.until)
         estimate = self._mean()
-        diagnostics = {k: np.nan for p in self._keys.values() for k in p}
+        self._report(estimate, notes)
+        return estimate
+
+    def _normalise(self) -> float:
+        """Order the hypotheses by their probabilities, and make these sum to 1; the logarithm that was taken off."""
+        self._hypotheses.sort(key=lambda h: -h.weight)
+        largest = self._hypotheses[0].weight
+        total = largest + log(sum(exp(h.weight - largest) for h in self._hypotheses))
+        for h in self._hypotheses:
+            h.weight -= total
+        return total
+
+    def _reconsider(self, time: float) -> None:
+        """Begin hypotheses from the anchor, drop those that are improbable, and set the next anchor."""
+        anchor, surprised = self._anchor, self._period.surprising
+        watched = time >= self._watch - _SAME_TIME
+        if watched:
+            self._watch = time + WATCH
+        known = anchor.kinds.values()
+        for name, kind in self._kinds.items():
+            if surprised or (watched and kind.watched and name not in known):
+                length = WATCH if kind.watched and not surprised else self.period
+                self._begin(length / (kind.rare * self.onset), name)
+        for group in anchor.doubts:
+            self._begin(self.period / self.end, "", well=group)
+        self._normalise()
+        for h in [h for h in self._hypotheses if h.weight < self._hypotheses[0].weight - LEAST]:
+            self._drop(h)
+        self._normalise()
+        lead = self._hypotheses[0]
+        anchor.filter.take_over(lead.filter)
+        anchor.doubts, anchor.weight, self._period = lead.doubts, lead.weight, _Period(time)
+
+    def _begin(self, prior: float, name: str, well: str = "") -> None:
+        """Begin a hypothesis from the anchor.
+
+        Parameters
+        ----------
+        prior : float
+            Its probability before the measurements, given the anchor.
+        name : str
+            Its kind; empty for the next.
+        well : str
+            The group of instruments that is well again.
+        """
+        anchor, period, own = self._anchor, self._period, self._spare.pop()
+        own.take_over(anchor.filter)
+        weight = anchor.weight + log(min(prior, 0.5)) - period.taken
+        doubts, onsets = dict(anchor.doubts), {0}
+        if well:
+            del doubts[well]
+        else:
+            doubt, onset = self._kinds[name].doubt, period.onset
+            onsets = {onset, onset + 1} if doubt.group == "log" else {onset}
+            if doubt.group:
+                before = doubts.get(doubt.group)
+                since = before.since if before is not None else self._period.begin(onset)
+                doubts[doubt.group] = _Doubted(name, since)
+        for k, step in enumerate(period.steps):
+            if k in onsets and well:
+                own.model.believe(own.covariance, well)
+            elif k in onsets:
+                doubt.begin(own.model, own.covariance)
+            own.advance(step)
+            weight += own.evidence
+        born = _Hypothesis(doubts, own, weight)
+        self._hypotheses.append(born)
+        alike = [h for h in self._hypotheses if h.kinds == born.kinds]
+        if len(alike) > ALIKE:
+            self._drop(min(alike, key=lambda h: h.weight))
+        elif len(self._hypotheses) > self.filters:
+            self._drop(min(self._hypotheses, key=lambda h: h.weight))
+
+    def _drop(self, hypothesis: _Hypothesis) -> None:
+        self._hypotheses.remove(hypothesis)
+        self._spare.append(hypothesis.filter)
+
+    def _mean(self) -> Estimate:
+        """The mean of the hypotheses, and the covariance of their mixture."""
+        kept = [h for h in self._hypotheses if h.weight > self._hypotheses[0].weight - SILENT]
+        first = kept[0].filter.estimate()
+        if len(kept) == 1:
+            return first
+        estimates = [first, *(h.filter.estimate() for h in kept[1:])]
+        weights = np.exp([h.weight for h in kept])
+        weights /= weights.sum()
+        apart = differences(estimates, first)
+        mean = weights @ apart
+        apart -= mean
+        covariance = (weights[:, None] * apart).T @ apart
+        for weight, one in zip(weights.tolist(), estimates, strict=True):
+            covariance += weight * one.covariance
+        return displaced(first, mean, covariance)
+
+    def _report(self, estimate: Estimate, notes: list[tuple[Measurement, float, float]]) -> None:
+        """Set diagnostics and flags of an estimate.
+
+        Parameters
+        ----------
+        estimate : Estimate
+            The estimate of the step.
+        notes : list of (Measurement, float, float)
+            The measurements that the leading filter used, as of `HypothesisFilter.notes`.
+        """
+        diagnostics: dict[str, float | Array] = dict(self._blank)
+        wrong, flagged = set[str](), list[tuple[str, float]]()
+        for group, names in self._groups.items():
+            doubting = [h for h in self._hypotheses if group in h.doubts]
+            probability = sum(exp(h.weight) for h in doubting)
+            for name in names:
+                diagnostics[f"doubt.{name}"] = probability
+                if probability > 0.5:
+                    wrong.add(name)
+                    diagnostics[f"since.{name}"] = doubting[0].doubts[group].since
         for m, nis, size in notes:
             if nis < 0.0:
                 self._admission.skipped += 1
-            else:
-                self._innovation_test.add(nis, len(m.value))
-                a, b = self._keys[m.instrument]
-                diagnostics[a], diagnostics[b] = size, nis
+                continue
+            freedom = len(m.value)
+            self._innovation_test.add(nis, freedom)
+            diagnostics[f"innovation.{m.instrument}"], diagnostics[f"nis.{m.instrument}"] = size, nis
+            if m.instrument in wrong or nis > self._gross[freedom]:
+                flagged.append((m.instrument, m.time))
         self._innovation_test.end_epoch()
         diagnostics["variance_factor"] = self._innovation_test.variance_factor
         diagnostics["inconsistent"] = float(self._innovation_test.inconsistent)
         diagnostics["skipped"] = float(self._admission.skipped)
-        for g in ("fix", "log", "imu", "compass"):
-            diagnostics["doubt." + g] = sum(exp(b.weight) for b in alive if g in b.doubts)
-        estimate.diagnostics = diagnostics
-        self.history.append((measurements.time, [(b.kind, b.weight, b.since) for b in alive]))
-        return estimate
-
-    def _normalise(self):
-        self.branches.sort(key=lambda b: -b.weight)
-        best = self.branches[0].weight
-        total = best + log(sum(exp(b.weight - best) for b in self.branches))
-        for b in self.branches:
-            b.weight -= total
-        return total
-
-    @property
-    def covariance(self) -> Array:
-        return self.branches[0].filter.covariance
-
-    def _branch(self, time: float) -> None:
-        """Hypotheses are begun from the anchor."""
-        anchor = self._anchor
-        alarmed = self._freedom > 0 and self._nis - self._freedom > self.alarm * (2.0 * self._freedom) ** 0.5
-        regular = time >= self._regular - 1e-6
-        if regular:
-            self._regular = time + self.watch
-        for name, doubt in self.kinds.items():
-            if alarmed or (regular and name in self.regular and name not in anchor.doubts.values()):
-                interval = self.watch if name in self.regular and not alarmed else self.period
-                self._child(time, interval / self.onset / P["rare_" + name], doubt, name)
-        for group in anchor.doubts:
-            self._child(time, self.period / self.end, None, group)
-        best = max(b.weight for b in self.branches)
-        for b in [b for b in self.branches if b.weight < best - self.least]:
-            self._drop(b)
-        self._normalise()
-        lead = self.branches[0]
-        anchor.filter.take_over(lead.filter)
-        anchor.doubts, anchor.weight = lead.doubts, lead.weight
-        self._begin_period()
-
-    def _drop(self, b):
-        self.branches.remove(b)
-        self._spare.append(b.filter)
-
-    def _child(self, time, p, doubt, name):
-        anchor, f = self._anchor, self._spare.pop()
-        f.take_over(anchor.filter)
-        if doubt is None:
-            f.model.believe(f.covariance, name)
-            doubts = {g: k for g, k in anchor.doubts.items() if g != name}
-        else:
-            doubts = {**anchor.doubts, doubt.group: name} if doubt.group else anchor.doubts
-        child = Branch(doubts, f, anchor.weight + log(min(p, 0.5)) - self._norm, time - self.period)
-        onset = (next((k for k, x in enumerate(self._excess) if x > max(0.0, 0.3 * max(self._excess))), 0),)
-        if name == "log":
-            onset = (onset[0], onset[0] + 1)
-        for k, step in enumerate(self._steps):
-            if doubt is not None and k in onset:
-                if doubt.group:
-                    f.model.doubt(f.covariance, doubt)
-                else:
-                    f.loosen(doubt.sigma)
-            f.advance(step)
-            child.weight += f.evidence
-        self.branches.append(child)
-        alike = [b for b in self.branches if b.doubts == child.doubts]
-        if len(alike) > self.same:
-            self._drop(min(alike, key=lambda b: b.weight))
-        elif len(self.branches) > self.filters:
-            self._drop(min(self.branches, key=lambda b: b.weight))
-
-    def _mean(self) -> Estimate:
-        kept = [b for b in self.branches if b.weight > self.branches[0].weight - P["speak"]]
-        first = kept[0].filter.estimate()
-        if len(kept) == 1:
-            return first
-        estimates = [first, *(b.filter.estimate() for b in kept[1:])]
-        apart = differences(estimates, first)
-        weights = np.exp([b.weight for b in kept])
-        weights /= weights.sum()
-        mean = weights @ apart
-        apart -= mean
-        covariance = (weights[:, None] * apart).T @ apart
-        for w, one in zip(weights.tolist(), estimates, strict=True):
-            covariance += w * one.covariance
-        return displaced(first, mean, covariance)
+        diagnostics["hypotheses"] = float(len(self._hypotheses))
+        if self._owners:
+            diagnostics.update(summary(diagnostics, self._owners))
+        estimate.diagnostics, estimate.flagged = diagnostics, flagged
