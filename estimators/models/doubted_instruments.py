@@ -68,33 +68,35 @@ class BiasDoubt:
 
 @dataclass(frozen=True)
 class ImuDoubt:
-    """The error that the IMU is suspected of: noise, and biases that jump and wander.
+    """The error that the IMU is suspected of: biases that jump, and noise.
 
     Attributes
     ----------
+    rate_jump, force_jump : float
+        Standard deviation of the jump of each bias at the onset [rad/s], [m/s^2].
     rate, force : float
         Density of the white noise of gyroscopes [rad/s/sqrt(Hz)] and accelerometers [m/s^2/sqrt(Hz)], at least.
-    jump : float
-        Sigma of the jump of the biases at the onset, over these densities.
     walk : float
-        Density of the random walk of the biases over these densities [1/sqrt(s)], at least.
+        Density of the random walk of the biases over that of the white noise [1/s], at least.
     """
 
-    rate: float
-    force: float
-    jump: float
-    walk: float
+    rate_jump: float
+    force_jump: float
+    rate: float = 0.0
+    force: float = 0.0
+    walk: float = 0.2
     group: str = IMU
 
     def begin(self, model: DoubtingModel, covariance: Array) -> None:
         """Doubt the IMU; the (n, n) covariance is updated."""
         own = model.imu_noise.view(IMU_NOISE)[0]
-        for triad, density, at in (
-            ("gyroscope", self.rate, _GYROSCOPE), ("accelerometer", self.force, _ACCELEROMETER),
-        ):  # fmt: skip
+        for triad, jump, density, at in (
+            ("gyroscope", self.rate_jump, self.rate, _GYROSCOPE),
+            ("accelerometer", self.force_jump, self.force, _ACCELEROMETER),
+        ):
             own[triad] = max(own[triad], density**2)
             own[f"{triad}_walk"] = max(own[f"{triad}_walk"], (self.walk * density) ** 2)
-            covariance[at, at] += (self.jump * density) ** 2
+            covariance[at, at] += jump**2
 
 
 @dataclass(frozen=True)

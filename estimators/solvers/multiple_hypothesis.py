@@ -17,8 +17,9 @@ jump of a log of many readings a second may be in the middle of a step, so its p
 **What is begun when.** Slow errors of fixes surprise nobody, so hypotheses on fixes begin every `WATCH` seconds in any
 case. All kinds begin when the leading filter has had larger innovations than its datasheets allow since the anchor. If
 the leading hypothesis doubts a group of instruments, one more says that they are well again from the anchor on: so a
-wrong decision is undone, too. What is less probable than exp(-`LEAST`) times the leading one is dropped, as are the
-least probable of more than `filters`, and of more than `ALIKE` with the same doubts.
+wrong decision is undone, too. If it doubts some and is surprised again, it is asked once whether the IMU was wrong
+instead, from the last anchor at which nothing was doubted. What is less probable than exp(-`LEAST`) times the leading
+one is dropped, as are the least probable of more than `filters`, and of more than `ALIKE` with the same doubts.
 
 **Prior probabilities.** A fault of each kind begins once in `onset` seconds, or more rarely by the factor of the kind
 (`KINDS`), and lasts for `end` seconds, in the mean. The start is wrong with the probability `WRONG_START`.
@@ -46,7 +47,7 @@ from simnav.estimators.algebra.chi_square import chi_square_limits
 from simnav.estimators.composition import Solver
 from simnav.estimators.models.channels import owners, summary
 from simnav.estimators.models.coupling import by_source
-from simnav.estimators.models.doubted_instruments import AttitudeDoubt, BiasDoubt, ImuDoubt
+from simnav.estimators.models.doubted_instruments import IMU, AttitudeDoubt, BiasDoubt, ImuDoubt
 from simnav.estimators.models.suitable import ModelChoice
 from simnav.types import Array, Estimate, InitialState, Instruments, Measurement, Measurements
 
@@ -84,13 +85,18 @@ KINDS: Mapping[str, Kind] = {
     "jumping fixes": Kind(BiasDoubt("fix", sigma=15.0, time=40.0, jump=15.0), watched=True),
     "log": Kind(BiasDoubt("log", sigma=0.5, time=1000.0, jump=1.0)),
     "compass": Kind(BiasDoubt("compass", sigma=radians(5.0), time=60.0, jump=radians(5.0)), rare=2.0),
-    "imu": Kind(ImuDoubt(rate=radians(0.3), force=0.1, jump=1.0, walk=0.2), rare=30.0),
+    "imu bias": Kind(ImuDoubt(rate_jump=radians(0.3), force_jump=0.5), rare=5.0),
+    "imu": Kind(ImuDoubt(rate_jump=radians(0.3), force_jump=0.1, rate=radians(0.3), force=0.1), rare=10.0),
+    "imu far off": Kind(ImuDoubt(rate_jump=radians(3.0), force_jump=1.0, rate=radians(3.0), force=1.0), rare=10.0),
     "attitude": Kind(AttitudeDoubt(level=0.04, heading=0.2), rare=30.0),
 }
 #: Time between hypotheses that are begun in any case [s].
 WATCH = 20.0
-#: Prior probability that the start is wrong.
-WRONG_START = 0.02
+#: Prior probabilities that the position at the start is wrong, and that the attitude is, too.
+WRONG_POSITION, WRONG_START = 0.02, 0.02
+#: No fault is looked for before this time [s]: until then an instrument and the start contradict each other, and the
+#: start has not been confirmed.
+TRUST = 30.0
 #: The leading filter is surprised where the sum of its normalised innovations squared is so many sigmas too large.
 SURPRISED = 3.0
 #: A step is the onset if its excess is above this part of the largest one since the anchor.
@@ -101,6 +107,8 @@ LEAST, SILENT = 12.0, 7.0
 ALIKE = 2
 #: A measurement less probable than this by the leading hypothesis is flagged as a gross error.
 GROSS = 0.99999
+#: Time after which nobody looks back to a sound anchor [s].
+LONGEST = 60.0
 #: Tolerance of times [s].
 _SAME_TIME = 1e-6
 
@@ -213,8 +221,10 @@ class MultipleHypothesis(Solver):
         for name, value in (("period", period), ("onset", onset), ("end", end)):
             if not 0.0 < value < inf:
                 raise ValueError(f"{name} = {value:g} s: it must be above 0 and finite")
-        if filters < 2:
-            raise ValueError(f"filters = {filters}: it must be 2 or more, or there is nothing to decide")
+        if filters < 3:
+            raise ValueError(
+                f"filters = {filters}: it must be 3 or more, for a start that is right or wrong in two ways"
+            )
         self._choice, self.period, self.onset, self.end, self.filters = model, period, onset, end, filters
 
     def reset(self, start: InitialState, instruments: Instruments) -> None:
@@ -229,18 +239,20 @@ class MultipleHypothesis(Solver):
 
         first = made(start)
         self._hypotheses = [
-            _Hypothesis({}, first, log(1.0 - WRONG_START)),
+            _Hypothesis({}, first, log(1.0 - WRONG_POSITION - WRONG_START)),
+            _Hypothesis({}, made(uncertain_start(start, attitude=False)), log(WRONG_POSITION)),
             _Hypothesis({}, made(uncertain_start(start)), log(WRONG_START)),
         ]
         # One more than may stay: the last one is begun before it is known which is dropped.
-        self._spare = [made(start) for _ in range(self.filters - 1)]
-        self._anchor = _Hypothesis({}, made(start), 0.0)
-        self._anchor.filter.take_over(first)
+        self._spare = [made(start) for _ in range(self.filters - 2)]
+        self._anchor, self._sound = (_Hypothesis({}, made(start), 0.0) for _ in range(2))
+        for anchor in (self._anchor, self._sound):
+            anchor.filter.take_over(first)
         self._groups: Mapping[str, tuple[str, ...]] = first.model.groups
         possible = {*self._groups, *([""] if first.model.moving[1].stop > 0 else [])}
         self._kinds = {name: kind for name, kind in KINDS.items() if kind.doubt.group in possible}
-        self._period = _Period(start.time)
-        self._next, self._watch = start.time + self.period, start.time + WATCH
+        self._period = self._since_sound = _Period(start.time)
+        self._next, self._watch = start.time + max(self.period, TRUST), start.time + TRUST
         self._admission = Admission(instruments, first.names)
         self._innovation_test = InnovationTest()
         self._gross, self._owners = chi_square_limits(GROSS), owners(instruments)
@@ -266,7 +278,8 @@ class MultipleHypothesis(Solver):
             h.weight += h.filter.evidence
         taken = self._normalise()
         lead = self.best
-        self._period.add(step, taken, lead)
+        for period in {self._period, self._since_sound}:
+            period.add(step, taken, lead)
         notes = lead.notes
         if step.until >= self._next - _SAME_TIME:
             self._next = step.until + self.period
@@ -297,27 +310,56 @@ class MultipleHypothesis(Solver):
                 self._begin(length / (kind.rare * self.onset), name)
         for group in anchor.doubts:
             self._begin(self.period / self.end, "", well=group)
-        self._normalise()
+        if surprised and anchor.doubts and IMU not in anchor.doubts and self._since_sound.steps:
+            self._look_back()
+        taken = self._normalise()
         for h in [h for h in self._hypotheses if h.weight < self._hypotheses[0].weight - LEAST]:
             self._drop(h)
-        self._normalise()
+        taken += self._normalise()
         lead = self._hypotheses[0]
         anchor.filter.take_over(lead.filter)
         anchor.doubts, anchor.weight, self._period = lead.doubts, lead.weight, _Period(time)
+        if not lead.doubts:
+            self._sound.filter.take_over(lead.filter)
+            self._sound.weight, self._since_sound = lead.weight, self._period
+        elif self._since_sound.steps:
+            self._since_sound.taken += taken
+            if time - self._since_sound.start > LONGEST:
+                self._since_sound = _Period(inf)
 
-    def _begin(self, prior: float, name: str, well: str = "") -> None:
-        """Begin a hypothesis from the anchor.
+    def _look_back(self) -> None:
+        """Ask whether what instruments are blamed for is the fault of the IMU, from the last sound anchor on.
+
+        It is asked once for each such anchor: all measurements since then are used once more.
+        """
+        for name, kind in self._kinds.items():
+            if kind.doubt.group == IMU:
+                self._begin(self.period / (kind.rare * self.onset), name, self._sound, self._since_sound)
+        self._since_sound = _Period(inf)
+
+    def _begin(
+        self,
+        prior: float,
+        name: str,
+        anchor: _Hypothesis | None = None,
+        period: _Period | None = None,
+        *,
+        well: str = "",
+    ) -> None:
+        """Begin a hypothesis from an anchor.
 
         Parameters
         ----------
         prior : float
             Its probability before the measurements, given the anchor.
         name : str
-            Its kind; empty for the next.
+            Its kind; empty where a group is well again.
+        anchor, period : _Hypothesis and _Period, optional
+            The anchor, and what happened since; by default those of the last one.
         well : str
             The group of instruments that is well again.
         """
-        anchor, period, own = self._anchor, self._period, self._spare.pop()
+        anchor, period, own = anchor or self._anchor, period or self._period, self._spare.pop()
         own.take_over(anchor.filter)
         weight = anchor.weight + log(min(prior, 0.5)) - period.taken
         doubts, onsets = dict(anchor.doubts), {0}
@@ -328,7 +370,7 @@ class MultipleHypothesis(Solver):
             onsets = {onset, onset + 1} if doubt.group == "log" else {onset}
             if doubt.group:
                 before = doubts.get(doubt.group)
-                since = before.since if before is not None else self._period.begin(onset)
+                since = before.since if before is not None else period.begin(onset)
                 doubts[doubt.group] = _Doubted(name, since)
         for k, step in enumerate(period.steps):
             if k in onsets and well:
