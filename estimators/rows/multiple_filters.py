@@ -13,7 +13,7 @@ from simnav.estimators.solvers.solution_separation import SolutionSeparation
 from simnav.estimators.weightings.fault_isolation import FaultIsolation
 from simnav.estimators.weightings.graduated_non_convexity import GraduatedNonConvexity
 
-__all__ = ["HeadingBankEkf", "MidValue", "SolutionSeparationEkf"]
+__all__ = ["HeadingBankEkf", "MidValue", "MultipleHypothesisEkf", "SolutionSeparationEkf"]
 
 
 @register("heading-bank")
@@ -96,4 +96,16 @@ class MidValue(
 
 @register("mh-ekf")
 class MultipleHypothesisEkf(Row, solver=MultipleHypothesis, model=DoubtedInstruments):
-    """PROTOTYPE."""
+    """Multiple-hypothesis EKF: it weighs that all is well against faults of fixes, log, compass, IMU and start.
+
+    It says which instrument is wrong, since when and with which probability (diagnostics ``doubt.NAME`` and
+    ``since.NAME``), and flags the measurements of one that is.
+
+    Do not use it where nothing else gives the velocity: beside a receiver alone, a fix that is wrong for minutes cannot
+    be told from a wrong IMU. With two instruments wrong at once it may blame a third one, as ``training-voyages`` 51007
+    and 51021 show (a wrong fix, and a DVL that reports zero).
+
+    Source: D. T. Magill, *Optimal adaptive estimation of sampled stochastic processes*, IEEE TAC 10(4), 1965; A. S.
+    Willsky and H. L. Jones, *A generalized likelihood ratio approach to the detection and estimation of jumps in linear
+    systems*, IEEE TAC 21(1), 1976.
+    """
