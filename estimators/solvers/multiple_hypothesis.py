@@ -22,7 +22,9 @@ instead, from the last anchor at which nothing was doubted. What is less probabl
 one is dropped, as are the least probable of more than `filters`, and of more than `ALIKE` with the same doubts.
 
 **Prior probabilities.** A fault of each kind begins once in `onset` seconds, or more rarely by the factor of the kind
-(`KINDS`), and lasts for `end` seconds, in the mean. The start is wrong with the probability `WRONG_START`.
+(`KINDS`), and lasts for `end` seconds, in the mean. At the start the position is wrong with the probability
+`WRONG_POSITION`, and the attitude, too, with `WRONG_START`. Until `TRUST` seconds have confirmed the start, no fault is
+looked for: an instrument and the start contradict each other, and nothing says which of them is right.
 
 Gross errors and a noise beyond the datasheet need no hypothesis: in each filter the noise of every instrument switches
 between levels (`simnav.estimators.solvers.hypothesis_filter`).
@@ -38,7 +40,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Mapping
 from dataclasses import dataclass
-from math import exp, inf, log, nan, radians, sqrt
+from math import exp, inf, isfinite, log, nan, radians, sqrt
 from typing import ClassVar, NamedTuple
 
 import numpy as np
@@ -251,8 +253,10 @@ class MultipleHypothesis(Solver):
         self._groups: Mapping[str, tuple[str, ...]] = first.model.groups
         possible = {*self._groups, *([""] if first.model.moving[1].stop > 0 else [])}
         self._kinds = {name: kind for name, kind in KINDS.items() if kind.doubt.group in possible}
-        self._period = self._since_sound = _Period(start.time)
-        self._next, self._watch = start.time + max(self.period, TRUST), start.time + TRUST
+        self._period = _Period(start.time)
+        self._since_sound: _Period | None = self._period
+        self._next = start.time + self.period
+        self._trusted = self._watch = start.time + TRUST
         self._admission = Admission(instruments, first.names)
         self._innovation_test = InnovationTest()
         self._gross, self._owners = chi_square_limits(GROSS), owners(instruments)
@@ -275,11 +279,12 @@ class MultipleHypothesis(Solver):
         step = Step(measurements.imu, admitted, measurements.time)
         for h in self._hypotheses:
             h.filter.advance(step)
-            h.weight += h.filter.evidence
+            h.weight += h.filter.evidence if isfinite(h.filter.evidence) else -inf
         taken = self._normalise()
         lead = self.best
-        for period in {self._period, self._since_sound}:
-            period.add(step, taken, lead)
+        self._period.add(step, taken, lead)
+        if self._since_sound is not None and self._since_sound is not self._period:
+            self._since_sound.add(step, taken, lead)
         notes = lead.notes
         if step.until >= self._next - _SAME_TIME:
             self._next = step.until + self.period
@@ -299,6 +304,25 @@ class MultipleHypothesis(Solver):
 
     def _reconsider(self, time: float) -> None:
         """Begin hypotheses from the anchor, drop those that are improbable, and set the next anchor."""
+        if time > self._trusted + _SAME_TIME:
+            self._begin_all(time)
+        taken = self._normalise()
+        for h in [h for h in self._hypotheses if h.weight < self._hypotheses[0].weight - LEAST]:
+            self._drop(h)
+        taken += self._normalise()
+        anchor, lead = self._anchor, self._hypotheses[0]
+        anchor.filter.take_over(lead.filter)
+        anchor.doubts, anchor.weight, self._period = lead.doubts, lead.weight, _Period(time)
+        if not lead.doubts:
+            self._sound.filter.take_over(lead.filter)
+            self._sound.weight, self._since_sound = lead.weight, self._period
+        elif self._since_sound is not None:
+            self._since_sound.taken += taken
+            if time - self._since_sound.start > LONGEST:
+                self._since_sound = None
+
+    def _begin_all(self, time: float) -> None:
+        """Begin the hypotheses that are due."""
         anchor, surprised = self._anchor, self._period.surprising
         watched = time >= self._watch - _SAME_TIME
         if watched:
@@ -310,32 +334,18 @@ class MultipleHypothesis(Solver):
                 self._begin(length / (kind.rare * self.onset), name)
         for group in anchor.doubts:
             self._begin(self.period / self.end, "", well=group)
-        if surprised and anchor.doubts and IMU not in anchor.doubts and self._since_sound.steps:
-            self._look_back()
-        taken = self._normalise()
-        for h in [h for h in self._hypotheses if h.weight < self._hypotheses[0].weight - LEAST]:
-            self._drop(h)
-        taken += self._normalise()
-        lead = self._hypotheses[0]
-        anchor.filter.take_over(lead.filter)
-        anchor.doubts, anchor.weight, self._period = lead.doubts, lead.weight, _Period(time)
-        if not lead.doubts:
-            self._sound.filter.take_over(lead.filter)
-            self._sound.weight, self._since_sound = lead.weight, self._period
-        elif self._since_sound.steps:
-            self._since_sound.taken += taken
-            if time - self._since_sound.start > LONGEST:
-                self._since_sound = _Period(inf)
+        if surprised and anchor.doubts and IMU not in anchor.doubts and self._since_sound is not None:
+            self._look_back(self._since_sound)
 
-    def _look_back(self) -> None:
+    def _look_back(self, period: _Period) -> None:
         """Ask whether what instruments are blamed for is the fault of the IMU, from the last sound anchor on.
 
         It is asked once for each such anchor: all measurements since then are used once more.
         """
         for name, kind in self._kinds.items():
             if kind.doubt.group == IMU:
-                self._begin(self.period / (kind.rare * self.onset), name, self._sound, self._since_sound)
-        self._since_sound = _Period(inf)
+                self._begin(self.period / (kind.rare * self.onset), name, self._sound, period)
+        self._since_sound = None
 
     def _begin(
         self,

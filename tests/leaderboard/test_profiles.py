@@ -42,7 +42,13 @@ def test_standard_has_the_same_seeds_for_all_rows_of_a_track():
         for scenario in part.scenarios:
             for row in part.estimators:
                 most[scenario, row] = max(part.runs, most.get((scenario, row), 0))
-    later = {"iae-paper", "iae-fgo-paper", "mh-ekf", "net-ekf", "net-fgo"}  # with the next edition, as the faults of IMUs
+    later = {
+        "iae-paper",
+        "iae-fgo-paper",
+        "mh-ekf",
+        "net-ekf",
+        "net-fgo",
+    }  # with the next edition, as the faults of IMUs
     assert {s for s, _ in most} == {h.name for h in ranked if not h.track.startswith("imu-faults")}
     chosen = {row for (scenario, row) in most if known[scenario].track in ("papers", "long")}
     assert 20 <= len(chosen) <= 25
