@@ -329,6 +329,8 @@ class MultipleHypothesis(Solver):
             self._watch = time + WATCH
         known = anchor.kinds.values()
         for name, kind in self._kinds.items():
+            if IMU in anchor.doubts and kind.doubt.group not in (IMU, ""):
+                continue  # what a wrong IMU predicts condemns no other instrument
             if surprised or (watched and kind.watched and name not in known):
                 length = WATCH if kind.watched and not surprised else self.period
                 self._begin(length / (kind.rare * self.onset), name)
