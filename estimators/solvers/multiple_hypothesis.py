@@ -17,9 +17,11 @@ jump of a log of many readings a second may be in the middle of a step, so its p
 **What is begun when.** Slow errors of fixes surprise nobody, so hypotheses on fixes begin every `WATCH` seconds in any
 case. All kinds begin when the leading filter has had larger innovations than its datasheets allow since the anchor. If
 the leading hypothesis doubts a group of instruments, one more says that they are well again from the anchor on: so a
-wrong decision is undone, too. If it doubts some and is surprised again, it is asked once whether the IMU was wrong
-instead, from the last anchor at which nothing was doubted. What is less probable than exp(-`LEAST`) times the leading
-one is dropped, as are the least probable of more than `filters`, and of more than `ALIKE` with the same doubts.
+wrong decision is undone, too. While it doubts the IMU, no other instrument is doubted anew, because a wrong IMU
+predicts wrongly what any of them should measure. If it doubts other instruments and is surprised again, it is asked
+once whether the IMU was wrong instead, from the last anchor at which nothing was doubted. What is less probable than
+exp(-`LEAST`) times the leading one is dropped, as are the least probable of more than `filters`, and of more than
+`ALIKE` with the same doubts.
 
 **Prior probabilities.** A fault of each kind begins once in `onset` seconds, or more rarely by the factor of the kind
 (`KINDS`), and lasts for `end` seconds, in the mean. At the start the position is wrong with the probability
