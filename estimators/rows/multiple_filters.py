@@ -102,8 +102,9 @@ class MultipleHypothesisEkf(Row, solver=MultipleHypothesis, model=DoubtedInstrum
     ``since.NAME``), and flags the measurements of one that is.
 
     Do not use it beside gyroscopes that saturate at every roll: on ``imu-clipping`` it has several times the error of
-    ``ekf``. Beside a receiver alone a fix that is wrong for minutes cannot be told from a wrong IMU. With two instruments wrong at once it may blame a third one, as ``training-voyages`` 51007
-    and 51021 show (a wrong fix, and a DVL that reports zero).
+    ``ekf``. Beside a receiver alone a fix that is wrong for minutes cannot be told from a wrong IMU. With two
+    instruments wrong at once it may blame a third one, as ``training-voyages`` 51007 and 51021 show (a wrong fix, and a
+    DVL that reports zero).
 
     Source: D. T. Magill, *Optimal adaptive estimation of sampled stochastic processes*, IEEE TAC 10(4), 1965; A. S.
     Willsky and H. L. Jones, *A generalized likelihood ratio approach to the detection and estimation of jumps in linear
