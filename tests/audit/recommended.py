@@ -27,10 +27,10 @@ import numpy as np
 
 from simnav.estimator import make
 from simnav.leaderboard.ranking.troubles import troubles
+from simnav.log import LogError
 from simnav.scenario import load, names
 from simnav.scoring import score
 from simnav.source import record
-from simnav.spec import SpecError
 from simnav.trial import run_trial
 
 __all__ = ["measured", "parts", "rows"]
@@ -48,12 +48,18 @@ Scores = dict[str, dict[str, list[float]]]
 
 
 def measured(name: str, runs: int) -> Scores:
-    """The scores of all rows on the runs of a scenario; NaN where a row failed or does not suit."""
+    """The scores of all rows on the runs of a scenario; NaN where a row failed or does not suit.
+
+    There are none where the recording of a voyage is not on this machine.
+    """
     found: Scores = {row: {"error": [], "coverage": [], "time": []} for row in (ROW, PLAIN, ORACLE, *RIVALS)}
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         for seed in range(FIRST, FIRST + runs):
-            recording = record(load(name), seed)
+            try:
+                recording = record(load(name), seed)
+            except LogError:
+                break
             for row, scores in found.items():
                 trial = run_trial(make(row), recording)
                 ended = score(trial, recording, (_ERROR, _COVERAGE)) if trial.status == "ok" else {}
@@ -64,15 +70,9 @@ def measured(name: str, runs: int) -> Scores:
 
 
 def _scenarios() -> dict[str, str]:
-    """The track of each scenario that is measured; those without a recording on this machine are left out."""
-    found = {}
-    for name in names():
-        try:
-            track = load(name).track
-        except SpecError:
-            continue
-        if track in TRACKS:
-            found[name] = track
+    """The track of each scenario that is measured."""
+    found = {name: load(name).track for name in names()}
+    found = {name: track for name, track in found.items() if track in TRACKS}
     return dict(sorted(found.items(), key=lambda item: TRACKS.index(item[1])))
 
 

@@ -19,6 +19,7 @@ from simnav.scoring import score
 from simnav.scoring.navigation_error import errors
 from simnav.source import record
 from simnav.trial import run_trial
+from tests.audit import recommended
 
 SHORT = tomllib.loads((Path(__file__).parents[2] / "cases" / "short.toml").read_text(encoding="utf-8"))
 
@@ -184,3 +185,22 @@ def test_a_doubted_bias_stays_stationary():
 def test_parameters_out_of_range_are_refused(parameters, message):
     with pytest.raises(ValueError, match=message):
         make("mh-ekf", **parameters)
+
+
+def test_the_audit_says_which_promises_are_kept():
+    def scores(error, coverage):
+        return {"error": [error, error], "coverage": [coverage, coverage], "time": [1e-3, 1e-3]}
+
+    def scenario(own, coverage=0.95):
+        others = {row: scores(1.0, 0.9) for row in ("ekf", "oracle", "iae-fgo", "vb-akf")}
+        return {"mh-ekf": scores(own, coverage), **others}
+
+    found = {"open-sea": scenario(1.02), "gnss-spoofing": scenario(2.0, coverage=0.5), "imu-clipping": scenario(1.5)}
+    said = {what: (figure, kept) for what, figure, _, kept in recommended.rows(found)}
+    assert said["mh-ekf: Aided INS, times oracle"] == ("1.43", True)
+    assert said["mh-ekf: nothing wrong, times oracle"] == ("1.02", True)
+    assert said["mh-ekf: gnss-spoofing, times the better of iae-fgo and vb-akf"] == ("2.00", False)
+    assert said["mh-ekf: the IMU wrong, times ekf"] == ("1.50", False)
+    assert said["mh-ekf: 95 % region, Fixes that lie slowly"] == ("50 %", False)
+    assert said["mh-ekf: 95 % region, Nothing wrong"] == ("95 %", True)
+    assert said["mh-ekf: time of an update, times ekf"] == ("1.0", True)
