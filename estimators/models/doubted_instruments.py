@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from simnav.types import Array, Datasheet, InitialState, Instruments
+from simnav.types import Array, Datasheet, InitialState, Instruments, Integers
 
 from .base import ErrorModel
 from .equations import equation_of
@@ -124,8 +124,8 @@ class AttitudeDoubt:
 class _Places:
     """The biases of a group: places among the states and the rates, and what the datasheets say of them."""
 
-    states: Array
-    rates: Array
+    states: Integers
+    rates: Integers
     variance: Array
     decay: Array
     density: Array
@@ -172,7 +172,7 @@ class DoubtingModel(ErrorModel):
         decay, density = self.rates()
         for group, names in self.groups.items():
             at = [self.bias_at[n] + k for n in names for k in range(self.components(self.instruments[n]))]
-            states = np.array(at, dtype=np.intp)
+            states: Integers = np.array(at, dtype=np.int64)
             own = states - first
             self.places[group] = _Places(
                 states, own, covariance.diagonal()[states].copy(), decay[own].copy(), density[own].copy()
@@ -248,7 +248,8 @@ class _Ship(DoubtingModel, ShipModel):
 
     def biases(self) -> Array:
         """As `DoubtingModel.biases`."""
-        return self.x
+        values: Array = self.x
+        return values
 
 
 class DoubtedInstruments(Suitable):
