@@ -6,7 +6,7 @@ section 11.6.
 
 from __future__ import annotations
 
-from math import exp, log
+from math import exp, log, pi
 
 import numpy as np
 
@@ -29,7 +29,7 @@ def mixture_update(
     transition: Matrix,
     probability: Vector,
     correction: Vector,
-) -> tuple[float, float]:
+) -> tuple[float, float, float]:
     """Kalman update with every noise level, weighted by likelihood and merged by moments, in place.
 
     With ``S_j = H P H' + variances_j R``, ``y_j = S_j^-1 v`` and mu_j proportional to the probability of level j times
@@ -61,6 +61,8 @@ def mixture_update(
         Normalised innovation squared of the first level; -1 if an S_j is singular, and then nothing is changed.
     expected : float
         Expected variance, as a multiple of R.
+    evidence : float
+        Logarithm of the density of the innovation, over all levels.
     """
     n, m = cross.shape
     count = variances.size
@@ -72,7 +74,7 @@ def mixture_update(
             for c in range(r + 1):
                 L[r, c] = predicted[r, c] + variances[j] * noise[r, c]
         if not factorise(L, m, 1e-14, pivot):
-            return -1.0, 0.0
+            return -1.0, 0.0, 0.0
         determinant = 0.0
         for r in range(m):
             determinant += log(pivot[r])
@@ -102,7 +104,7 @@ def mixture_update(
         likelihood[j] = prior * exp(likelihood[j] - best)
         total += likelihood[j]
     if not total > 0.0:
-        return -1.0, 0.0
+        return -1.0, 0.0, 0.0
     merged, expected = np.zeros(m), 0.0
     for j in range(count):
         probability[j] = likelihood[j] / total
@@ -129,4 +131,4 @@ def mixture_update(
                 x -= half[r, i] * cross[c, i]
             covariance[r, c] = x
             covariance[c, r] = x
-    return distance[0], expected
+    return distance[0], expected, best + log(total) - 0.5 * m * log(2.0 * pi)

@@ -3,15 +3,17 @@
 from simnav.estimator import register
 from simnav.estimators.adaptations.variational_bayes import VariationalBayes
 from simnav.estimators.composition import Row
+from simnav.estimators.models.doubted_instruments import DoubtedInstruments
 from simnav.estimators.models.suitable import Suitable
 from simnav.estimators.solvers.heading_bank import HeadingBank
 from simnav.estimators.solvers.iterated import poor_heading
 from simnav.estimators.solvers.mid_value import MidValueSelection
+from simnav.estimators.solvers.multiple_hypothesis import MultipleHypothesis
 from simnav.estimators.solvers.solution_separation import SolutionSeparation
 from simnav.estimators.weightings.fault_isolation import FaultIsolation
 from simnav.estimators.weightings.graduated_non_convexity import GraduatedNonConvexity
 
-__all__ = ["HeadingBankEkf", "MidValue", "SolutionSeparationEkf"]
+__all__ = ["HeadingBankEkf", "MidValue", "MultipleHypothesisEkf", "SolutionSeparationEkf"]
 
 
 @register("heading-bank")
@@ -102,3 +104,21 @@ class MidValue(
     """
 
     version = 5
+
+
+@register("mh-ekf")
+class MultipleHypothesisEkf(Row, solver=MultipleHypothesis, model=DoubtedInstruments):
+    """Multiple-hypothesis EKF: it weighs that all is well against faults of fixes, log, compass, IMU and start.
+
+    It says which instrument is wrong, since when and with which probability (diagnostics ``doubt.NAME`` and
+    ``since.NAME``), and flags the measurements of one that is.
+
+    Do not use it beside gyroscopes that saturate at every roll: on ``imu-clipping`` it has several times the error of
+    ``ekf``. Beside a receiver alone a fix that is wrong for minutes cannot be told from a wrong IMU. With two
+    instruments wrong at once it may blame a third one, as ``training-voyages`` 51007 and 51021 show (a wrong fix, and a
+    DVL that reports zero).
+
+    Source: D. T. Magill, *Optimal adaptive estimation of sampled stochastic processes*, IEEE TAC 10(4), 1965; A. S.
+    Willsky and H. L. Jones, *A generalized likelihood ratio approach to the detection and estimation of jumps in linear
+    systems*, IEEE TAC 21(1), 1976.
+    """

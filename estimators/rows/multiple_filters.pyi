@@ -4,15 +4,17 @@ import typing
 from simnav.estimator import register
 from simnav.estimators.adaptations.variational_bayes import VariationalBayes
 from simnav.estimators.composition import Row
+from simnav.estimators.models.doubted_instruments import DoubtedInstruments
 from simnav.estimators.models.suitable import Suitable
 from simnav.estimators.solvers.heading_bank import HeadingBank
 from simnav.estimators.solvers.iterated import poor_heading
 from simnav.estimators.solvers.mid_value import MidValueSelection
+from simnav.estimators.solvers.multiple_hypothesis import MultipleHypothesis
 from simnav.estimators.solvers.solution_separation import SolutionSeparation
 from simnav.estimators.weightings.fault_isolation import FaultIsolation
 from simnav.estimators.weightings.graduated_non_convexity import GraduatedNonConvexity
 
-__all__ = ["HeadingBankEkf", "MidValue", "SolutionSeparationEkf"]
+__all__ = ["HeadingBankEkf", "MidValue", "MultipleHypothesisEkf", "SolutionSeparationEkf"]
 
 @register("heading-bank")
 class HeadingBankEkf(Row, solver=HeadingBank, model=Suitable):
@@ -70,4 +72,15 @@ class MidValue(
         tolerance: float = 0.05,
         solver__iterations: int = 15,
         spacing: float = 0.5,
+    ) -> None: ...
+
+@register("mh-ekf")
+class MultipleHypothesisEkf(Row, solver=MultipleHypothesis, model=DoubtedInstruments):
+    def __init__(
+        self,
+        *,
+        period: float = 5.0,
+        onset: float = 2000.0,
+        end: float = 100.0,
+        filters: int = 6,
     ) -> None: ...

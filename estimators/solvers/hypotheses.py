@@ -226,11 +226,13 @@ class ImuHypothesis(Hypothesis):
     exclusion: Exclusion = field(default_factory=Exclusion)
 
 
-def uncertain_start(start: InitialState) -> InitialState:
-    """The same start with larger sigmas."""
+def uncertain_start(start: InitialState, attitude: bool = True) -> InitialState:
+    """The same start with larger sigmas; of the position alone, if not of the ``attitude``, too."""
     stated = np.sqrt(np.diag(start.covariance))
     larger = stated * np.repeat((_WRONG_START, _WRONG_VELOCITY, _WRONG_START), 3)
     larger[6:] = np.minimum(larger[6:], np.maximum((_TILT, _TILT, _HEADING), stated[6:]))
+    if not attitude:
+        larger[3:] = stated[3:]
     factor = np.divide(larger, stated, out=np.ones(9), where=stated > 0.0)
     return replace(start, covariance=start.covariance * np.outer(factor, factor))
 

@@ -135,7 +135,7 @@ def correct_by_mixture(dynamics: Dynamics, choice: Choice, readings: Readings, k
     i = choice.index[readings.instrument[k]]
     probability, count = choice.memories[choice.first[i] : choice.first[i + 1]], choice.first[i + 1] - choice.first[i]
     levels, transition = choice.settings[i, :count], choice.settings[i, count:].reshape((count, count))
-    nis, expected = mixture_update(
+    nis, expected, _ = mixture_update(
         dynamics.covariance, prediction.cross, prediction.predicted, prediction.nominal, prediction.innovation, levels,
         transition, probability, dynamics.correction,
     )  # fmt: skip

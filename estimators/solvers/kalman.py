@@ -52,7 +52,7 @@ from .step_report import TESTS, StepReport, end_report, note_readings
 __all__ = ["FilterFunctions", "KalmanEstimator"]
 
 #: Methods of a step; a subclass that has one of its own takes the steps of a run one by one.
-_STEPWISE = ("update", "_use", "_estimate")
+_STEPWISE = ("update", "_use", "_note", "_estimate")
 
 
 class FilterFunctions(NamedTuple):
@@ -158,14 +158,8 @@ class KalmanEstimator(Solver):
         model.load(measurements.imu)
         diagnostics = dict(self._blank)
         flagged: list[tuple[str, float]] = []
-        admitted, until, samples = self._admission.admit(measurements, model.time), measurements.time, model.samples
         self._iterations = 0
-        for group in self._groups(admitted):
-            end = until if group is admitted else min(group[0].time, until)
-            if group is admitted or len(group) == 1 or not self._use_together(group, end):
-                self._use(group, samples, end, flagged)
-        if model.time < until:
-            self._use((), samples, until, flagged)
+        self._advance(self._admission.admit(measurements, model.time), measurements.time, flagged)
         end_report.unchecked(self._report, self._row)
         diagnostics.update(zip(self._labels, self._row.tolist()))
         if self._iterations:
@@ -288,6 +282,17 @@ class KalmanEstimator(Solver):
             return own.choice(self._names, self.model.size)
         return no_choice()
 
+    def _advance(self, admitted: Sequence[Measurement], until: float, flagged: list[tuple[str, float]]) -> None:
+        """Use the admitted measurements of a step, and propagate to its end."""
+        model = self.model
+        samples = model.samples
+        for group in self._groups(admitted):
+            end = until if group is admitted else min(group[0].time, until)
+            if group is admitted or len(group) == 1 or not self._use_together(group, end):
+                self._use(group, samples, end, flagged)
+        if model.time < until:
+            self._use((), samples, until, flagged)
+
     def _use(
         self,
         measurements: Sequence[Measurement],
@@ -302,7 +307,7 @@ class KalmanEstimator(Solver):
             filter_step.unchecked(self._filter, readings, samples, count, until)
         else:
             filter_step.function(self._filter.in_python, readings, samples, count, until)
-        note_readings.unchecked(self._report, readings, count)
+        self._note(readings, count)
         if readings.rejected[:count].any():
             flagged += [(m.instrument, m.time) for m, bad in zip(measurements, readings.rejected.tolist()) if bad]
 
@@ -384,6 +389,11 @@ class KalmanEstimator(Solver):
             return False
         readings, count = self._arrays.fill(group), len(group)
         readings.nis[:count], readings.size[:count] = used
-        readings.rejected[:count], readings.sigma[:count, 0] = False, np.nan
-        note_readings.unchecked(self._report, readings, count)
+        readings.rejected[:count], readings.sigma[:count, 0], readings.reported[:count] = False, np.nan, 0.0
+        self._measurements = group
+        self._note(readings, count)
         return True
+
+    def _note(self, readings: Readings, count: int) -> None:
+        """Note what became of the measurements; subclasses may override it."""
+        note_readings.unchecked(self._report, readings, count)

@@ -37,7 +37,7 @@ _AXES = (
 _MOST_DIAGNOSTICS = 10
 _WIDEST_LABEL = 20  # characters of a line of a label, so that it is no longer than its panel is high
 #: Of diagnostics of single instruments (`simnav.scoring.plot_series.DIAGNOSTICS`), but for innovations.
-_UNITS = {"nis": "-", "residual": "sigma", "weight": "-"}
+_UNITS = {"doubt": "-", "nis": "-", "residual": "sigma", "since": "s", "weight": "-"}
 
 
 def _origin(recording: Recording) -> Array:
@@ -216,7 +216,8 @@ def _diagnostics(shown: Sequence[tuple[str, Trial, Array]], recording: Recording
     Those of the channels of one instrument (``nis.INSTRUMENT:CHANNEL``) have one panel together, with the mean over its
     channels (``nis.INSTRUMENT``) where an estimator gives it.
 
-    Where not all can be shown, those of an instrument or of the motion go before counters.
+    Where not all can be shown, those of an instrument or of the motion go before counters, and what says whether an
+    instrument is wrong goes first.
     """
     found: dict[str, list[Curve]] = {}
     for label, trial, _ in shown:
@@ -230,7 +231,11 @@ def _diagnostics(shown: Sequence[tuple[str, Trial, Array]], recording: Recording
                 panel, _, channel = name.partition(":")
                 found.setdefault(panel, []).append(Curve(label, trial.time, mean, channel=channel))
     labels = {name: len({c.label for c in curves}) for name, curves in found.items()}
-    most = sorted(found.items(), key=lambda item: (-labels[item[0]], "." not in item[0]))[:_MOST_DIAGNOSTICS]
+
+    def order(name: str) -> tuple[bool, int, bool]:
+        return not name.startswith("doubt."), -labels[name], "." not in name
+
+    most = sorted(found.items(), key=lambda item: order(item[0]))[:_MOST_DIAGNOSTICS]
     panels = {}
     for name, curves in most:
         unit, factor = _unit(name, recording)

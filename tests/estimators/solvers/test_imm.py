@@ -37,7 +37,7 @@ def test_the_merged_update_has_the_moments_of_the_mixture(seed: int, m: int):
 
     got, probability, dx = P.copy(), prior.copy(), np.empty(7)
     cross = np.ascontiguousarray(P @ H.T)
-    nis, expected = mixture_update(got, cross, H @ cross, R, v, levels**2, np.eye(len(levels)), probability, dx)
+    nis, expected, _ = mixture_update(got, cross, H @ cross, R, v, levels**2, np.eye(len(levels)), probability, dx)
     np.testing.assert_allclose(probability, weights, rtol=1e-9)
     assert expected == pytest.approx(weights @ levels**2)
     np.testing.assert_allclose(dx, mean, rtol=1e-9, atol=1e-12)
@@ -69,7 +69,7 @@ def test_a_singular_innovation_covariance_changes_nothing():
     P = np.eye(2)
     H = np.array([[1.0, 0.0], [1.0, 0.0]])
     cross, probability = np.ascontiguousarray(P @ H.T), np.array([0.5, 0.5])
-    nis, _ = mixture_update(
+    nis, _, _ = mixture_update(
         P, cross, H @ cross, np.zeros((2, 2)), np.ones(2), np.ones(2), np.eye(2), probability, np.empty(2)
     )
     assert nis == -1.0

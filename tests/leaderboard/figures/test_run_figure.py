@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -102,3 +103,12 @@ def test_an_outage_is_where_nothing_came(plugins):
         assert not np.any((time >= start) & (time < end))
     missing = set(np.arange(1.0, 121.0)) - set(time)
     assert missing == {t for t in np.arange(1.0, 121.0) for a, b, _ in spans if a <= t < b}
+
+
+def test_what_says_that_an_instrument_is_wrong_has_a_panel_first(run):
+    trial, _ = run
+    recording = record(load("ship-dead-reckoning").model_copy(update={"duration": 60.0, "faults": ()}), 0)
+    many = {f"nis.one{k}": np.arange(len(trial), dtype=float) for k in range(20)}
+    told = replace(trial, diagnostics={**many, "doubt.gnss": np.linspace(0.0, 1.0, len(trial))})
+    figure = run_figure(recording, [("mh-ekf", told)])
+    assert "doubt\ngnss [-]" in {ax.get_ylabel() for ax in figure.axes}

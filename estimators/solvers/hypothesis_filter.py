@@ -1,0 +1,136 @@
+"""The filter of one hypothesis: it can be copied from another one, and says how probable the measurements were to it.
+
+It is the filter of `simnav.estimators.solvers.imm`: the noise of each instrument switches between levels, so that gross
+errors and a larger noise need no hypothesis of their own. The density of an innovation over all levels is the evidence
+of the hypothesis. The errors of an instrument are alike from one reading to the next, but for its white noise, so a
+thousand readings say less than their number. An instrument of more than `FULL` readings per second counts as one of
+that rate.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from simnav.compiled import kernel
+from simnav.estimators.adaptations.choice import Choice
+from simnav.estimators.adaptations.prediction import PredictionTest
+from simnav.estimators.algebra.mixture import mixture_update
+from simnav.estimators.models.doubted_instruments import DoubtingModel
+from simnav.estimators.models.filtering import Dynamics, Prediction, Readings
+from simnav.types import Estimate, ImuSamples, InitialState, Instruments, Measurement
+
+from .imm import ImmEstimator
+from .kalman import FilterFunctions
+
+__all__ = ["FULL", "HypothesisFilter", "Step"]
+
+#: Readings of an instrument per second that count fully as evidence.
+FULL = 1.0
+
+
+class Step(NamedTuple):
+    """What a filter uses in one step.
+
+    Attributes
+    ----------
+    imu : ImuSamples or None
+        The samples of the IMU.
+    readings : sequence of Measurement
+        The admitted measurements, in order of their times.
+    until : float
+        End of the step [s].
+    """
+
+    imu: ImuSamples | None
+    readings: Sequence[Measurement]
+    until: float
+
+
+@kernel(passed=True)
+def correct_with_evidence(
+    dynamics: Dynamics, choice: Choice, readings: Readings, k: int, prediction: Prediction
+) -> float:
+    """Correct the covariance by a mixture of levels, and report the logarithm of the density of the innovation."""
+    i = choice.index[readings.instrument[k]]
+    probability, count = choice.memories[choice.first[i] : choice.first[i + 1]], choice.first[i + 1] - choice.first[i]
+    levels, transition = choice.settings[i, :count], choice.settings[i, count:].reshape((count, count))
+    nis, _, evidence = mixture_update(
+        dynamics.covariance, prediction.cross, prediction.predicted, prediction.nominal, prediction.innovation, levels,
+        transition, probability, dynamics.correction,
+    )  # fmt: skip
+    readings.reported[k] = evidence
+    return nis
+
+
+class HypothesisFilter(ImmEstimator):
+    """The filter of the module.
+
+    Attributes
+    ----------
+    evidence : float
+        Logarithm of the density of the measurements of the last step.
+    nis, freedom : float
+        Sum of the normalised innovations squared of the last step, and of their degrees of freedom, by the noise of the
+        datasheets. An instrument of a high rate counts as for the evidence.
+    notes : list of (Measurement, float, float)
+        The measurements used in the last step, with the normalised innovation squared and the norm of the innovation.
+    """
+
+    model: DoubtingModel
+
+    def reset(self, start: InitialState, instruments: Instruments) -> None:
+        """Begin a run."""
+        super().reset(start, instruments)
+        sheets = self.model.instruments
+        self._shares = np.array([min(1.0, FULL / sheets[name].rate) for name in self._names])
+        self._clear()
+
+    def _clear(self) -> None:
+        self.evidence = self.nis = self.freedom = 0.0
+        self.notes: list[tuple[Measurement, float, float]] = []
+
+    def functions(self) -> FilterFunctions:
+        """The correction is a mixture that reports its evidence."""
+        return super().functions()._replace(correct=correct_with_evidence)
+
+    def choice(self, instruments: Instruments) -> Choice:
+        """As of `ImmEstimator`, but without tests of the prediction: that the IMU is wrong is another hypothesis."""
+        return replace(super().choice(instruments), tested=PredictionTest(instruments, together=0).tested(0))
+
+    def advance(self, step: Step) -> None:
+        """Take one step's measurements."""
+        self.model.load(step.imu)
+        self._clear()
+        self._advance(step.readings, step.until, [])
+
+    def estimate(self) -> Estimate:
+        """The estimate at the end of the step."""
+        return self._estimate()
+
+    @property
+    def names(self) -> Sequence[str]:
+        """The instruments that it observes."""
+        return self._names
+
+    def take_over(self, other: HypothesisFilter) -> None:
+        """Copy the state of another filter of the same run, with all that it keeps."""
+        self.model.take_over(other.model)
+        self.model.take_over_doubts(other.model)
+        self.covariance[...] = other.covariance
+        mine, theirs = self._filter.choice, other._filter.choice
+        mine.memories[...], mine.last[...] = theirs.memories, theirs.last
+
+    def _note(self, readings: Readings, count: int) -> None:
+        """Add the evidence of the measurements, and keep what became of each."""
+        if not count:
+            return
+        nis = readings.nis[:count]
+        share = np.where(nis >= 0.0, self._shares[readings.instrument[:count]], 0.0)
+        self.evidence += float(share @ readings.reported[:count])
+        self.nis += float(share @ nis)
+        self.freedom += float(share @ readings.components[:count])
+        self.notes += zip(self._measurements, nis.tolist(), readings.size[:count].tolist(), strict=True)
