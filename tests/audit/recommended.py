@@ -1,7 +1,7 @@
 """Whether one row can be recommended: near the oracle, harmless where nothing is wrong, and honest.
 
 The row is run beside the oracle, the plain row and the two best rows before it, on the tracks of `TRACKS`, with seeds
-from `FIRST` on, which no choice of a parameter has seen. A scenario counts by the geometric mean of its runs, a group
+from `FIRST` on, on which no parameter was chosen. A scenario counts by the geometric mean of its runs, a group
 by that of its scenarios. Promised is:
 
 - on Aided INS at most `NEAR` times the oracle, at most `CLEAN` times where nothing is wrong, and on no scenario more
