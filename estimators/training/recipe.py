@@ -12,6 +12,7 @@ import math
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -163,8 +164,8 @@ class Recipe:
             )
         n = len(self.families)
         numbers = range(FIRST_COMPARED * n, FIRST_COMPARED * n + options.compared)
-        rows: dict[str, Callable[[], Estimator]] = {row: lambda row=row: make(row) for row in self.rows}
-        rows |= {run: lambda file=file: make(self.row, file=file) for run, file in files.items()}
+        rows: dict[str, Callable[[], Estimator]] = {row: partial(make, row) for row in self.rows}
+        rows |= {run: partial(make, self.row, file=file) for run, file in files.items()}
         seen = voyages(self.families, "validation", numbers)
         compared = error_over_plain(rows, seen if self.altered is None else map(self.altered, seen))
         document = {

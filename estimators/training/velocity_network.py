@@ -33,7 +33,7 @@ from simnav.estimators.networks.velocity import (
 )
 from simnav.geometry.rotation import dcm_from_rpy
 from simnav.recording import Recording
-from simnav.types import Array, Measurements
+from simnav.types import Array, Measurements, TapStates
 
 from .recipe import Fitted, Recipe, recorded
 
@@ -109,6 +109,7 @@ def gather(recordings: Iterable[Recording]) -> list[list[Silenced]]:
 def _read(recording: Recording, rng: np.random.Generator) -> Silenced:
     sheet, truth = VelocityNetwork.dvl_of(recording.instruments), recording.data.truth
     assert sheet is not None
+    assert isinstance(truth, TapStates), "the truth of a simulated voyage has the angular rate"
     times, seconds = silent_times(recording.duration, rng), VelocitySeconds(sheet, recording.start)
     true = np.einsum("kji,kj->ki", dcm_from_rpy(truth.attitude), truth.velocity)
     true += np.cross(truth.angular_rate, sheet.lever_arm)
