@@ -11,6 +11,7 @@ import json
 import math
 import re
 import tempfile
+import textwrap
 from pathlib import Path
 
 import numpy as np
@@ -150,8 +151,8 @@ def draw_learning() -> None:
                     colour = "0.6" if name == "training" else style.colour(found["row"])
                     losses.plot(steps, curve[name], line, color=colour, lw=1.4, label=name if first else None)
             losses.set_xlabel("Steps of the optimizer")
-            losses.set_ylabel("Loss")
-            losses.set_title(f"{found['row']}, {whole} voyages: {found['loss']}", fontsize=8)
+            losses.set_ylabel(textwrap.fill(found["loss"].capitalize(), 36), fontsize=7)
+            losses.set_title(f"{found['row']}, {whole} voyages")
             losses.legend(fontsize=7)
             for curve, ratios in zip(found["curves"], found["rows"], strict=True):
                 mean, low, high = _geometric_mean(ratios, rng)
@@ -169,7 +170,7 @@ def draw_learning() -> None:
             errors_.set_xlabel("Voyages of the training")
             errors_.set_ylabel("Error over that of ekf")
             errors_.set_title(f"{len(found['rows'][0])} validation voyages, 95 % intervals")
-            errors_.legend(fontsize=7)
+            errors_.legend(fontsize=7, loc="upper left", frameon=True, facecolor="white", framealpha=0.9, edgecolor="none")
             save(fig, file.with_suffix(""), formats=("png",))
 
 

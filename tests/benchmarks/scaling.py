@@ -36,13 +36,16 @@ __all__ = ["FILE", "Figures", "exponent", "model", "read"]
 FILE = Path(__file__).with_suffix(".csv")
 FIGURE = Path(__file__).parents[2] / "docs" / "figures" / "scaling.png"
 SCENARIO = "open-sea"
-ROWS = ("ekf", "sw-fgo", "iae", "gnc-fgo", "ukf", "huber-kf", "vb-akf", "huber-fgo")
+#: Rows that cost the same: one with different parameters.
+ROWS = [EstimatorRequest("gated-ekf", {"patience": 10.0 + k}) for k in range(8)]
+#: Rows on a cluster.
+CLUSTER_ROWS = ("ekf", "sw-fgo", "iae", "gnc-fgo")
 RUNS, SOME, LENGTH = 4, 2, 150.0  # what is not varied: runs, rows, and the length of a run [s]
 IDLE = 2.0  # a run with hardly any work [s]
 SIZES = (1, 2, 4, 8)
 NODES = (5, 10, 20, 40, 80)
 EPOCHS = 60
-CLUSTER_RUNS, CLUSTER_ROWS = 8, 4
+CLUSTER_RUNS = 8
 WORKERS = (1, 2, 4)
 RESULTS = (320, 640, 1280)
 WALL = "wall clock"
@@ -55,10 +58,9 @@ Figures = dict[str, dict[str, dict[float, float]]]
 def campaign_seconds(runs: int = RUNS, rows: int = SOME, length: float = LENGTH) -> float:
     """Processor time of a campaign in this process, with all processes that it starts [s]."""
     scenario = load(SCENARIO).model_copy(update={"duration": length})
-    requests = [EstimatorRequest(row) for row in ROWS[:rows]]
     with tempfile.TemporaryDirectory() as folder:
         before = _spent()
-        run_campaign([scenario], requests, range(runs), folder, workers=1, confinement="none")
+        run_campaign([scenario], ROWS[:rows], range(runs), folder, workers=1, confinement="none")
         return _spent() - before
 
 
@@ -97,7 +99,7 @@ def ranking_seconds(results: int) -> float:
 
 def cluster_figures() -> Iterator[tuple[str, int, str, float]]:
     """What a run of `CLUSTER_ROWS` rows costs on a cluster of local workers, for each number of workers."""
-    requests = [EstimatorRequest(row) for row in ROWS[:CLUSTER_ROWS]]
+    requests = [EstimatorRequest(row) for row in CLUSTER_ROWS]
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         cluster = Cluster(folder)
@@ -188,7 +190,7 @@ def say(figures: Figures) -> None:
     for workers in WORKERS:
         own = {what: times[float(workers)] for what, times in figures["workers"].items()}
         listed = ", ".join(f"{what} {v:.0f}" if what == "kB" else f"{what} {1e3 * v:.1f} ms" for what, v in own.items())
-        print(f"a run of {CLUSTER_ROWS} rows with {workers} workers: {listed}")
+        print(f"a run of {len(CLUSTER_ROWS)} rows with {workers} workers: {listed}")
     for workers in ASKED:
         rate, limit = model(figures, workers)
         print(f"{workers:4d} workers: {rate:6.2f} runs a second, limited by {limit}")
@@ -234,7 +236,7 @@ def _draw_cluster(figures: Figures, right: Any) -> None:
     right.loglog(asked, [model(figures, int(n))[0] for n in asked], color="grey", lw=1.0, label="model")
     walls = figures["workers"][WALL]
     right.loglog(list(walls), [1.0 / t for t in walls.values()], "o", label="measured, on two cores with other work")
-    right.set(xlabel="Workers of a Dask cluster", ylabel=f"Runs of {CLUSTER_ROWS} rows a second")
+    right.set(xlabel="Workers of a Dask cluster", ylabel=f"Runs of {len(CLUSTER_ROWS)} rows a second")
     right.legend(frameon=False, fontsize=8)
     right.grid(alpha=0.3)
 
