@@ -170,7 +170,9 @@ def draw_learning() -> None:
             errors_.set_xlabel("Voyages of the training")
             errors_.set_ylabel("Error over that of ekf")
             errors_.set_title(f"{len(found['rows'][0])} validation voyages, 95 % intervals")
-            errors_.legend(fontsize=7, loc="upper left", frameon=True, facecolor="white", framealpha=0.9, edgecolor="none")
+            errors_.legend(
+                fontsize=7, loc="upper left", frameon=True, facecolor="white", framealpha=0.9, edgecolor="none"
+            )
             save(fig, file.with_suffix(""), formats=("png",))
 
 
