@@ -31,11 +31,19 @@ def structure(**fields: type | int | tuple[int, ...]) -> np.dtype[Any]:
     **fields : type, int or tuple of int
         By name: ``float``, ``int``, or the length or the shape of an array of float64.
 
+    Raises
+    ------
+    ValueError
+        If a record of NumPy has an attribute of that name: in Python it would be read in place of the field.
+
     Examples
     --------
     >>> structure(count=int, limits=4).names
     ('count', 'limits')
     """
+    for name in fields:
+        if hasattr(np.record, name):
+            raise ValueError(f"field {name!r} of a structure: records of NumPy have an attribute of that name; rename it")
     named: list[Any] = [
         (name, np.dtype(kind)) if isinstance(kind, type) else (name, np.float64, kind) for name, kind in fields.items()
     ]

@@ -50,7 +50,7 @@ SETTINGS = structure(group=int, least=float, units=int)
 #: Time and inputs of the last reading; behind them is the memory of the network.
 MEMORY = structure(heard=float, inputs=NUMBER_OF_INPUTS)
 #: Of each group: mean size of the innovations, and the time of the last one.
-TOGETHER = structure(size=GROUPS, time=GROUPS)
+TOGETHER = structure(usual=GROUPS, time=GROUPS)
 _WEIGHTS, HIDDEN = length(SETTINGS), length(MEMORY)
 #: Time constant of the mean sizes [s], and the size without a fault, ln(1 + 0.82).
 _MEMORY, _TYPICAL = 10.0, 0.6
@@ -80,11 +80,11 @@ def set_by_network(
     inputs[5] = log1p(max(elapsed, 0.0)) if elapsed == elapsed else 0.0
     for g in range(GROUPS):
         inputs[6 + g] = 1.0 if g == group else 0.0
-        inputs[6 + GROUPS + g] = groups.size[g]
+        inputs[6 + GROUPS + g] = groups.usual[g]
     kept.heard = time
     last = groups.time[group]
     part = 1.0 - exp(-max(time - last, 0.0) / _MEMORY) if last == last else 0.3
-    groups.size[group] += part * (size - groups.size[group])
+    groups.usual[group] += part * (size - groups.usual[group])
     groups.time[group] = time
     output = advance(settings[_WEIGHTS:], inputs, memory[HIDDEN : HIDDEN + own.units])
     weight: float = max(1.0 / (1.0 + exp(-output)), own.least)
@@ -156,7 +156,7 @@ class LearnedNoise(NoiseAdaptation):
 
     def begun_together(self) -> Array:
         """As `NoiseAdaptation.begun_together`."""
-        return filled(TOGETHER, size=_TYPICAL, time=np.nan)
+        return filled(TOGETHER, usual=_TYPICAL, time=np.nan)
 
     def reset(self, instruments: Instruments) -> None:
         """Begin a run."""

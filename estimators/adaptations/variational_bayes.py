@@ -68,8 +68,8 @@ def variational_noise(
 
 #: Forgetting factor, iterations, and bounds of the variance ratios.
 SETTINGS = structure(forgetting=float, iterations=int, lowest=float, highest=float)
-#: The shape of the densities, and their scales.
-MEMORY = structure(shape=float, scales=3)
+#: The shape of the gamma densities, and their scales.
+MEMORY = structure(gamma_shape=float, scales=3)
 
 
 @kernel(passed=True)
@@ -79,12 +79,12 @@ def variational_bayes_noise(
     """Make one step of `VariationalBayes`, and write the noise of its last iteration into ``noise``; 0."""
     innovation, _, predicted, nominal, noise = prediction
     own, kept = settings.view(SETTINGS)[0], memory.view(MEMORY)[0]
-    kept.shape = own.forgetting * kept.shape + 0.5
+    kept.gamma_shape = own.forgetting * kept.gamma_shape + 0.5
     scales = kept.scales[: innovation.size]
     for i in range(innovation.size):
         scales[i] *= own.forgetting
     variational_noise(
-        innovation, predicted, nominal, kept.shape, own.iterations, own.lowest, own.highest, scales, noise
+        innovation, predicted, nominal, kept.gamma_shape, own.iterations, own.lowest, own.highest, scales, noise
     )
     return 0.0
 
@@ -146,4 +146,4 @@ class VariationalBayes(EstimatedNoise):
     def begun(self, longer: float, m: int) -> Array:
         """As `EstimatedNoise.begun`: shape and scales of the datasheet's noise."""
         prior = 0.5 * self.prior * longer
-        return filled(MEMORY, shape=prior, scales=prior)
+        return filled(MEMORY, gamma_shape=prior, scales=prior)

@@ -30,6 +30,10 @@ class _Stated(ErrorModel):
     #: Variances of the datasheet, by the name of the instrument.
     stated_variances: Mapping[str, Array]
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """A copy makes the class, too, because no module has it."""
+        return _blank, (type(self).__bases__[1],), self.__dict__
+
     def _states(self, m: Measurement) -> bool:
         return m.instrument in self.stated_variances and len(m.side) == len(m.value)
 
@@ -67,6 +71,11 @@ class _Stated(ErrorModel):
 @lru_cache(maxsize=64)
 def _stated_class(kind: type[Any]) -> type[Any]:
     return type(f"Stated{kind.__name__}", (_Stated, kind), {"__module__": __name__})
+
+
+def _blank(kind: type[Any]) -> Any:
+    found = _stated_class(kind)
+    return found.__new__(found)
 
 
 def with_stated_sigmas(model: M, instruments: Instruments) -> M:

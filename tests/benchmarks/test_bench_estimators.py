@@ -99,7 +99,7 @@ def test_update_without_propagation(benchmark, recording: Recording):
 
     def update() -> None:
         estimator.covariance[:] = covariance
-        estimator._use(aids, model.samples, model.time, {}, [])
+        estimator._use(aids, model.samples, model.time, [])
 
     benchmark(update)
     assert len(aids) == 4

@@ -62,7 +62,7 @@ def test_update_only(benchmark, recording: Recording, row: str, kind: str):
         model.restore(state)
         covariance[:] = before
         propagate_covariance(covariance, model.transition, model.process_noise, model.calibration, none, none, 1.0)
-        estimator._use([measurement], model.samples, model.time, {}, [])
+        estimator._use([measurement], model.samples, model.time, [])
 
     benchmark(update)
     assert np.trace(covariance[:3, :3]) <= np.trace(before[:3, :3]) * 1.5
