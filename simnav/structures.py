@@ -43,7 +43,9 @@ def structure(**fields: type | int | tuple[int, ...]) -> np.dtype[Any]:
     """
     for name in fields:
         if hasattr(np.record, name):
-            raise ValueError(f"field {name!r} of a structure: records of NumPy have an attribute of that name; rename it")
+            raise ValueError(
+                f"field {name!r} of a structure: a record of NumPy has an attribute of that name; rename it"
+            )
     named: list[Any] = [
         (name, np.dtype(kind)) if isinstance(kind, type) else (name, np.float64, kind) for name, kind in fields.items()
     ]

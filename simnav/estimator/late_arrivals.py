@@ -12,8 +12,9 @@ before it arrives.
 A stamp that is ahead of its step waits for the step in which its time comes. Stamps are corrected before by what the
 datasheet says of them: a stamp that is set at arrival is later than the time of validity by the mean latency. Memory is
 bounded: copies and packets are kept for the longest latency of the datasheets, or `REACH` where these say nothing. What
-arrives later still is left out. Each copy takes half a millisecond for a filter, once a step. Nothing is copied where
-no datasheet has a clock and no reading has come late.
+arrives later still is left out. A copy takes half a millisecond for a filter. It is made before each step, or before
+every few steps where `MOST_COPIES` would not reach back so far: then the steps after the copy are taken once more.
+Nothing is copied where no datasheet has a clock and no reading has come late.
 """
 
 from __future__ import annotations
@@ -54,6 +55,8 @@ LATE = "late"
 #: step in which they arrive; or not at all.
 Manner = Literal["replay", "arrival", "skip"]
 MANNERS: tuple[Manner, ...] = ("replay", "arrival", "skip")
+#: How many copies reach back as far as the longest latency, and so the memory of a run.
+MOST_COPIES = 32
 #: How far back it goes where no datasheet says how late readings may be [s].
 REACH = 5.0
 #: A reading that is older than the begin of its step by less than this counts as of that time [s].
@@ -128,7 +131,12 @@ def parts_of(recording: Recording) -> Sequence[object]:
 @dataclass
 class _Step:
     packet: Measurements
-    before: Estimator  # a copy, from before the packet
+    before: Estimator | None  # a copy, from before the packet; not every step has one
+
+
+def _forget(estimator: Estimator | None) -> None:
+    """Let go what a copy holds: it may refer to itself, and Python looks for such circles seldom."""
+    getattr(estimator, "__dict__", {}).clear()
 
 
 class LateArrivals:
@@ -171,7 +179,10 @@ class LateArrivals:
         self._clocks = {name: sheet.timing for name, sheet in instruments.items() if sheet.timing is not None}
         reaches = [clock.longest for clock in self._clocks.values()]
         self.reach = (max(reaches) if reaches and len(reaches) == len(self._clocks) else REACH) + instruments.step
+        self._apart = max(1, math.ceil(self.reach / (MOST_COPIES * instruments.step)))  # steps from copy to copy
         self._history: deque[_Step] = deque()
+        self._oldest = math.inf  # begin of the first step to which it goes back
+        self._made: Estimator | None = None  # the copy that has gone back last
         self._waiting: list[Measurement] = []
         self._newest: dict[str, float] = defaultdict(lambda: -math.inf)
         self._stamps: dict[tuple[str, float], float] = {}
@@ -206,7 +217,10 @@ class LateArrivals:
         packet, late = self._sorted(measurements)
         flagged: list[tuple[str, float]] = []
         if late and self._history:
-            estimator = self._replay(late, flagged)
+            before, estimator = estimator, self._replay(late, flagged)
+            if before is self._made:
+                _forget(before)
+            self._made = estimator
         if self.manner == "replay":
             self._keep(packet, estimator)
         estimate = estimator.update(packet)
@@ -233,7 +247,7 @@ class LateArrivals:
                 present.append(m._replace(time=start))
                 start = measurements.start
                 self.used += 1
-            elif self.manner == "replay" and self._history and time > self._history[0].packet.start + TIME_TOLERANCE:
+            elif self.manner == "replay" and self._history and time > self._oldest + TIME_TOLERANCE:
                 late.append(m)
                 self.used += 1
             else:
@@ -273,21 +287,24 @@ class LateArrivals:
 
     def _keep(self, packet: Measurements, estimator: Estimator) -> None:
         """Remember the packet, and the estimator before it; forget what is older than the longest latency."""
+        steps = self._history
+        since = next((k for k, step in enumerate(reversed(steps), 1) if step.before is not None), self._apart)
         try:
-            before = self._copy(estimator)
+            before = self._copy(estimator) if since >= self._apart else None
         except Exception:  # a graph of GTSAM cannot be copied: its late readings count when they arrive
             self.manner = "arrival"
-            self._history.clear()
+            steps.clear()
             return
         imu = packet.imu
         if imu is not None:  # the buffer of a packet is reused
             imu = replace(imu, **{name: array.copy() for name, array in vars(imu).items()})
         aids = [m._replace(value=m.value.copy(), side=m.side.copy()) for m in packet.aids]
-        self._history.append(_Step(Measurements(packet.start, packet.time, imu, aids), before))
-        while self._history[0].packet.time < packet.time - self.reach:
-            self._history.popleft()
-        oldest = self._history[0].packet.start - 1.0
-        self._stamps = {key: stamp for key, stamp in self._stamps.items() if key[1] > oldest}
+        steps.append(_Step(Measurements(packet.start, packet.time, imu, aids), before))
+        self._oldest = next(x.packet.start for x in steps if x.packet.time >= packet.time - self.reach)
+        copies = [k for k, x in enumerate(steps) if x.before is not None and x.packet.start <= self._oldest]
+        for _ in range(copies[-1]):
+            _forget(steps.popleft().before)
+        self._stamps = {key: stamp for key, stamp in self._stamps.items() if key[1] > self._oldest - 1.0}
 
     def _replay(self, late: list[Measurement], flagged: list[tuple[str, float]]) -> Estimator:
         """Put late readings into their steps, and process these and all later ones again."""
@@ -299,9 +316,13 @@ class LateArrivals:
             steps[k].packet = Measurements(old.start, old.time, old.imu, aids)
             first = min(first, k)
         wanted = {(m.source, m.time) for m in late}
-        estimator = self._copy(steps[first].before)
-        for k in range(first, len(steps)):
-            if k > first:
+        begin = next(k for k in range(first, -1, -1) if steps[k].before is not None)
+        known = steps[begin].before
+        assert known is not None
+        estimator = self._copy(known)
+        for k in range(begin, len(steps)):
+            if k > first and steps[k].before is not None:
+                _forget(steps[k].before)
                 steps[k].before = self._copy(estimator)
             flagged += [flag for flag in estimator.update(steps[k].packet).flagged if tuple(flag) in wanted]
         return estimator
