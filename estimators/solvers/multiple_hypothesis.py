@@ -47,12 +47,14 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
+from simnav.compiled import kernel
 from simnav.estimators.algebra.chi_square import chi_square_limits
 from simnav.estimators.composition import Solver
 from simnav.estimators.models.channels import owners, summary
 from simnav.estimators.models.coupling import by_source
 from simnav.estimators.models.doubted_instruments import IMU, AttitudeDoubt, BiasDoubt, ImuDoubt
 from simnav.estimators.models.suitable import ModelChoice
+from simnav.kernel_types import Matrix, Vector
 from simnav.types import Array, Estimate, InitialState, Instruments, Measurement, Measurements
 
 from .admission import Admission
@@ -182,6 +184,18 @@ class _Period:
         """The step at which a fault began; the first one, if none is surprising."""
         limit = ONSET * max(self.excess)
         return next((k for k, x in enumerate(self.excess) if x > 0.0 and x > limit), 0)
+
+
+@kernel
+def judge_innovations(memory: Vector, squares: Matrix) -> bool:
+    """Whether the innovations have been improbable, with those of an epoch.
+
+    ``squares`` (m, 2) has the normalised innovations squared of the epoch and their degrees of freedom.
+    """
+    for k in range(squares.shape[0]):
+        add_square(memory, squares[k, 0], squares[k, 1])
+    end_epoch(memory)
+    return is_inconsistent(memory)
 
 
 def _excess(nis: float, freedom: float) -> float:
@@ -433,7 +447,7 @@ class MultipleHypothesis(Solver):
             The measurements that the leading filter used, as of `HypothesisFilter.notes`.
         """
         diagnostics: dict[str, float | Array] = dict(self._blank)
-        wrong, flagged = set[str](), list[tuple[str, float]]()
+        wrong, flagged, squares = set[str](), list[tuple[str, float]](), list[tuple[float, float]]()
         for group, names in self._groups.items():
             doubting = [h for h in self._hypotheses if group in h.doubts]
             probability = sum(exp(h.weight) for h in doubting)
@@ -447,13 +461,13 @@ class MultipleHypothesis(Solver):
                 self._admission.skipped += 1
                 continue
             freedom = len(m.value)
-            add_square(self._test, nis, freedom)
+            squares.append((nis, freedom))
             diagnostics[f"innovation.{m.instrument}"], diagnostics[f"nis.{m.instrument}"] = size, nis
             if m.instrument in wrong or nis > self._gross[freedom]:
                 flagged.append((m.instrument, m.time))
-        end_epoch(self._test)
+        inconsistent = judge_innovations.unchecked(self._test, np.array(squares, dtype=np.float64).reshape(-1, 2))
         diagnostics["variance_factor"] = float(self._test.view(TEST)[0].variance_factor)
-        diagnostics["inconsistent"] = float(is_inconsistent(self._test))
+        diagnostics["inconsistent"] = float(inconsistent)
         diagnostics["skipped"] = float(self._admission.skipped)
         diagnostics["hypotheses"] = float(len(self._hypotheses))
         if self._owners:
