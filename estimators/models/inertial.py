@@ -79,6 +79,7 @@ from .measurements import (
 from .propagation import (
     CLOCK,
     IMU_NOISE,
+    INERTIAL_STATE,
     MOTION_NUMBERS,
     TURN_TIME,
     Samples,
@@ -93,8 +94,6 @@ __all__ = ["InertialModel", "roll_pitch_yaw"]
 #: Components of the error without calibration states, and without the biases of the IMU.
 _NAV, _MOTION = 15, 9
 _GRAVITY = 9.81
-#: Places in the flat state (`motion_of`).
-_POSITION, _VELOCITY, _DCM, _TIME = slice(0, 3), slice(3, 6), slice(6, 15), 30
 
 
 class InertialModel(ErrorModel):
@@ -478,10 +477,10 @@ class InertialModel(ErrorModel):
         """As `ErrorModel.estimates`."""
         if self.blocks.brought or self.reports_all or type(self).estimate is not InertialModel.estimate:
             return super().estimates(numbers, covariances)
-        attitude = np.array([_angles(elements) for elements in numbers[:, _DCM].tolist()])
-        return Estimates(
-            numbers[:, _TIME], numbers[:, _POSITION], numbers[:, _VELOCITY], attitude, covariances[:, :9, :9]
-        )
+        states = numbers[:, :MOTION_NUMBERS].view(INERTIAL_STATE)[:, 0]
+        attitude = np.array([_angles(elements) for elements in states["dcm"].reshape(-1, 9).tolist()])
+        time = states["clock"].view(CLOCK)["time"][:, 0]
+        return Estimates(time, states["position"], states["velocity"], attitude, covariances[:, :9, :9])
 
 
 def roll_pitch_yaw(dcm: Array) -> Array:

@@ -39,6 +39,7 @@ __all__ = [
     "HELD_ATTITUDE",
     "HELD_VELOCITY",
     "IMU_NOISE",
+    "INERTIAL_STATE",
     "MOTION_NUMBERS",
     "TURN_TIME",
     "Motion",
@@ -73,6 +74,10 @@ ERROR_BLOCK = structure(
 #: mean rate of the one before; and the rate at the time of the state, extrapolated from both: a mean is half a sample
 #: old, which over the lever arm of a DVL in a seaway would be taken for a misalignment.
 CLOCK = structure(time=float, used=float, held=float, mean_rate=3, mean_force=3, rate_before=3, rate=3)
+#: A flat inertial state, behind which are the calibration states of the instruments; the blocks are those of `Motion`.
+INERTIAL_STATE = structure(position=3, velocity=3, dcm=(3, 3), bias=6, increments=6, turn=3, clock=numbers_of(CLOCK))
+#: Numbers of a flat inertial state before the calibration states.
+MOTION_NUMBERS = numbers_of(INERTIAL_STATE)
 #: Noise of an IMU: densities of the white noises of gyroscopes and accelerometers; decay and noise density of their
 #: biases; ``scale^2 TURN_TIME`` and ``misalignment^2 TURN_TIME`` of the gyroscopes; and the nominal interval [s].
 IMU_NOISE = structure(
@@ -130,17 +135,13 @@ class Motion(NamedTuple):
     clock: Vector
 
 
-#: Numbers of a flat inertial state before the calibration states of the instruments.
-MOTION_NUMBERS = 45
-
-
 @helper
 def motion_of(numbers: Array) -> Motion:
     """The named blocks of a flat inertial state; behind them are the calibration states."""
+    own = numbers[:MOTION_NUMBERS].view(INERTIAL_STATE)[0]
     return Motion(
-        numbers[0:3], numbers[3:6], numbers[6:15].reshape((3, 3)), numbers[15:21], numbers[21:27], numbers[27:30],
-        numbers[30:45],
-    )  # fmt: skip
+        own.position[:], own.velocity[:], own.dcm[:], own.bias[:], own.increments[:], own.turn[:], own.clock[:]
+    )
 
 
 @helper
