@@ -23,6 +23,7 @@ from simnav.types import Array, Datasheet, InitialState, Instruments, Integers
 from .base import ErrorModel
 from .equations import equation_of
 from .inertial import InertialModel
+from .inertial_errors import ERROR
 from .propagation import IMU_NOISE
 from .ship import ShipModel
 from .suitable import Suitable
@@ -33,8 +34,9 @@ __all__ = ["IMU", "AttitudeDoubt", "BiasDoubt", "DoubtedInstruments", "DoubtingM
 IMU = "imu"
 #: Sigma of a bias over that of the noise, where a datasheet has no bias: it only keeps a place for the state.
 _PLACE = 1e-4
-#: Index of the first state behind motion and IMU in the error of the inertial model; places of both biases of the IMU.
-_INERTIAL, _GYROSCOPE, _ACCELEROMETER = 15, np.arange(9, 12), np.arange(12, 15)
+#: Places of the biases of the IMU in the error of the inertial model.
+_GYROSCOPE = np.arange(ERROR.gyroscope_bias, ERROR.accelerometer_bias)
+_ACCELEROMETER = np.arange(ERROR.accelerometer_bias, ERROR.calibration)
 
 
 @dataclass(frozen=True)
@@ -219,7 +221,7 @@ class _Inertial(DoubtingModel, InertialModel):
         covariance = super().begin(start, _with_biases(instruments))
         self._decay, self._density = self._decay.copy(), self._density.copy()  # not those of the blocks
         self.imu_noise, self.stated_noise = self._noise, self._noise.copy()
-        self.find_biases(covariance, _INERTIAL)
+        self.find_biases(covariance, ERROR.calibration)
         self.groups[IMU] = (IMU,) if instruments.imu is None else (instruments.imu.name,)
         return covariance
 

@@ -67,6 +67,7 @@ from .delayed import is_delayed
 from .equations import EQUATIONS, equation_of
 from .error_states import merged, merged_states
 from .filtering import Aid, AidTable, Dynamics, ModelFunctions, aid_table
+from .inertial_errors import ERROR
 from .inertial_functions import INERTIAL_FUNCTIONS
 from .lever_arms import has_measurement_function, with_lever_arms
 from .measurement_functions import MeasurementFunction
@@ -79,6 +80,7 @@ from .measurements import (
 from .propagation import (
     CLOCK,
     IMU_NOISE,
+    INERTIAL_STATE,
     MOTION_NUMBERS,
     TURN_TIME,
     Samples,
@@ -91,10 +93,8 @@ from .state_blocks import StateBlocks
 __all__ = ["InertialModel", "roll_pitch_yaw"]
 
 #: Components of the error without calibration states, and without the biases of the IMU.
-_NAV, _MOTION = 15, 9
+_NAV, _MOTION = ERROR.calibration, ERROR.gyroscope_bias
 _GRAVITY = 9.81
-#: Places in the flat state (`motion_of`).
-_POSITION, _VELOCITY, _DCM, _TIME = slice(0, 3), slice(3, 6), slice(6, 15), 30
 
 
 class InertialModel(ErrorModel):
@@ -137,8 +137,8 @@ class InertialModel(ErrorModel):
     delayed: bool = False
     state = ("position", "velocity", "dcm", "bias", "calibration")
     memory = ("numbers",)
-    attitude_at = 6
-    moving = (slice(0, 6), slice(6, 9))
+    attitude_at = ERROR.attitude
+    moving = (slice(ERROR.position, ERROR.attitude), slice(ERROR.attitude, ERROR.gyroscope_bias))
     #: True if the kernels of `simnav.estimators.models.inertial_functions` may replace `measure`, `correct` and
     #: `loosen`. A model with another form of one of these methods, or of those of points, sets it to False.
     fused: ClassVar[bool] = True
@@ -478,10 +478,10 @@ class InertialModel(ErrorModel):
         """As `ErrorModel.estimates`."""
         if self.blocks.brought or self.reports_all or type(self).estimate is not InertialModel.estimate:
             return super().estimates(numbers, covariances)
-        attitude = np.array([_angles(elements) for elements in numbers[:, _DCM].tolist()])
-        return Estimates(
-            numbers[:, _TIME], numbers[:, _POSITION], numbers[:, _VELOCITY], attitude, covariances[:, :9, :9]
-        )
+        states = numbers[:, :MOTION_NUMBERS].view(INERTIAL_STATE)[:, 0]
+        attitude = np.array([_angles(elements) for elements in states["dcm"].reshape(-1, 9).tolist()])
+        time = states["clock"].view(CLOCK)["time"][:, 0]
+        return Estimates(time, states["position"], states["velocity"], attitude, covariances[:, :9, :9])
 
 
 def roll_pitch_yaw(dcm: Array) -> Array:

@@ -10,13 +10,16 @@ from simnav.estimators.algebra.joseph import joseph_update, project
 from simnav.types import Array
 
 from .filtering import Aid, Dynamics, ModelFunctions, Prediction, Readings, aid_of
+from .inertial_errors import ERROR
 from .measurements import State, observe_inertial
 from .propagation import CLOCK, MOTION_NUMBERS, Samples, correct_inertial, motion_of, propagate_inertial, time_of
 
 __all__ = ["INERTIAL_FUNCTIONS", "state_of", "use_reading"]
 
-#: Places of position and velocity, and of the attitude, in the error.
-_MOVING = MotionStates(linear=0, linear_end=6, attitude=6, attitude_end=9)
+#: Position and velocity, and attitude, in the error.
+_MOVING = MotionStates(
+    linear=ERROR.position, linear_end=ERROR.attitude, attitude=ERROR.attitude, attitude_end=ERROR.gyroscope_bias
+)
 
 
 @helper

@@ -34,6 +34,7 @@ from simnav.types import Array, Measurement
 
 from .filtering import Aid, Dynamics, ModelFunctions, Prediction, Readings, aid_of
 from .inertial import InertialModel
+from .inertial_errors import ERROR
 from .inertial_functions import inflate_and_predict as inflate_linearised
 from .inertial_functions import predict as linearise
 from .inertial_functions import propagate as propagate_linearised
@@ -102,7 +103,7 @@ def propagate_points(before: Vector, after: Vector, constants: Vector, decay: Ve
     for j in range(decay.size):
         keep = np.exp(-decay[j] * interval)
         for k in range(errors.shape[0]):
-            errors[k, 15 + j] *= keep
+            errors[k, ERROR.calibration + j] *= keep
     p, v, m = np.empty(3), np.empty(3), np.empty((3, 3))
     for k in range(errors.shape[0]):
         still = True
@@ -110,36 +111,41 @@ def propagate_points(before: Vector, after: Vector, constants: Vector, decay: Ve
             still = still and errors[k, j] == 0.0
         if still:
             continue
-        p[0] = position[0] + errors[k, 0] / north
-        p[1] = position[1] + errors[k, 1] / east
-        p[2] = position[2] - errors[k, 2]
+        p[0] = position[0] + errors[k, ERROR.position] / north
+        p[1] = position[1] + errors[k, ERROR.position + 1] / east
+        p[2] = position[2] - errors[k, ERROR.position + 2]
         for j in range(3):
-            v[j] = velocity[j] + errors[k, 3 + j]
-        _turn(dcm, errors[k, 6], errors[k, 7], errors[k, 8], m)
+            v[j] = velocity[j] + errors[k, ERROR.velocity + j]
+        _turn(dcm, errors[k, ERROR.attitude], errors[k, ERROR.attitude + 1], errors[k, ERROR.attitude + 2], m)
         memory[:] = 0.0
+        g, a = ERROR.gyroscope_bias, ERROR.accelerometer_bias
         mechanize_step(
             p, v, m, memory,
-            (rate[0] - errors[k, 9], rate[1] - errors[k, 10], rate[2] - errors[k, 11]),
-            (force[0] - errors[k, 12], force[1] - errors[k, 13], force[2] - errors[k, 14]),
+            (rate[0] - errors[k, g], rate[1] - errors[k, g + 1], rate[2] - errors[k, g + 2]),
+            (force[0] - errors[k, a], force[1] - errors[k, a + 1], force[2] - errors[k, a + 2]),
             interval,
         )  # fmt: skip
-        errors[k, 0] = (p[0] - end_latitude) * next_north
-        errors[k, 1] = (p[1] - end_longitude) * next_east
-        errors[k, 2] = end_height - p[2]
+        errors[k, ERROR.position] = (p[0] - end_latitude) * next_north
+        errors[k, ERROR.position + 1] = (p[1] - end_longitude) * next_east
+        errors[k, ERROR.position + 2] = end_height - p[2]
         # Rotation vector of C_k C': its skew part holds the sine, its trace the cosine (good below half a turn).
         x0, x1, x2, trace = 0.0, 0.0, 0.0, 0.0
         for j in range(3):
-            errors[k, 3 + j] = v[j] - next_velocity[j]
+            errors[k, ERROR.velocity + j] = v[j] - next_velocity[j]
             trace += m[0, j] * d[0, j] + m[1, j] * d[1, j] + m[2, j] * d[2, j]
             x0 += 0.5 * (m[2, j] * d[1, j] - m[1, j] * d[2, j])
             x1 += 0.5 * (m[0, j] * d[2, j] - m[2, j] * d[0, j])
             x2 += 0.5 * (m[1, j] * d[0, j] - m[0, j] * d[1, j])
         sine = sqrt(x0 * x0 + x1 * x1 + x2 * x2)
         ratio = 1.0 if sine < 1e-12 else atan2(sine, 0.5 * (trace - 1.0)) / sine
-        errors[k, 6], errors[k, 7], errors[k, 8] = ratio * x0, ratio * x1, ratio * x2
+        errors[k, ERROR.attitude], errors[k, ERROR.attitude + 1], errors[k, ERROR.attitude + 2] = (
+            ratio * x0,
+            ratio * x1,
+            ratio * x2,
+        )
         for j in range(3):
-            errors[k, 9 + j] *= keep_g
-            errors[k, 12 + j] *= keep_a
+            errors[k, ERROR.gyroscope_bias + j] *= keep_g
+            errors[k, ERROR.accelerometer_bias + j] *= keep_a
 
 
 @kernel
@@ -180,8 +186,8 @@ def observe_points(
             v[:] = through
         if k >= 0:
             for j in range(3):
-                v[j], b[j] = through[j] + errors[k, 3 + j], bias[j] + errors[k, 9 + j]
-            _turn(dcm, errors[k, 6], errors[k, 7], errors[k, 8], m)
+                v[j], b[j] = through[j] + errors[k, ERROR.velocity + j], bias[j] + errors[k, ERROR.gyroscope_bias + j]
+            _turn(dcm, errors[k, ERROR.attitude], errors[k, ERROR.attitude + 1], errors[k, ERROR.attitude + 2], m)
         full = k == -2
         known = observe_inertial(
             Aid(code, arm, bias_at if full else -1, scale_at if full else -1), value,

@@ -31,6 +31,7 @@ from simnav.kernel_types import Matrix, Vector
 from simnav.types import Array
 
 from .filtering import Aid
+from .inertial_errors import ERROR
 
 __all__ = [
     "OWN", "State", "has_heading", "observe", "observe_inertial", "radii", "wrap",
@@ -39,7 +40,7 @@ __all__ = [
 #: Smallest cosine of the pitch at which there is a heading [-].
 LEAST_LEVEL = 0.1
 #: Number of components of the inertial state, without the calibration.
-NAVIGATION_STATES = 15
+NAVIGATION_STATES = ERROR.calibration
 
 #: What `observe_inertial` calls the measurement equations: `simnav.estimators.models.equations.Equation.code`.
 GNSS_POSITION, TERRAIN_FIX, GNSS_VELOCITY, DVL, SPEED_LOG, HEADING, DEPTH = range(7)
@@ -91,6 +92,12 @@ def has_heading(dcm: Array) -> bool:
 
 
 @helper
+def _fill(jacobian: Array, row: int, first: int, values: tuple[float, float, float]) -> None:
+    """Write three elements of a row, the derivatives by one part of the error."""
+    jacobian[row, first], jacobian[row, first + 1], jacobian[row, first + 2] = values
+
+
+@helper
 def observe_inertial(aid: Aid, value: Array, state: State, innovation: Array, jacobian: Array) -> int:
     """Compute innovation and Jacobian of one measurement (equations in the module).
 
@@ -130,17 +137,20 @@ def observe_inertial(aid: Aid, value: Array, state: State, innovation: Array, ja
         c1 = dcm[1, 0] * l0 + dcm[1, 1] * l1 + dcm[1, 2] * l2
         if code == DEPTH:
             innovation[0] = value[0] + position[2] - c2
-            jacobian[0, 2], jacobian[0, 6], jacobian[0, 7] = 1.0, c1, -c0
+            jacobian[0, ERROR.position + 2] = 1.0
+            _fill(jacobian, 0, ERROR.attitude, (c1, -c0, 0.0))
         else:
             meridian, prime = radii_scalar(sin(position[0]))
             east = value[1] - position[1]
             innovation[0] = (value[0] - position[0]) * (meridian + position[2]) - c0
             innovation[1] = atan2(sin(east), cos(east)) * (prime + position[2]) * cos(position[0]) - c1
-            jacobian[0, 0], jacobian[0, 7], jacobian[0, 8] = 1.0, c2, -c1
-            jacobian[1, 1], jacobian[1, 6], jacobian[1, 8] = 1.0, -c2, c0
+            jacobian[0, ERROR.position], jacobian[1, ERROR.position + 1] = 1.0, 1.0
+            _fill(jacobian, 0, ERROR.attitude, (0.0, c2, -c1))
+            _fill(jacobian, 1, ERROR.attitude, (-c2, 0.0, c0))
             if code == GNSS_POSITION:
                 innovation[2] = position[2] - value[2] - c2
-                jacobian[2, 2], jacobian[2, 6], jacobian[2, 7] = 1.0, c1, -c0
+                jacobian[2, ERROR.position + 2] = 1.0
+                _fill(jacobian, 2, ERROR.attitude, (c1, -c0, 0.0))
 
     elif code == HEADING:
         if not has_heading(dcm):
@@ -148,7 +158,7 @@ def observe_inertial(aid: Aid, value: Array, state: State, innovation: Array, ja
         c0, c1 = dcm[0, 0], dcm[1, 0]
         level = c0 * c0 + c1 * c1
         slope = -dcm[2, 0] / level
-        jacobian[0, 6], jacobian[0, 7], jacobian[0, 8] = slope * c0, slope * c1, 1.0
+        _fill(jacobian, 0, ERROR.attitude, (slope * c0, slope * c1, 1.0))
         innovation[0] = value[0] - atan2(c1, c0)
 
     else:
@@ -164,11 +174,13 @@ def observe_inertial(aid: Aid, value: Array, state: State, innovation: Array, ja
             t1 = dcm[1, 0] * u0 + dcm[1, 1] * u1 + dcm[1, 2] * u2
             t2 = dcm[2, 0] * u0 + dcm[2, 1] * u1 + dcm[2, 2] * u2
             innovation[0], innovation[1], innovation[2] = value[0] - v0 - t0, value[1] - v1 - t1, value[2] - v2 - t2
-            jacobian[0, 3], jacobian[0, 7], jacobian[0, 8] = 1.0, t2, -t1
-            jacobian[1, 4], jacobian[1, 6], jacobian[1, 8] = 1.0, -t2, t0
-            jacobian[2, 5], jacobian[2, 6], jacobian[2, 7] = 1.0, t1, -t0
-            for i in range(3):  # row i of C times [l x]
-                jacobian[i, 9], jacobian[i, 10], jacobian[i, 11] = cross(dcm[i, 0], dcm[i, 1], dcm[i, 2], l0, l1, l2)
+            _fill(jacobian, 0, ERROR.attitude, (0.0, t2, -t1))
+            _fill(jacobian, 1, ERROR.attitude, (-t2, 0.0, t0))
+            _fill(jacobian, 2, ERROR.attitude, (t1, -t0, 0.0))
+            for i in range(3):
+                jacobian[i, ERROR.velocity + i] = 1.0
+                # row i of C times [l x]
+                _fill(jacobian, i, ERROR.gyroscope_bias, cross(dcm[i, 0], dcm[i, 1], dcm[i, 2], l0, l1, l2))
         else:
             if code == SPEED_LOG and bias_at >= 0:
                 k = bias_at - NAVIGATION_STATES
@@ -176,16 +188,16 @@ def observe_inertial(aid: Aid, value: Array, state: State, innovation: Array, ja
                 jacobian[0, bias_at + 1], jacobian[0, bias_at + 2] = -dcm[0, 0], -dcm[1, 0]
             for i in range(d):
                 c0, c1, c2 = dcm[0, i], dcm[1, i], dcm[2, i]
-                jacobian[i, 3], jacobian[i, 4], jacobian[i, 5] = c0, c1, c2
-                jacobian[i, 6], jacobian[i, 7], jacobian[i, 8] = cross(c0, c1, c2, v0, v1, v2)
+                _fill(jacobian, i, ERROR.velocity, (c0, c1, c2))
+                _fill(jacobian, i, ERROR.attitude, cross(c0, c1, c2, v0, v1, v2))
             u0 += dcm[0, 0] * v0 + dcm[1, 0] * v1 + dcm[2, 0] * v2
-            jacobian[0, 10], jacobian[0, 11] = -l2, l1
+            _fill(jacobian, 0, ERROR.gyroscope_bias, (0.0, -l2, l1))
             innovation[0] = value[0] - u0
             if code == DVL:
                 u1 += dcm[0, 1] * v0 + dcm[1, 1] * v1 + dcm[2, 1] * v2
                 u2 += dcm[0, 2] * v0 + dcm[1, 2] * v1 + dcm[2, 2] * v2
-                jacobian[1, 9], jacobian[1, 11] = l2, -l0
-                jacobian[2, 9], jacobian[2, 10] = -l1, l0
+                _fill(jacobian, 1, ERROR.gyroscope_bias, (l2, 0.0, -l0))
+                _fill(jacobian, 2, ERROR.gyroscope_bias, (-l1, l0, 0.0))
                 innovation[1], innovation[2] = value[1] - u1, value[2] - u2
             if scale_at >= 0:
                 k = scale_at - NAVIGATION_STATES

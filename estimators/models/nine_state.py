@@ -26,6 +26,7 @@ from .base import Linearised
 from .equations import equation_of
 from .filtering import Dynamics, ModelFunctions, Prediction, Readings, aid_of
 from .inertial import InertialModel
+from .inertial_errors import ERROR
 from .inertial_functions import state_of
 from .measurements import NAVIGATION_STATES, observe_inertial
 from .propagation import IMU_NOISE, Samples, correct_inertial, motion_of, propagate_inertial, time_of
@@ -34,8 +35,10 @@ from .state_blocks import StateBlocks
 __all__ = ["NineStateModel"]
 
 
-#: Places of position and velocity, and of the attitude, in the error.
-_MOVING = MotionStates(linear=0, linear_end=6, attitude=6, attitude_end=9)
+#: Position and velocity, and attitude, in the error.
+_MOVING = MotionStates(
+    linear=ERROR.position, linear_end=ERROR.attitude, attitude=ERROR.attitude, attitude_end=ERROR.gyroscope_bias
+)
 
 
 @kernel

@@ -31,6 +31,7 @@ from simnav.structures import structure
 from simnav.types import Array
 
 from .covariance_propagation import propagate_covariance
+from .inertial_errors import ERROR
 
 __all__ = [
     "BLOCK",
@@ -39,6 +40,7 @@ __all__ = [
     "HELD_ATTITUDE",
     "HELD_VELOCITY",
     "IMU_NOISE",
+    "INERTIAL_STATE",
     "MOTION_NUMBERS",
     "TURN_TIME",
     "Motion",
@@ -73,6 +75,10 @@ ERROR_BLOCK = structure(
 #: mean rate of the one before; and the rate at the time of the state, extrapolated from both: a mean is half a sample
 #: old, which over the lever arm of a DVL in a seaway would be taken for a misalignment.
 CLOCK = structure(time=float, used=float, held=float, mean_rate=3, mean_force=3, rate_before=3, rate=3)
+#: A flat inertial state, behind which are the calibration states of the instruments; the blocks are those of `Motion`.
+INERTIAL_STATE = structure(position=3, velocity=3, dcm=(3, 3), bias=6, increments=6, turn=3, clock=numbers_of(CLOCK))
+#: Numbers of a flat inertial state before the calibration states.
+MOTION_NUMBERS = numbers_of(INERTIAL_STATE)
 #: Noise of an IMU: densities of the white noises of gyroscopes and accelerometers; decay and noise density of their
 #: biases; ``scale^2 TURN_TIME`` and ``misalignment^2 TURN_TIME`` of the gyroscopes; and the nominal interval [s].
 IMU_NOISE = structure(
@@ -130,17 +136,13 @@ class Motion(NamedTuple):
     clock: Vector
 
 
-#: Numbers of a flat inertial state before the calibration states of the instruments.
-MOTION_NUMBERS = 45
-
-
 @helper
 def motion_of(numbers: Array) -> Motion:
     """The named blocks of a flat inertial state; behind them are the calibration states."""
+    own = numbers[:MOTION_NUMBERS].view(INERTIAL_STATE)[0]
     return Motion(
-        numbers[0:3], numbers[3:6], numbers[6:15].reshape((3, 3)), numbers[15:21], numbers[21:27], numbers[27:30],
-        numbers[30:45],
-    )  # fmt: skip
+        own.position[:], own.velocity[:], own.dcm[:], own.bias[:], own.increments[:], own.turn[:], own.clock[:]
+    )
 
 
 @helper
@@ -201,10 +203,10 @@ def _dynamics(F: Array, block: Any, gyro_decay: float, accelerometer_decay: floa
     dcm = block.dcm
     for i in range(3):
         for j in range(3):
-            F[3 + i, 12 + j] = -dcm[3 * i + j]
-            F[6 + i, 9 + j] = -dcm[3 * i + j]
-        F[9 + i, 9 + i] = -gyro_decay
-        F[12 + i, 12 + i] = -accelerometer_decay
+            F[ERROR.velocity + i, ERROR.accelerometer_bias + j] = -dcm[3 * i + j]
+            F[ERROR.attitude + i, ERROR.gyroscope_bias + j] = -dcm[3 * i + j]
+        F[ERROR.gyroscope_bias + i, ERROR.gyroscope_bias + i] = -gyro_decay
+        F[ERROR.accelerometer_bias + i, ERROR.accelerometer_bias + i] = -accelerometer_decay
 
 
 @helper
@@ -237,11 +239,12 @@ def _add_noise(Q: Array, block: Any, noise: Any) -> None:
     for i in range(3):
         c0, c1, c2 = dcm[3 * i] * g0, dcm[1 + 3 * i] * g1, dcm[2 + 3 * i] * g2
         for j in range(3):
-            Q[6 + i, 6 + j] += c0 * dcm[3 * j] + c1 * dcm[1 + 3 * j] + c2 * dcm[2 + 3 * j]
-        Q[3 + i, 3 + i] += noise.accelerometer * dt + HELD_VELOCITY * HELD_VELOCITY * held
-        Q[6 + i, 6 + i] += HELD_ATTITUDE * HELD_ATTITUDE * held
-        Q[9 + i, 9 + i] += noise.gyroscope_walk * dt
-        Q[12 + i, 12 + i] += noise.accelerometer_walk * dt
+            turn = c0 * dcm[3 * j] + c1 * dcm[1 + 3 * j] + c2 * dcm[2 + 3 * j]
+            Q[ERROR.attitude + i, ERROR.attitude + j] += turn
+        Q[ERROR.velocity + i, ERROR.velocity + i] += noise.accelerometer * dt + HELD_VELOCITY * HELD_VELOCITY * held
+        Q[ERROR.attitude + i, ERROR.attitude + i] += HELD_ATTITUDE * HELD_ATTITUDE * held
+        Q[ERROR.gyroscope_bias + i, ERROR.gyroscope_bias + i] += noise.gyroscope_walk * dt
+        Q[ERROR.accelerometer_bias + i, ERROR.accelerometer_bias + i] += noise.accelerometer_walk * dt
 
 
 @kernel
@@ -518,17 +521,18 @@ def propagate_inertial(
 def correct_inertial(
     position: Vector, velocity: Vector, dcm: Matrix, bias: Vector, calibration: Vector, dx: Vector
 ) -> None:
-    """Add the correction ``dx`` to a state, in place; the attitude is turned by ``exp(dx[6:9] x)`` from the left."""
+    """Add the correction ``dx`` to a state, in place; the attitude is turned by ``exp(r x)`` from the left."""
     meridian, prime = radii_scalar(sin(position[0]))
-    position[1] += dx[1] / ((prime + position[2]) * cos(position[0]))
-    position[0] += dx[0] / (meridian + position[2])
-    position[2] -= dx[2]
-    r0, r1, r2 = dx[6], dx[7], dx[8]
+    north, east, down = dx[ERROR.position], dx[ERROR.position + 1], dx[ERROR.position + 2]
+    position[1] += east / ((prime + position[2]) * cos(position[0]))
+    position[0] += north / (meridian + position[2])
+    position[2] -= down
+    r0, r1, r2 = dx[ERROR.attitude], dx[ERROR.attitude + 1], dx[ERROR.attitude + 2]
     a, b = rotation_coefficients(r0 * r0 + r1 * r1 + r2 * r2)
     rotate_left(dcm, r0, r1, r2, a, b, dcm)
     for j in range(3):
-        velocity[j] += dx[3 + j]
+        velocity[j] += dx[ERROR.velocity + j]
     for j in range(6):
-        bias[j] += dx[9 + j]
+        bias[j] += dx[ERROR.gyroscope_bias + j]
     for j in range(calibration.size):
-        calibration[j] += dx[15 + j]
+        calibration[j] += dx[ERROR.calibration + j]

@@ -48,12 +48,9 @@ from .ship_kernels import (
     HEADING,
     LOG,
     POSITION,
-    PSI,
+    SHIP,
     SHIP_NOISE,
     VELOCITY,
-    E,
-    N,
-    U,
     advance_ship,
     correct_ship,
     correct_ships,
@@ -65,7 +62,7 @@ from .ship_kernels import (
 from .ship_observation import HEEL, VERTICAL_SPEED, ShipObservation, ShipReadings
 from .state_blocks import StateBlocks
 
-__all__ = ["OBSERVED", "POSITIONS", "E", "N", "ShipModel"]
+__all__ = ["OBSERVED", "POSITIONS", "ShipModel"]
 
 #: Measurement equations (`simnav.kinds.EQUATIONS`) that the model knows.
 POSITIONS = (kinds.POSITION, kinds.HORIZONTAL_POSITION)
@@ -132,7 +129,7 @@ class ShipModel(MovingModel):
             self._bind()
 
     def _bind(self) -> None:
-        """Name the blocks of the flat state; x has u, psi, r, c and biases at their indices."""
+        """Name the blocks of the flat state."""
         self._clock, self.position, self.x = ship_state.function(self.numbers)
 
     @property
@@ -188,7 +185,7 @@ class ShipModel(MovingModel):
         self.instruments = instruments = with_lever_arms(instruments, drifting=False)
         if not any(self.observes(s) for s in instruments.values()):
             raise UnsuitableScenario("the ship model needs GNSS, a compass or a log; there is none of them")
-        self.blocks = StateBlocks(U)
+        self.blocks = StateBlocks(SHIP.speed)
         for block in self._motion():
             self.blocks.add("ship", block.name, block.rates())
         self.bias_at: dict[str, int] = {}
@@ -197,8 +194,11 @@ class ShipModel(MovingModel):
             self._calibrate(sheet)
         self.blocks.bring(s for s in instruments.values() if has_measurement_function(s) and self.observes(s))
         self.size = n = self.blocks.size
-        variance, decay, density = self.blocks.columns(U)
-        self.decay, self.density = np.concatenate([[0.0, 0.0], decay]), np.concatenate([[0.0, 0.0], density])
+        variance, decay, density = self.blocks.columns(SHIP.speed)
+        self.decay, self.density = (
+            np.concatenate([np.zeros(SHIP.speed), decay]),
+            np.concatenate([np.zeros(SHIP.speed), density]),
+        )
         self.transition, self.constants = np.eye(n), filled(SHIP_MOTION, turn_time=self.turn_time)
         self._height_variance = float(start.covariance[2, 2])
         self.numbers = np.zeros(SHIP_NUMBERS + n)
@@ -207,15 +207,15 @@ class ShipModel(MovingModel):
         self.position[:] = start.position
         self._tabulate()
         psi = float(start.attitude[2])
-        self.x[PSI] = psi
+        self.x[SHIP.heading] = psi
         P = np.zeros((n, n))
         P[:2, :2] = start.covariance[:2, :2]
-        P[range(U, n), range(U, n)] = variance
-        P[PSI, PSI] = start.covariance[8, 8]
+        P[range(SHIP.speed, n), range(SHIP.speed, n)] = variance
+        P[SHIP.heading, SHIP.heading] = start.covariance[8, 8]
         # The initial velocity over ground is a measurement of u and c; the prior of u has no information.
-        P[U, U] = 1e4
+        P[SHIP.speed, SHIP.speed] = 1e4
         north, east = start.velocity[:2].tolist()
-        self.x[U] = cos(psi) * north + sin(psi) * east
+        self.x[SHIP.speed] = cos(psi) * north + sin(psi) * east
         residual, H, noise = np.empty(2), np.zeros((2, n)), np.empty((2, 2))
         ground = Aid(VELOCITY, np.zeros(3), -1, -1)
         observe_ship(ground, filled(SHIP_NOISE), self.position, self.x, north, east, residual, H, noise)
@@ -329,7 +329,7 @@ class ShipModel(MovingModel):
 
     def estimate(self, covariance: Array) -> Estimate:
         """Horizontal position and velocity, and heading."""
-        psi = float(self.x[PSI])
+        psi = float(self.x[SHIP.heading])
         velocity, full = np.zeros(3), np.zeros((9, 9))
         describe_ship(self.x, covariance, self.sway, velocity, full)
         full[2, 2], full[5, 5] = self._height_variance, VERTICAL_SPEED**2

@@ -1,8 +1,7 @@
 """Kernels of the ship model: each of its equations once, for one state or for many.
 
-The state is a position (latitude, longitude, height) and a vector x of n numbers: those at the indices `U` to `CE`,
-then biases and scale factors; x[0] and x[1] are zero, or metres north and east of the position where many states share
-it.
+The state is a position (latitude, longitude, height) and a vector x of n numbers: those of the ship (`ShipStates`),
+then biases and scale factors. North and east are zero, or metres from the position where many states share it.
 Equations and sources are those of `simnav.estimators.models.ship`.
 
 An instrument is an `Aid`, whose code is one of `POSITION` to `BODY_VELOCITY`, with figures of its noise (`SHIP_NOISE`).
@@ -25,17 +24,13 @@ from .filtering import Aid
 
 __all__ = [
     "BODY_VELOCITY",
-    "CE",
-    "CN",
     "HEADING",
     "LOG",
     "POSITION",
-    "PSI",
+    "SHIP",
+    "SHIP_NOISE",
     "VELOCITY",
-    "E",
-    "N",
-    "R",
-    "U",
+    "ShipStates",
     "advance_ship",
     "correct_ship",
     "correct_ships",
@@ -47,7 +42,32 @@ __all__ = [
     "sail_ships",
 ]
 
-N, E, U, PSI, R, CN, CE = range(7)
+
+class ShipStates(NamedTuple):
+    """Where the states of the ship are in x, and their errors in rows and columns of matrices.
+
+    Attributes
+    ----------
+    north, east : int
+        Position [m].
+    speed : int
+        Ahead through the water [m/s].
+    heading, turn_rate : int
+        [rad], [rad/s].
+    current_north, current_east : int
+        Current [m/s].
+    """
+
+    north: int = 0
+    east: int = 1
+    speed: int = 2
+    heading: int = 3
+    turn_rate: int = 4
+    current_north: int = 5
+    current_east: int = 6
+
+
+SHIP = ShipStates()
 POSITION, HEADING, LOG, VELOCITY, BODY_VELOCITY = range(5)
 #: The noise of an instrument: variances of its two components and of the sideways velocity; squared scale factor and
 #: squared yaw misalignment that count as noise.
@@ -103,13 +123,13 @@ class ShipStep(NamedTuple):
 @helper
 def sail(x: Array, decay: Array, turning: float, dt: float) -> ShipStep:
     """Move x on by a step."""
-    u, turn = x[U], turning * x[R]
-    middle = x[PSI] + 0.5 * turn
+    u, turn = x[SHIP.speed], turning * x[SHIP.turn_rate]
+    middle = x[SHIP.heading] + 0.5 * turn
     c, s = cos(middle), sin(middle)
-    north, east = dt * (u * c + x[CN]), dt * (u * s + x[CE])
-    for i in range(2, x.size):
+    north, east = dt * (u * c + x[SHIP.current_north]), dt * (u * s + x[SHIP.current_east])
+    for i in range(SHIP.speed, x.size):
         x[i] *= decay[i]
-    x[PSI] += turn
+    x[SHIP.heading] += turn
     return ShipStep(north, east, u, c, s)
 
 
@@ -126,12 +146,12 @@ def carry_rows(M: Array, decay: Array, turning: float, dt: float, u: float, c: f
     """``M = F M`` in place, F the transition matrix of `sail`'s step."""
     n = M.shape[1]
     for j in range(n):
-        turned = turning * M[R, j]
-        aside = u * (M[PSI, j] + 0.5 * turned)
-        M[N, j] += dt * (c * M[U, j] - s * aside + M[CN, j])
-        M[E, j] += dt * (s * M[U, j] + c * aside + M[CE, j])
-        M[PSI, j] += turned
-    for i in range(2, M.shape[0]):
+        turned = turning * M[SHIP.turn_rate, j]
+        aside = u * (M[SHIP.heading, j] + 0.5 * turned)
+        M[SHIP.north, j] += dt * (c * M[SHIP.speed, j] - s * aside + M[SHIP.current_north, j])
+        M[SHIP.east, j] += dt * (s * M[SHIP.speed, j] + c * aside + M[SHIP.current_east, j])
+        M[SHIP.heading, j] += turned
+    for i in range(SHIP.speed, M.shape[0]):
         if decay[i] != 1.0:
             for j in range(n):
                 M[i, j] *= decay[i]
@@ -210,8 +230,8 @@ def move_ships(states: Matrix, rate: Vector, turn_time: float, elapsed: float) -
     for k in range(states.shape[0]):
         for _ in range(steps):
             step = sail(states[k], decay, turning, dt)
-            states[k, N] += step.north
-            states[k, E] += step.east
+            states[k, SHIP.north] += step.north
+            states[k, SHIP.east] += step.east
 
 
 @kernel
@@ -246,9 +266,9 @@ def differ_ships(position: Matrix, x: Matrix, other: Matrix, other_x: Matrix, di
     for k in range(x.shape[0]):
         meridian, prime = radii_scalar(sin(other[k, 0]))
         east = position[k, 1] - other[k, 1]
-        difference[k, N] = (position[k, 0] - other[k, 0]) * (meridian + other[k, 2])
-        difference[k, E] = atan2(sin(east), cos(east)) * (prime + other[k, 2]) * cos(other[k, 0])
-        for i in range(2, x.shape[1]):
+        difference[k, SHIP.north] = (position[k, 0] - other[k, 0]) * (meridian + other[k, 2])
+        difference[k, SHIP.east] = atan2(sin(east), cos(east)) * (prime + other[k, 2]) * cos(other[k, 0])
+        for i in range(SHIP.speed, x.shape[1]):
             difference[k, i] = x[k, i] - other_x[k, i]
 
 
@@ -256,7 +276,7 @@ def differ_ships(position: Matrix, x: Matrix, other: Matrix, other_x: Matrix, di
 def reading(aid: Aid, x: Array) -> tuple[float, float]:
     """What an instrument should read, up to two components; a position in metres from that of the state."""
     kind, at, scale = aid.code, aid.bias_at, aid.scale_at
-    u, psi, r, lx, ly = x[U], x[PSI], x[R], aid.lever_arm[0], aid.lever_arm[1]
+    u, psi, r, lx, ly = x[SHIP.speed], x[SHIP.heading], x[SHIP.turn_rate], aid.lever_arm[0], aid.lever_arm[1]
     a, b = 0.0, 0.0
     if kind == HEADING:
         a = psi
@@ -267,13 +287,14 @@ def reading(aid: Aid, x: Array) -> tuple[float, float]:
     else:
         c, s = cos(psi), sin(psi)
         if kind == POSITION:
-            a, b = x[N] + c * lx - s * ly, x[E] + s * lx + c * ly
+            a, b = x[SHIP.north] + c * lx - s * ly, x[SHIP.east] + s * lx + c * ly
         else:
             ahead, across = u - r * ly, r * lx
             if kind == VELOCITY:
-                a, b = c * ahead - s * across + x[CN], s * ahead + c * across + x[CE]
+                a, b = c * ahead - s * across + x[SHIP.current_north], s * ahead + c * across + x[SHIP.current_east]
             else:
-                a, b = ahead + c * x[CN] + s * x[CE], across - s * x[CN] + c * x[CE]
+                a = ahead + c * x[SHIP.current_north] + s * x[SHIP.current_east]
+                b = across - s * x[SHIP.current_north] + c * x[SHIP.current_east]
     if at >= 0:
         a += x[at]
         if kind == POSITION:
@@ -285,32 +306,33 @@ def reading(aid: Aid, x: Array) -> tuple[float, float]:
 def fill_jacobian(aid: Aid, x: Array, jacobian: Array) -> None:
     """The derivative of `reading`, into a matrix of zeros (or of the same instrument's last one)."""
     kind, at, scale = aid.code, aid.bias_at, aid.scale_at
-    u, psi, r, lx, ly = x[U], x[PSI], x[R], aid.lever_arm[0], aid.lever_arm[1]
+    u, psi, r, lx, ly = x[SHIP.speed], x[SHIP.heading], x[SHIP.turn_rate], aid.lever_arm[0], aid.lever_arm[1]
     if kind == HEADING:
-        jacobian[0, PSI] = 1.0
+        jacobian[0, SHIP.heading] = 1.0
     elif kind == LOG:
         factor = 1.0
         if scale >= 0:
             factor += x[scale]
             jacobian[0, scale] = u - r * ly
-        jacobian[0, U], jacobian[0, R] = factor, -factor * ly
+        jacobian[0, SHIP.speed], jacobian[0, SHIP.turn_rate] = factor, -factor * ly
     else:
         c, s = cos(psi), sin(psi)
         if kind == POSITION:
-            jacobian[0, N], jacobian[1, E] = 1.0, 1.0
-            jacobian[0, PSI], jacobian[1, PSI] = -s * lx - c * ly, c * lx - s * ly
+            jacobian[0, SHIP.north], jacobian[1, SHIP.east] = 1.0, 1.0
+            jacobian[0, SHIP.heading], jacobian[1, SHIP.heading] = -s * lx - c * ly, c * lx - s * ly
         elif kind == VELOCITY:
             ahead, across = u - r * ly, r * lx
-            jacobian[0, U], jacobian[1, U] = c, s
-            jacobian[0, R], jacobian[1, R] = -c * ly - s * lx, -s * ly + c * lx
-            jacobian[0, PSI], jacobian[1, PSI] = -s * ahead - c * across, c * ahead - s * across
-            jacobian[0, CN], jacobian[1, CE] = 1.0, 1.0
+            jacobian[0, SHIP.speed], jacobian[1, SHIP.speed] = c, s
+            jacobian[0, SHIP.turn_rate], jacobian[1, SHIP.turn_rate] = -c * ly - s * lx, -s * ly + c * lx
+            jacobian[0, SHIP.heading], jacobian[1, SHIP.heading] = -s * ahead - c * across, c * ahead - s * across
+            jacobian[0, SHIP.current_north], jacobian[1, SHIP.current_east] = 1.0, 1.0
         else:
-            jacobian[0, U] = 1.0
-            jacobian[0, R], jacobian[1, R] = -ly, lx
-            jacobian[0, PSI], jacobian[1, PSI] = c * x[CE] - s * x[CN], -c * x[CN] - s * x[CE]
-            jacobian[0, CN], jacobian[0, CE] = c, s
-            jacobian[1, CN], jacobian[1, CE] = -s, c
+            jacobian[0, SHIP.speed] = 1.0
+            jacobian[0, SHIP.turn_rate], jacobian[1, SHIP.turn_rate] = -ly, lx
+            jacobian[0, SHIP.heading] = c * x[SHIP.current_east] - s * x[SHIP.current_north]
+            jacobian[1, SHIP.heading] = -c * x[SHIP.current_north] - s * x[SHIP.current_east]
+            jacobian[0, SHIP.current_north], jacobian[0, SHIP.current_east] = c, s
+            jacobian[1, SHIP.current_north], jacobian[1, SHIP.current_east] = -s, c
     if at >= 0:
         jacobian[0, at] = 1.0
         if kind == POSITION:
@@ -376,7 +398,7 @@ def observe_ship(
     residual[1] = b
     noise[0, 1], noise[1, 0], noise[1, 1] = 0.0, 0.0, white.second
     if aid.code == VELOCITY:
-        c, s = cos(x[PSI]), sin(x[PSI])
+        c, s = cos(x[SHIP.heading]), sin(x[SHIP.heading])
         noise[0, 0] += s * s * white.sway
         noise[0, 1] -= s * c * white.sway
         noise[1, 0] -= s * c * white.sway
@@ -400,8 +422,8 @@ def read_ships(aid: Aid, states: Matrix, readings: Matrix) -> None:
 @kernel
 def correct_ship(position: Vector, x: Vector, dx: Vector) -> None:
     """Add the correction ``dx`` (n,) to a state, in place."""
-    displace_ship(position, dx[N], dx[E])
-    for i in range(2, x.size):
+    displace_ship(position, dx[SHIP.north], dx[SHIP.east])
+    for i in range(SHIP.speed, x.size):
         x[i] += dx[i]
 
 
@@ -436,7 +458,8 @@ def describe_ship(x: Vector, covariance: Matrix, sway: float, velocity: Vector, 
     fill_jacobian(aid, x, G)
     rows = np.zeros((5, n))  # of G P, G being of position, velocity, heading
     for j in range(n):
-        rows[0, j], rows[1, j], rows[4, j] = covariance[N, j], covariance[E, j], covariance[PSI, j]
+        rows[0, j], rows[1, j] = covariance[SHIP.north, j], covariance[SHIP.east, j]
+        rows[4, j] = covariance[SHIP.heading, j]
         for k in range(n):
             rows[2, j] += G[0, k] * covariance[k, j]
             rows[3, j] += G[1, k] * covariance[k, j]
@@ -446,9 +469,9 @@ def describe_ship(x: Vector, covariance: Matrix, sway: float, velocity: Vector, 
         for k in range(n):
             x0 += rows[i, k] * G[0, k]
             x1 += rows[i, k] * G[1, k]
-        out[at[i], 0], out[at[i], 1], out[at[i], 8] = rows[i, N], rows[i, E], rows[i, PSI]
+        out[at[i], 0], out[at[i], 1], out[at[i], 8] = rows[i, SHIP.north], rows[i, SHIP.east], rows[i, SHIP.heading]
         out[at[i], 3], out[at[i], 4] = x0, x1
-    c, s = cos(x[PSI]), sin(x[PSI])
+    c, s = cos(x[SHIP.heading]), sin(x[SHIP.heading])
     out[3, 3] += s * s * sway * sway
     out[3, 4] -= s * c * sway * sway
     out[4, 3] -= s * c * sway * sway

@@ -21,7 +21,7 @@ from .ambiguity import innovation_of
 from .base import Linearised
 from .channel_readings import ChannelReadings
 from .measurement_functions import MeasurementFunction
-from .ship_kernels import CE, CN, PSI, E, N, R, U
+from .ship_kernels import SHIP
 
 __all__ = ["HEEL", "VERTICAL_SPEED", "ShipObservation", "ShipReadings"]
 
@@ -79,7 +79,7 @@ class ShipObservation(MeasurementFunction):
             return None
         innovation, jacobian, whole, point = found
         own = whole[:, :9]
-        aside = self._sway**0.5 * (own[:, 4] * cos(x[PSI]) - own[:, 3] * sin(x[PSI]))
+        aside = self._sway**0.5 * (own[:, 4] * cos(x[SHIP.heading]) - own[:, 3] * sin(x[SHIP.heading]))
         noise = self._white + own @ self._unknown @ own.T + np.outer(aside, aside)
         more = self.spread(whole, point)
         return Linearised(innovation, jacobian, noise if more is None else noise + more)
@@ -133,7 +133,8 @@ class ShipObservation(MeasurementFunction):
         predicted = self.predict(point)
         assert predicted is not None, "the model's own state has a reading"
         reading, own = predicted
-        places = displace(position, np.column_stack([errors[:, N], errors[:, E], np.zeros(len(errors))]))
+        north, east = errors[:, SHIP.north], errors[:, SHIP.east]
+        places = displace(position, np.column_stack([north, east, np.zeros(len(errors))]))
         if self.observations is not None:
             states = places, *_kinematics(x + errors)
             differences = np.asarray(self.kind.difference(self.read_many(point, states, errors, 0), reading))
@@ -162,30 +163,30 @@ class ShipReadings(ChannelReadings):
         return states[0].take(row, axis=0), *_kinematics(own)
 
     def _by_navigation(self, derivative: Array, own: Array, jacobian: Array) -> None:
-        c, s, u = np.cos(own[:, PSI, None]), np.sin(own[:, PSI, None]), own[:, U, None]
-        jacobian[:, :, N], jacobian[:, :, E] = derivative[:, :, 0], derivative[:, :, 1]
-        jacobian[:, :, CN], jacobian[:, :, CE] = derivative[:, :, 3], derivative[:, :, 4]
-        jacobian[:, :, U] = derivative[:, :, 3] * c + derivative[:, :, 4] * s
-        jacobian[:, :, PSI] = derivative[:, :, 8] + (derivative[:, :, 4] * c - derivative[:, :, 3] * s) * u
+        c, s, u = np.cos(own[:, SHIP.heading, None]), np.sin(own[:, SHIP.heading, None]), own[:, SHIP.speed, None]
+        jacobian[:, :, SHIP.north], jacobian[:, :, SHIP.east] = derivative[:, :, 0], derivative[:, :, 1]
+        jacobian[:, :, SHIP.current_north], jacobian[:, :, SHIP.current_east] = derivative[:, :, 3], derivative[:, :, 4]
+        jacobian[:, :, SHIP.speed] = derivative[:, :, 3] * c + derivative[:, :, 4] * s
+        jacobian[:, :, SHIP.heading] = derivative[:, :, 8] + (derivative[:, :, 4] * c - derivative[:, :, 3] * s) * u
 
 
 def _kinematics(x: Array) -> tuple[Array, Array, Array]:
     """Velocity, DCM and angular rate of (..., n) states of a ship."""
-    c, s = np.cos(x[..., PSI]), np.sin(x[..., PSI])
+    c, s = np.cos(x[..., SHIP.heading]), np.sin(x[..., SHIP.heading])
     velocity, dcm, turning = np.zeros((*x.shape[:-1], 3)), np.zeros((*x.shape[:-1], 3, 3)), np.zeros((*x.shape[:-1], 3))
-    velocity[..., 0] = x[..., U] * c + x[..., CN]
-    velocity[..., 1] = x[..., U] * s + x[..., CE]
+    velocity[..., 0] = x[..., SHIP.speed] * c + x[..., SHIP.current_north]
+    velocity[..., 1] = x[..., SHIP.speed] * s + x[..., SHIP.current_east]
     dcm[..., 0, 0] = dcm[..., 1, 1] = c
     dcm[..., 0, 1], dcm[..., 1, 0], dcm[..., 2, 2] = -s, s, 1.0
-    turning[..., 2] = x[..., R]
+    turning[..., 2] = x[..., SHIP.turn_rate]
     return velocity, dcm, turning
 
 
 def _navigation(x: Array) -> Array:
     """(9, n) derivative of the navigation state's error with respect to that of the ship's state."""
-    c, s = cos(x[PSI]), sin(x[PSI])
+    c, s = cos(x[SHIP.heading]), sin(x[SHIP.heading])
     G = np.zeros((9, len(x)))
-    G[0, N] = G[1, E] = G[3, CN] = G[4, CE] = G[8, PSI] = 1.0
-    G[3, U], G[3, PSI] = c, -x[U] * s
-    G[4, U], G[4, PSI] = s, x[U] * c
+    G[0, SHIP.north] = G[1, SHIP.east] = G[3, SHIP.current_north] = G[4, SHIP.current_east] = G[8, SHIP.heading] = 1.0
+    G[3, SHIP.speed], G[3, SHIP.heading] = c, -x[SHIP.speed] * s
+    G[4, SHIP.speed], G[4, SHIP.heading] = s, x[SHIP.speed] * c
     return G

@@ -19,11 +19,11 @@ from .base import Linearised
 from .equations import equation_of
 from .filtering import Dynamics, ModelFunctions, Prediction, Readings
 from .propagation import Samples
-from .ship import POSITIONS, E, N, ShipModel
+from .ship import POSITIONS, ShipModel
 from .ship_functions import SHIP_FUNCTIONS, SHIP_MOTION, ship_state
 from .ship_functions import predict as predict_ship
 from .ship_functions import propagate as propagate_ship
-from .ship_kernels import POSITION, U
+from .ship_kernels import POSITION, SHIP
 
 __all__ = ["StandingShip"]
 
@@ -54,8 +54,8 @@ def stand(
         position[i] = place[i]
     waited, waited_before = until - motion.last_fix, begin - motion.last_fix
     grown = speed**2 * (waited**2 - waited_before**2)
-    covariance[N, N] += grown
-    covariance[E, E] += grown
+    covariance[SHIP.north, SHIP.north] += grown
+    covariance[SHIP.east, SHIP.east] += grown
 
 
 @kernel(passed=True)
@@ -65,7 +65,7 @@ def propagate(dynamics: Dynamics, samples: Samples, until: float) -> None:
     begin, place = state.clock[0], state.position.copy()
     if until > begin:
         propagate_ship(dynamics, samples, until)
-        stand(state.position, place, dynamics.covariance, state.x[U], dynamics.constants, begin, until)
+        stand(state.position, place, dynamics.covariance, state.x[SHIP.speed], dynamics.constants, begin, until)
 
 
 @kernel(passed=True)
@@ -107,7 +107,7 @@ class StandingShip(ShipModel):
         begin, place = self.time, self.position.copy()
         if until > begin:
             super().propagate(covariance, until)
-            stand(self.position, place, covariance, float(self.x[U]), self.constants, begin, until)
+            stand(self.position, place, covariance, float(self.x[SHIP.speed]), self.constants, begin, until)
 
     def measure(self, measurement: Measurement) -> Linearised | None:
         """Linearise one measurement; a fix ends the standing."""

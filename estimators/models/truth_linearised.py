@@ -56,13 +56,14 @@ from .declared_errors import errors_of, errors_of_triad
 from .equations import equation_of
 from .error_states import merged, separate_states
 from .inertial import InertialModel, roll_pitch_yaw
+from .inertial_errors import ERROR
 from .propagation import correct_inertial
 from .state_blocks import StateBlocks
 from .truth_linearised_factors import TruthLinearisedFactors
 
 __all__ = ["TruthLinearisedModel"]
 
-_NAV, _INERTIAL = 9, 15
+_NAV, _INERTIAL = ERROR.gyroscope_bias, ERROR.calibration
 #: Times closer than this are one and the same [s].
 _SAME = 1e-6
 #: Three less the trace of a rotation matrix that is a vector product to third order: an angle of 3 mrad.

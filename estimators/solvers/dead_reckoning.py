@@ -21,7 +21,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from math import hypot
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
@@ -49,8 +49,19 @@ SEAWAY = 0.2
 #: Samples beyond these are no measurements of a marine vehicle [rad/s], [m/s^2].
 LARGEST = (50.0, 500.0)
 
-# Error states: position north and east, heading, gyroscope bias, speed bias forward and starboard.
-_N, _E, _PSI, _GYRO, _AHEAD, _ABEAM = range(6)
+
+class _Errors(NamedTuple):
+    """Where the error states are: position, heading, gyroscope bias, and bias of the speed forward and to starboard."""
+
+    north: int = 0
+    east: int = 1
+    heading: int = 2
+    gyroscope: int = 3
+    ahead: int = 4
+    abeam: int = 5
+
+
+_ERROR = _Errors()
 
 
 class DeadReckoningEstimator(Solver):
@@ -102,11 +113,11 @@ class DeadReckoningEstimator(Solver):
 
         P = np.zeros((6, 6))
         P[:2, :2] = start.covariance[:2, :2]
-        P[_PSI, _PSI] = start.covariance[8, 8]
+        P[_ERROR.heading, _ERROR.heading] = start.covariance[8, 8]
         self._gyro_walk = 0.0
         if self._imu is not None:
             drift = bias_of_triad(self._imu.gyroscope, "deg_s")
-            P[_GYRO, _GYRO] = merged(drift)[0].variance
+            P[_ERROR.gyroscope, _ERROR.gyroscope] = merged(drift)[0].variance
             self._gyro_walk = self._imu.gyroscope.random_walk**2 + float(drift.white_density()[0])
         self._covariance = P
         self._use(speeds[0])
@@ -121,8 +132,8 @@ class DeadReckoningEstimator(Solver):
         abeam = float(slow[1]) + (sheet.misalignment[2] * speed) ** 2 if equation.in_body else 0.0
         extra = self.current**2 if equation.through_water else 0.0
         P = self._covariance
-        P[4:, :], P[:, 4:] = 0.0, 0.0
-        P[_AHEAD, _AHEAD], P[_ABEAM, _ABEAM] = ahead + extra, abeam + extra
+        P[_ERROR.ahead :, :], P[:, _ERROR.ahead :] = 0.0, 0.0
+        P[_ERROR.ahead, _ERROR.ahead], P[_ERROR.abeam, _ERROR.abeam] = ahead + extra, abeam + extra
 
     def update(self, measurements: Measurements) -> Estimate:
         """Carry the position on through one step."""
@@ -229,41 +240,43 @@ class DeadReckoningEstimator(Solver):
         P, c = self._covariance, self._dcm
         v = c @ self._body
         F = np.eye(6)
-        F[_N, _PSI], F[_E, _PSI] = -v[1] * dt, v[0] * dt
-        F[_N, _AHEAD], F[_N, _ABEAM] = c[0, 0] * dt, c[0, 1] * dt
-        F[_E, _AHEAD], F[_E, _ABEAM] = c[1, 0] * dt, c[1, 1] * dt
-        F[_PSI, _GYRO] = -dt
+        F[_ERROR.north, _ERROR.heading], F[_ERROR.east, _ERROR.heading] = -v[1] * dt, v[0] * dt
+        F[_ERROR.north, _ERROR.ahead], F[_ERROR.north, _ERROR.abeam] = c[0, 0] * dt, c[0, 1] * dt
+        F[_ERROR.east, _ERROR.ahead], F[_ERROR.east, _ERROR.abeam] = c[1, 0] * dt, c[1, 1] * dt
+        F[_ERROR.heading, _ERROR.gyroscope] = -dt
         P = F @ P @ F.T
         sheet = self._source
         each = float(sheet.sigma[0]) ** 2 * max(dt, 1.0 / sheet.rate) * dt / max(1.0, dt * sheet.rate)
-        P[_N, _N] += each
-        P[_E, _E] += each
-        P[_PSI, _PSI] += self._gyro_walk * dt
+        P[_ERROR.north, _ERROR.north] += each
+        P[_ERROR.east, _ERROR.east] += each
+        P[_ERROR.heading, _ERROR.heading] += self._gyro_walk * dt
         if self._compass is not None:
             # The heading's error is the compass's: it grows no further.
             white = float(self._compass.sigma[0]) ** 2
             if self._imu is not None:
                 white = white / (2.0 * COMPASS_TIME * self._compass.rate) + self._gyro_walk * COMPASS_TIME
             slow = float(with_variance(np.zeros(1), bias_of(self._compass).processes)[0])
-            slow += float(P[_GYRO, _GYRO]) * COMPASS_TIME**2
+            slow += float(P[_ERROR.gyroscope, _ERROR.gyroscope]) * COMPASS_TIME**2
             limit = slow + white
             settled = 1.0 if self._imu is None else min(1.0, 2.0 * dt / COMPASS_TIME)
             shrink = np.ones(6)
-            shrink[_PSI] = (1.0 + settled * (limit / max(float(P[_PSI, _PSI]), 1e-12) - 1.0)) ** 0.5
+            shrink[_ERROR.heading] = (
+                1.0 + settled * (limit / max(float(P[_ERROR.heading, _ERROR.heading]), 1e-12) - 1.0)
+            ) ** 0.5
             P = P * np.outer(shrink, shrink)
         if self._time - self._heard[sheet.name] > SILENCE:
             self._silent = True
-            P[_AHEAD, _AHEAD] += DRIFT**2 * dt
-            P[_ABEAM, _ABEAM] += DRIFT**2 * dt
+            P[_ERROR.ahead, _ERROR.ahead] += DRIFT**2 * dt
+            P[_ERROR.abeam, _ERROR.abeam] += DRIFT**2 * dt
         self._covariance = P
 
     def _estimate(self) -> Estimate:
         c, P, start = self._dcm, self._covariance, self._start
         v = c @ self._body
         G = np.zeros((9, 6))
-        G[0, _N] = G[1, _E] = G[8, _PSI] = 1.0
-        G[3, _PSI], G[3, _AHEAD], G[3, _ABEAM] = -v[1], c[0, 0], c[0, 1]
-        G[4, _PSI], G[4, _AHEAD], G[4, _ABEAM] = v[0], c[1, 0], c[1, 1]
+        G[0, _ERROR.north] = G[1, _ERROR.east] = G[8, _ERROR.heading] = 1.0
+        G[3, _ERROR.heading], G[3, _ERROR.ahead], G[3, _ERROR.abeam] = -v[1], c[0, 0], c[0, 1]
+        G[4, _ERROR.heading], G[4, _ERROR.ahead], G[4, _ERROR.abeam] = v[0], c[1, 0], c[1, 1]
         full = G @ P @ G.T
         sigma = float(self._source.sigma[0])
         full[range(3, 6), range(3, 6)] += sigma**2 + SEAWAY**2

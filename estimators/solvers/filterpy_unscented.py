@@ -26,7 +26,8 @@ from simnav.estimators.composition import Solver
 from simnav.estimators.models.equations import equation_of_kind
 from simnav.estimators.models.measurements import radii, wrap
 from simnav.estimators.models.points import draw_points
-from simnav.estimators.models.ship import OBSERVED, E, N
+from simnav.estimators.models.ship import OBSERVED
+from simnav.estimators.models.ship_kernels import SHIP
 from simnav.estimators.models.ship_points import ShipPoints
 from simnav.geometry.earth import displace
 from simnav.types import Array, Datasheet, Estimate, InitialState, Instruments, Measurement
@@ -34,6 +35,8 @@ from simnav.types import Array, Datasheet, Estimate, InitialState, Instruments, 
 from .filterpy_adapter import FilterpyEstimator
 
 __all__ = ["FilterpyUnscentedEstimator"]
+
+_HORIZONTAL = [SHIP.north, SHIP.east]
 
 
 class FilterpyUnscentedEstimator(Solver, FilterpyEstimator):
@@ -109,8 +112,8 @@ class FilterpyUnscentedEstimator(Solver, FilterpyEstimator):
     def _settle(self, kf: Any) -> None:
         """Put the model where the filter is: its noise depends on the state."""
         self.model.x[:] = kf.x
-        self.model.x[[N, E]] = 0.0
-        self.model.position[:] = displace(self.origin, np.array([kf.x[N], kf.x[E], 0.0]))
+        self.model.x[_HORIZONTAL] = 0.0
+        self.model.position[:] = displace(self.origin, np.array([kf.x[SHIP.north], kf.x[SHIP.east], 0.0]))
 
     def _move(self, x: Array, dt: float) -> Array:
         states = x[None, :].copy()
@@ -118,12 +121,12 @@ class FilterpyUnscentedEstimator(Solver, FilterpyEstimator):
         # Metres at the origin's radii, as the adapter gives positions.
         latitude, _, height = self.origin.tolist()
         meridian, prime = radii(latitude)
-        here = latitude + float(x[N]) / (meridian + height)
+        here = latitude + float(x[SHIP.north]) / (meridian + height)
         own_meridian, own_prime = radii(here)
-        step = states[0, [N, E]] - x[[N, E]]
+        step = states[0, _HORIZONTAL] - x[_HORIZONTAL]
         step[0] *= (meridian + height) / (own_meridian + height)
         step[1] *= (prime + height) * cos(latitude) / ((own_prime + height) * cos(here))
-        states[0, [N, E]] = x[[N, E]] + step
+        states[0, _HORIZONTAL] = x[_HORIZONTAL] + step
         return np.asarray(states[0])
 
     def _read(self, x: Array) -> Array:

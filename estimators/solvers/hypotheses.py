@@ -16,6 +16,7 @@ import numpy as np
 from simnav.estimators.adaptations.base import Adaptation, Innovation
 from simnav.estimators.algebra.chi_square import chi_square_limits, normal_quantile
 from simnav.estimators.algebra.direct_update import normalised_square
+from simnav.estimators.models.inertial_errors import ERROR
 from simnav.types import Array, Estimate, InitialState, Instruments
 
 from .kalman import KalmanEstimator
@@ -32,8 +33,6 @@ _TILT, _HEADING = radians(5.0), radians(45.0)
 _DISTURBED_RATE, _DISTURBED_FORCE = radians(0.5), 0.5
 #: Factor on the variances of position and velocity if the motion is assumed to be wrong.
 _LOOSENED = 100.0
-#: Index of the bias of the vertical gyroscope in the state of an inertial model.
-_VERTICAL_GYROSCOPE = 11
 #: A measurement less probable than this is a gross error, unless its instrument goes on so for `_PATIENCE` seconds.
 _NOT_GROSS, _PATIENCE = 0.99999, 5.0
 #: Probability that two improbable measurements of white noise are not found to have a common direction.
@@ -182,8 +181,8 @@ class Hypothesis:
         self.filter.take_over(other)
         self.estimate = self.origin = estimate
         self.start = start
-        variances = other.covariance.diagonal()
-        self.drift = float(variances[_VERTICAL_GYROSCOPE]) if len(variances) > _VERTICAL_GYROSCOPE else 0.0
+        variances, vertical_gyroscope = other.covariance.diagonal(), ERROR.gyroscope_bias + 2
+        self.drift = float(variances[vertical_gyroscope]) if len(variances) > vertical_gyroscope else 0.0
 
     def turn(self, noise: float) -> None:
         """Increase the variance of the heading to at least that of the gyroscopes alone.

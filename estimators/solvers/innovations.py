@@ -22,15 +22,17 @@ from simnav.estimators.algebra.joseph import joseph_update
 from simnav.estimators.models.filtering import Dynamics, Prediction, Readings
 from simnav.estimators.models.propagation import Samples
 from simnav.kinds import MOST_COMPONENTS
+from simnav.structures import length, structure
 from simnav.types import Array, InitialState, Instruments, Measurement
 
 from .kalman import FilterFunctions, KalmanEstimator
 
 __all__ = ["InnovationKeeper", "KeptInnovation", "correct_and_keep"]
 
-#: Readings that a call of the loop uses at most, and the numbers that are kept of each: its components (0: it was not
-#: used), its innovation and the elements of its covariance.
-_READINGS, _NUMBERS = 512, 1 + MOST_COMPONENTS + MOST_COMPONENTS**2
+#: Readings that a call of the loop uses at most.
+_READINGS = 512
+#: What is kept of each: its components (0: it was not used), its innovation, and the covariance of that.
+KEPT = structure(components=int, innovation=MOST_COMPONENTS, covariance=(MOST_COMPONENTS, MOST_COMPONENTS))
 
 
 class KeptInnovation(NamedTuple):
@@ -57,14 +59,14 @@ class KeptInnovation(NamedTuple):
 @kernel(passed=True)
 def correct_and_keep(dynamics: Dynamics, choice: Choice, readings: Readings, k: int, prediction: Prediction) -> float:
     """As `simnav.estimators.solvers.filter_step.correct`; the innovation goes to row k of ``choice.last``."""
-    d, row = prediction.innovation.size, choice.last[k]
+    d, kept = prediction.innovation.size, choice.last[k].view(KEPT)[0]
     spread = np.empty((d, d))
     for a in range(d):
         for b in range(d):
-            spread[a, b] = row[1 + d + a * d + b] = prediction.predicted[a, b] + prediction.noise[a, b]
-        row[1 + a] = prediction.innovation[a]
+            spread[a, b] = kept.covariance[a, b] = prediction.predicted[a, b] + prediction.noise[a, b]
+        kept.innovation[a] = prediction.innovation[a]
     nis = joseph_update(dynamics.covariance, prediction.cross, spread, prediction.innovation, dynamics.correction)
-    row[0] = float(d) if nis >= 0.0 else 0.0
+    kept.components = d if nis >= 0.0 else 0
     return nis
 
 
@@ -90,7 +92,7 @@ class InnovationKeeper(KalmanEstimator):
 
     def choice(self, instruments: Instruments) -> Choice:
         """That of a filter without an adaptation, with room for innovations."""
-        self._room = np.zeros((_READINGS, _NUMBERS))
+        self._room = np.zeros((_READINGS, length(KEPT)))
         return replace(super().choice(instruments), last=self._room)
 
     def _use(
@@ -104,10 +106,10 @@ class InnovationKeeper(KalmanEstimator):
         for first in range(0, max(len(measurements), 1), _READINGS):
             part = measurements[first : first + _READINGS]
             last = first + _READINGS >= len(measurements)
-            self._room[:, 0] = 0.0
+            room = self._room.view(KEPT)[:, 0]
+            room["components"] = 0
             super()._use(part, samples, until if last else min(part[-1].time, until), flagged)
-            for m, row in zip(part, self._room, strict=False):
-                if d := int(row[0]):
-                    self.kept.append(KeptInnovation(
-                        m.instrument, m.time, row[1 : 1 + d].copy(), row[1 + d : 1 + d + d * d].reshape(d, d).copy()
-                    ))  # fmt: skip
+            for m, kept in zip(part, room, strict=False):
+                if d := int(kept["components"]):
+                    innovation, covariance = kept["innovation"][:d].copy(), kept["covariance"][:d, :d].copy()
+                    self.kept.append(KeptInnovation(m.instrument, m.time, innovation, covariance))
