@@ -28,6 +28,7 @@ from .equations import equation_of
 from .error_states import with_variance
 from .filtering import Aid, AidTable, Dynamics, ModelFunctions, Prediction, Readings, aid_table
 from .function_model import FunctionModel
+from .inertial_errors import ERROR
 from .propagation import Samples
 
 __all__ = ["KinematicModel"]
@@ -68,17 +69,17 @@ def propagate(dynamics: Dynamics, samples: Samples, until: float) -> None:
     _displace(state.position, velocity[0] * dt, velocity[1] * dt, velocity[2] * dt)
     state.time = until
     for i in range(3):
-        F[i, 3 + i] = dt
+        F[i, ERROR.velocity + i] = dt
         for j in range(6):
-            P[i, j] += dt * P[3 + i, j]
+            P[i, j] += dt * P[ERROR.velocity + i, j]
     for i in range(6):
         for j in range(3):
             P[i, j] += dt * P[i, 3 + j]
     for i in range(3):
         P[i, i] += q * dt * dt * dt / 3.0
-        P[i, 3 + i] += q * dt * dt / 2.0
-        P[3 + i, i] += q * dt * dt / 2.0
-        P[3 + i, 3 + i] += q * dt
+        P[i, ERROR.velocity + i] += q * dt * dt / 2.0
+        P[ERROR.velocity + i, i] += q * dt * dt / 2.0
+        P[ERROR.velocity + i, ERROR.velocity + i] += q * dt
 
 
 @kernel(passed=True)
@@ -89,7 +90,7 @@ def predict(dynamics: Dynamics, readings: Readings, k: int, prediction: Predicti
     H = np.zeros((3, 6))
     if aids.code[row] == A_VELOCITY:
         for i in range(3):
-            innovation[i], H[i, 3 + i] = value[i] - velocity[i], 1.0
+            innovation[i], H[i, ERROR.velocity + i] = value[i] - velocity[i], 1.0
     else:
         if hypot(velocity[0], velocity[1]) > SLOWEST:
             state.heading = atan2(velocity[1], velocity[0])
@@ -113,9 +114,9 @@ def predict(dynamics: Dynamics, readings: Readings, k: int, prediction: Predicti
 def retract(dynamics: Dynamics) -> None:
     """Add the correction to the state."""
     state, dx = dynamics.numbers.view(STATE)[0], dynamics.correction
-    _displace(state.position, dx[0], dx[1], dx[2])
+    _displace(state.position, dx[ERROR.position], dx[ERROR.position + 1], dx[ERROR.position + 2])
     for i in range(3):
-        state.velocity[i] += dx[3 + i]
+        state.velocity[i] += dx[ERROR.velocity + i]
 
 
 @kernel(passed=True)

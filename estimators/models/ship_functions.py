@@ -40,14 +40,17 @@ class ShipState(NamedTuple):
 #: Figures of the motion: correlation time of the turn rate [s]. Of a ship that stands still without a fix: time after
 #: the last fix from which it stands, and the time of the last fix [s].
 SHIP_MOTION = structure(turn_time=float, patience=float, last_fix=float)
+#: A flat state of a ship, behind which are its n other states; the blocks are those of `ShipState`.
+SHIP_STATE = structure(clock=1, position=3)
 #: Numbers of a flat state before its n states, and of the noise of an instrument.
-SHIP_NUMBERS, SHIP_NOISE_NUMBERS = 4, length(SHIP_NOISE)
+SHIP_NUMBERS, SHIP_NOISE_NUMBERS = length(SHIP_STATE), length(SHIP_NOISE)
 
 
 @helper
 def ship_state(numbers: Array) -> ShipState:
     """The named blocks of a flat state, as views."""
-    return ShipState(numbers[0:1], numbers[1:4], numbers[SHIP_NUMBERS:])
+    own = numbers[:SHIP_NUMBERS].view(SHIP_STATE)[0]
+    return ShipState(own.clock[:], own.position[:], numbers[SHIP_NUMBERS:])
 
 
 @kernel(passed=True)

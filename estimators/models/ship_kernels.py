@@ -21,6 +21,7 @@ from simnav.structures import structure
 from simnav.types import Array
 
 from .filtering import Aid
+from .inertial_errors import ERROR
 
 __all__ = [
     "BODY_VELOCITY",
@@ -449,7 +450,7 @@ def describe_ship(x: Vector, covariance: Matrix, sway: float, velocity: Vector, 
     velocity : (3,) array
         North and east are overwritten.
     out : (9, 9) array
-        Rows and columns 0, 1, 3, 4 and 8 are overwritten.
+        Rows and columns of horizontal position, horizontal velocity and heading are overwritten (`InertialErrors`).
     """
     n = x.size
     aid = Aid(VELOCITY, np.zeros(3), -1, -1)
@@ -463,16 +464,18 @@ def describe_ship(x: Vector, covariance: Matrix, sway: float, velocity: Vector, 
         for k in range(n):
             rows[2, j] += G[0, k] * covariance[k, j]
             rows[3, j] += G[1, k] * covariance[k, j]
-    at = (0, 1, 3, 4, 8)
+    north, east, heading = ERROR.position, ERROR.position + 1, ERROR.attitude + 2
+    northward, eastward = ERROR.velocity, ERROR.velocity + 1
+    at = (north, east, northward, eastward, heading)
     for i in range(5):
         x0, x1 = 0.0, 0.0
         for k in range(n):
             x0 += rows[i, k] * G[0, k]
             x1 += rows[i, k] * G[1, k]
-        out[at[i], 0], out[at[i], 1], out[at[i], 8] = rows[i, SHIP.north], rows[i, SHIP.east], rows[i, SHIP.heading]
-        out[at[i], 3], out[at[i], 4] = x0, x1
+        out[at[i], north], out[at[i], east] = rows[i, SHIP.north], rows[i, SHIP.east]
+        out[at[i], northward], out[at[i], eastward], out[at[i], heading] = x0, x1, rows[i, SHIP.heading]
     c, s = cos(x[SHIP.heading]), sin(x[SHIP.heading])
-    out[3, 3] += s * s * sway * sway
-    out[3, 4] -= s * c * sway * sway
-    out[4, 3] -= s * c * sway * sway
-    out[4, 4] += c * c * sway * sway
+    out[northward, northward] += s * s * sway * sway
+    out[northward, eastward] -= s * c * sway * sway
+    out[eastward, northward] -= s * c * sway * sway
+    out[eastward, eastward] += c * c * sway * sway

@@ -20,6 +20,7 @@ from simnav.types import NO_SIDE, Array, Datasheet
 from .ambiguity import innovation_of
 from .base import Linearised
 from .channel_readings import ChannelReadings
+from .inertial_errors import ERROR
 from .measurement_functions import MeasurementFunction
 from .ship_kernels import SHIP
 
@@ -79,7 +80,8 @@ class ShipObservation(MeasurementFunction):
             return None
         innovation, jacobian, whole, point = found
         own = whole[:, :9]
-        aside = self._sway**0.5 * (own[:, 4] * cos(x[SHIP.heading]) - own[:, 3] * sin(x[SHIP.heading]))
+        by_north, by_east = own[:, ERROR.velocity], own[:, ERROR.velocity + 1]
+        aside = self._sway**0.5 * (by_east * cos(x[SHIP.heading]) - by_north * sin(x[SHIP.heading]))
         noise = self._white + own @ self._unknown @ own.T + np.outer(aside, aside)
         more = self.spread(whole, point)
         return Linearised(innovation, jacobian, noise if more is None else noise + more)
@@ -164,10 +166,12 @@ class ShipReadings(ChannelReadings):
 
     def _by_navigation(self, derivative: Array, own: Array, jacobian: Array) -> None:
         c, s, u = np.cos(own[:, SHIP.heading, None]), np.sin(own[:, SHIP.heading, None]), own[:, SHIP.speed, None]
-        jacobian[:, :, SHIP.north], jacobian[:, :, SHIP.east] = derivative[:, :, 0], derivative[:, :, 1]
-        jacobian[:, :, SHIP.current_north], jacobian[:, :, SHIP.current_east] = derivative[:, :, 3], derivative[:, :, 4]
-        jacobian[:, :, SHIP.speed] = derivative[:, :, 3] * c + derivative[:, :, 4] * s
-        jacobian[:, :, SHIP.heading] = derivative[:, :, 8] + (derivative[:, :, 4] * c - derivative[:, :, 3] * s) * u
+        by_north, by_east = derivative[:, :, ERROR.velocity], derivative[:, :, ERROR.velocity + 1]
+        jacobian[:, :, SHIP.north] = derivative[:, :, ERROR.position]
+        jacobian[:, :, SHIP.east] = derivative[:, :, ERROR.position + 1]
+        jacobian[:, :, SHIP.current_north], jacobian[:, :, SHIP.current_east] = by_north, by_east
+        jacobian[:, :, SHIP.speed] = by_north * c + by_east * s
+        jacobian[:, :, SHIP.heading] = derivative[:, :, ERROR.attitude + 2] + (by_east * c - by_north * s) * u
 
 
 def _kinematics(x: Array) -> tuple[Array, Array, Array]:
@@ -186,7 +190,9 @@ def _navigation(x: Array) -> Array:
     """(9, n) derivative of the navigation state's error with respect to that of the ship's state."""
     c, s = cos(x[SHIP.heading]), sin(x[SHIP.heading])
     G = np.zeros((9, len(x)))
-    G[0, SHIP.north] = G[1, SHIP.east] = G[3, SHIP.current_north] = G[4, SHIP.current_east] = G[8, SHIP.heading] = 1.0
-    G[3, SHIP.speed], G[3, SHIP.heading] = c, -x[SHIP.speed] * s
-    G[4, SHIP.speed], G[4, SHIP.heading] = s, x[SHIP.speed] * c
+    north, east = ERROR.velocity, ERROR.velocity + 1
+    G[ERROR.position, SHIP.north] = G[ERROR.position + 1, SHIP.east] = G[ERROR.attitude + 2, SHIP.heading] = 1.0
+    G[north, SHIP.current_north] = G[east, SHIP.current_east] = 1.0
+    G[north, SHIP.speed], G[north, SHIP.heading] = c, -x[SHIP.speed] * s
+    G[east, SHIP.speed], G[east, SHIP.heading] = s, x[SHIP.speed] * c
     return G
