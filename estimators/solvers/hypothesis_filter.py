@@ -43,11 +43,14 @@ class Step(NamedTuple):
         The admitted measurements, in order of their times.
     until : float
         End of the step [s].
+    saturated : float
+        The largest rate at which a gyroscope saturates in it [rad/s]; 0 where none does.
     """
 
     imu: ImuSamples | None
     readings: Sequence[Measurement]
     until: float
+    saturated: float = 0.0
 
 
 @kernel(passed=True)
@@ -105,7 +108,8 @@ class HypothesisFilter(ImmEstimator):
         """Take one step's measurements."""
         self.model.load(step.imu)
         self._clear()
-        self._advance(step.readings, step.until, [])
+        with self.model.saturated(step.saturated):
+            self._advance(step.readings, step.until, [])
 
     def estimate(self) -> Estimate:
         """The estimate at the end of the step."""

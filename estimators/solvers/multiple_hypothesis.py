@@ -60,6 +60,7 @@ from .hypotheses import uncertain_start
 from .hypothesis_filter import HypothesisFilter, Step
 from .innovation_consistency import TEST, add_square, begun_test, end_epoch, is_inconsistent
 from .kalman import KalmanEstimator
+from .saturation import Saturation
 from .state_difference import differences, displaced
 
 __all__ = ["KINDS", "Kind", "MultipleHypothesis"]
@@ -260,6 +261,7 @@ class MultipleHypothesis(Solver):
         self._next = start.time + self.period
         self._trusted = self._watch = start.time + TRUST
         self._admission = Admission(instruments, first.names)
+        self._saturation = Saturation(instruments.imu, self._trusted)
         self._test = begun_test()
         self._gross, self._owners = chi_square_limits(GROSS), owners(instruments)
         self._blank = {f"{label}.{name}": nan for name in first.names for label in ("innovation", "nis")}
@@ -278,7 +280,7 @@ class MultipleHypothesis(Solver):
     def update(self, measurements: Measurements) -> Estimate:
         """Take one step's measurements, each at its own time."""
         admitted = self._admission.admit(measurements, self.best.model.time)
-        step = Step(measurements.imu, admitted, measurements.time)
+        step = Step(measurements.imu, admitted, measurements.time, self._saturation.largest(measurements.imu))
         for h in self._hypotheses:
             h.filter.advance(step)
             h.weight += h.filter.evidence if isfinite(h.filter.evidence) else -inf
@@ -330,8 +332,9 @@ class MultipleHypothesis(Solver):
         if watched:
             self._watch = time + WATCH
         known = anchor.kinds.values()
+        wrong = IMU in anchor.doubts or any(step.saturated for step in self._period.steps)
         for name, kind in self._kinds.items():
-            if IMU in anchor.doubts and kind.doubt.group not in (IMU, ""):
+            if wrong and kind.doubt.group not in (IMU, ""):
                 continue  # what a wrong IMU predicts condemns no other instrument
             if surprised or (watched and kind.watched and name not in known):
                 length = WATCH if kind.watched and not surprised else self.period
