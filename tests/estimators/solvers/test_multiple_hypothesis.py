@@ -28,7 +28,7 @@ SHORT = tomllib.loads((Path(__file__).parents[2] / "cases" / "short.toml").read_
 
 
 def recorded(fault=None, seed=3, instruments=None, **tables):
-    """A minute and a half of a ship with IMU, GNSS, DVL and compass; ``instruments`` change some, None takes one off."""
+    """A minute and a half of a ship with IMU, GNSS, DVL and compass; ``instruments`` changes some (None: none)."""
     table = deepcopy(SHORT)
     table |= {"duration_s": 90.0, "water_depth_m": 30.0, **tables}
     table["instruments"]["imu"] |= {
