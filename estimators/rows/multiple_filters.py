@@ -113,8 +113,8 @@ class MultipleHypothesisEkf(Row, solver=MultipleHypothesis, model=DoubtedInstrum
     It says which instrument is wrong, since when and with which probability (diagnostics ``doubt.NAME`` and
     ``since.NAME``), and flags the measurements of one that is.
 
-    Do not use it beside gyroscopes that saturate at every roll: on ``imu-clipping`` it has several times the error of
-    ``ekf``. Beside a receiver alone a fix that is wrong for minutes cannot be told from a wrong IMU. With two
+    Gyroscopes that saturate are known by readings that repeat, but not where they do so from the start. Beside a
+    receiver alone a fix that is wrong for minutes cannot be told from a wrong IMU. With two
     instruments wrong at once it may blame a third one, as ``training-voyages`` 51007 and 51021 show (a wrong fix, and a
     DVL that reports zero).
 

@@ -21,15 +21,30 @@ from simnav.estimators.adaptations.prediction import PredictionTest
 from simnav.estimators.algebra.mixture import mixture_update
 from simnav.estimators.models.doubted_instruments import DoubtingModel
 from simnav.estimators.models.filtering import Dynamics, Prediction, Readings
+from simnav.estimators.models.roles import fixes_and_logs
 from simnav.types import Estimate, ImuSamples, InitialState, Instruments, Measurement
 
 from .imm import ImmEstimator
 from .kalman import FilterFunctions
 
-__all__ = ["FULL", "HypothesisFilter", "Step"]
+__all__ = ["FULL", "RARE", "HypothesisFilter", "Step", "lone_fix"]
 
 #: Readings of an instrument per second that count fully as evidence.
 FULL = 1.0
+#: A fix of a lower rate is rare [Hz]. Chosen on voyages of its own, see docs/explanation/hypotheses.md.
+RARE = 0.5
+
+
+def lone_fix(instruments: Instruments) -> str:
+    """Name of a rare fix that has neither another fix nor a log beside it, but an IMU; empty if there is none.
+
+    From one such fix to the next the error of the IMU grows as far as that of a wrong fix, so nothing tells them apart.
+    """
+    group = fixes_and_logs(instruments)
+    if instruments.imu is None or len(group) != 1:
+        return ""
+    ((name, is_fix),) = group.items()
+    return name if is_fix and instruments[name].rate < RARE else ""
 
 
 class Step(NamedTuple):
@@ -43,11 +58,14 @@ class Step(NamedTuple):
         The admitted measurements, in order of their times.
     until : float
         End of the step [s].
+    saturated : float
+        The largest rate at which a gyroscope saturates in it [rad/s]; 0 where none does.
     """
 
     imu: ImuSamples | None
     readings: Sequence[Measurement]
     until: float
+    saturated: float = 0.0
 
 
 @kernel(passed=True)
@@ -98,14 +116,21 @@ class HypothesisFilter(ImmEstimator):
         return super().functions()._replace(correct=correct_with_evidence)
 
     def choice(self, instruments: Instruments) -> Choice:
-        """As of `ImmEstimator`, but without tests of the prediction: that the IMU is wrong is another hypothesis."""
-        return replace(super().choice(instruments), tested=PredictionTest(instruments, together=0).tested(0))
+        """As of `ImmEstimator`, but without tests of the prediction: that the IMU is wrong is another hypothesis.
+
+        The noise of a lone fix (`lone_fix`) has one level.
+        """
+        choice = replace(super().choice(instruments), tested=PredictionTest(instruments, together=0).tested(0))
+        if name := lone_fix(instruments):
+            choice.settings[list(instruments).index(name), : len(self._variances)] = 1.0
+        return choice
 
     def advance(self, step: Step) -> None:
         """Take one step's measurements."""
         self.model.load(step.imu)
         self._clear()
-        self._advance(step.readings, step.until, [])
+        with self.model.saturated(step.saturated):
+            self._advance(step.readings, step.until, [])
 
     def estimate(self) -> Estimate:
         """The estimate at the end of the step."""

@@ -18,15 +18,17 @@ jump of a log of many readings a second may be in the middle of a step, so its p
 case. All kinds begin when the leading filter has had larger innovations than its datasheets allow since the anchor. If
 the leading hypothesis doubts a group of instruments, one more says that they are well again from the anchor on: so a
 wrong decision is undone, too. While it doubts the IMU, no other instrument is doubted anew, because a wrong IMU
-predicts wrongly what any of them should measure. If it doubts other instruments and is surprised again, it is asked
-once whether the IMU was wrong instead, from the last anchor at which nothing was doubted. What is less probable than
-exp(-`LEAST`) times the leading one is dropped, as are the least probable of more than `filters`, and of more than
-`ALIKE` with the same doubts.
+predicts wrongly what any of them should measure. Nor is one while a gyroscope saturates, which its own readings say
+(`simnav.estimators.solvers.saturation`): all filters then expect a larger error of the gyroscopes. If it doubts other
+instruments and is surprised again, it is asked once whether the IMU was wrong instead, from the last anchor at which
+nothing was doubted. What is less probable than exp(-`LEAST`) times the leading one is dropped, as are the least
+probable of more than `filters`, and of more than `ALIKE` with the same doubts.
 
 **Prior probabilities.** A fault of each kind begins once in `onset` seconds, or more rarely by the factor of the kind
 (`KINDS`), and lasts for `end` seconds, in the mean. At the start the position is wrong with the probability
 `WRONG_POSITION`, and the attitude, too, with `WRONG_START`. Until `TRUST` seconds have confirmed the start, no fault is
-looked for: an instrument and the start contradict each other, and nothing says which of them is right.
+looked for: an instrument and the start contradict each other, and nothing says which of them is right. The same holds
+of a rare fix that has only the IMU beside it (`lone_fix`): there no fault is looked for at all.
 
 Gross errors and a noise beyond the datasheet need no hypothesis: in each filter the noise of every instrument switches
 between levels (`simnav.estimators.solvers.hypothesis_filter`).
@@ -59,9 +61,10 @@ from simnav.types import Array, Estimate, InitialState, Instruments, Measurement
 
 from .admission import Admission
 from .hypotheses import uncertain_start
-from .hypothesis_filter import HypothesisFilter, Step
+from .hypothesis_filter import HypothesisFilter, Step, lone_fix
 from .innovation_consistency import TEST, add_square, begun_test, end_epoch, is_inconsistent
 from .kalman import KalmanEstimator
+from .saturation import Saturation
 from .state_difference import differences, displaced
 
 __all__ = ["KINDS", "Kind", "MultipleHypothesis"]
@@ -268,12 +271,15 @@ class MultipleHypothesis(Solver):
             anchor.filter.take_over(first)
         self._groups: Mapping[str, tuple[str, ...]] = first.model.groups
         possible = {*self._groups, *([""] if first.model.moving[1].stop > 0 else [])}
+        if lone_fix(instruments):
+            possible = set()  # it and the IMU contradict each other, and nothing says which of them is right
         self._kinds = {name: kind for name, kind in KINDS.items() if kind.doubt.group in possible}
         self._period = _Period(start.time)
         self._since_sound: _Period | None = self._period
         self._next = start.time + self.period
         self._trusted = self._watch = start.time + TRUST
         self._admission = Admission(instruments, first.names)
+        self._saturation = Saturation(instruments.imu, self._trusted)
         self._test = begun_test()
         self._gross, self._owners = chi_square_limits(GROSS), owners(instruments)
         self._blank = {f"{label}.{name}": nan for name in first.names for label in ("innovation", "nis")}
@@ -292,7 +298,7 @@ class MultipleHypothesis(Solver):
     def update(self, measurements: Measurements) -> Estimate:
         """Take one step's measurements, each at its own time."""
         admitted = self._admission.admit(measurements, self.best.model.time)
-        step = Step(measurements.imu, admitted, measurements.time)
+        step = Step(measurements.imu, admitted, measurements.time, self._saturation.largest(measurements.imu))
         for h in self._hypotheses:
             h.filter.advance(step)
             h.weight += h.filter.evidence if isfinite(h.filter.evidence) else -inf
@@ -344,8 +350,9 @@ class MultipleHypothesis(Solver):
         if watched:
             self._watch = time + WATCH
         known = anchor.kinds.values()
+        wrong = IMU in anchor.doubts or any(step.saturated for step in self._period.steps)
         for name, kind in self._kinds.items():
-            if IMU in anchor.doubts and kind.doubt.group not in (IMU, ""):
+            if wrong and kind.doubt.group not in (IMU, ""):
                 continue  # what a wrong IMU predicts condemns no other instrument
             if surprised or (watched and kind.watched and name not in known):
                 length = WATCH if kind.watched and not surprised else self.period

@@ -13,19 +13,22 @@ from scipy.stats import multivariate_normal
 from simnav.estimator import make
 from simnav.estimators.algebra.mixture import mixture_update
 from simnav.estimators.models.doubted_instruments import BiasDoubt, DoubtedInstruments
+from simnav.estimators.solvers.hypothesis_filter import lone_fix
 from simnav.estimators.solvers.multiple_hypothesis import KINDS
+from simnav.estimators.solvers.saturation import Saturation
 from simnav.scenario import Scenario
 from simnav.scoring import score
 from simnav.scoring.navigation_error import errors
 from simnav.source import record
 from simnav.trial import run_trial
+from simnav.types import ImuDatasheet, ImuSamples, TriadDatasheet
 from tests.audit import recommended
 
 SHORT = tomllib.loads((Path(__file__).parents[2] / "cases" / "short.toml").read_text(encoding="utf-8"))
 
 
-def recorded(fault=None, seed=3, **tables):
-    """A minute and a half of a ship with IMU, GNSS, DVL and compass."""
+def recorded(fault=None, seed=3, instruments=None, **tables):
+    """A minute and a half of a ship with IMU, GNSS, DVL and compass; ``instruments`` changes some (None: none)."""
     table = deepcopy(SHORT)
     table |= {"duration_s": 90.0, "water_depth_m": 30.0, **tables}
     table["instruments"]["imu"] |= {
@@ -35,6 +38,11 @@ def recorded(fault=None, seed=3, **tables):
     table["instruments"]["gnss"] |= {"rate_hz": 1.0}
     table["instruments"]["dvl"] = {"rate_hz": 1.0, "sigma_m_s": 0.02}
     table["instruments"]["gyrocompass"] = {"rate_hz": 1.0, "sigma_deg": 0.3}
+    for name, changes in (instruments or {}).items():
+        if changes is None:
+            table["instruments"].pop(name, None)
+        else:
+            table["instruments"][name] = table["instruments"].get(name, {}) | changes
     if fault is not None:
         table["fault"] = [fault]
     return record(Scenario.from_toml(table, source="short"), seed)
@@ -204,3 +212,50 @@ def test_the_audit_says_which_promises_are_kept():
     assert said["mh-ekf: 95 % region, Fixes that lie slowly"] == ("50 %", False)
     assert said["mh-ekf: 95 % region, Nothing wrong"] == ("95 %", True)
     assert said["mh-ekf: time of an update, times ekf"] == ("1.0", True)
+
+
+def test_saturated_gyroscopes_condemn_no_instrument():
+    sea = {"significant_height_m": 8.0, "peak_period_s": 11.0, "direction_deg": 70.0}
+    fault = {"kind": "imu_clipping", "start_s": 40.0, "end_s": 90.0, "angular_rate_limit_deg_s": 1.5}
+    recording = recorded(fault, sea=sea)
+    trial = ran(recording)
+    assert rms(trial, recording) < 0.7 * rms(ran(recording, "ekf"), recording)
+    for name in ("gnss", "dvl", "gyrocompass"):
+        assert trial.diagnostics[f"doubt.{name}"].max() < 0.1
+
+
+def test_a_saturated_reading_is_told_from_a_quiet_and_from_a_coarse_one():
+    sheet = ImuDatasheet(50.0, TriadDatasheet(random_walk=1e-4, range=2.0), TriadDatasheet())
+
+    def samples(time, rate):
+        n = len(rate)
+        rates = np.array([[x, 0.0, 0.0] for x in rate])
+        return ImuSamples(time + 0.02 * np.arange(n), np.full(n, 0.02), rates, np.zeros((n, 3)))
+
+    found = Saturation(sheet, until=30.0)
+    assert found.largest(samples(31.0, [0.1, 0.2])) == 0.0
+    assert found.largest(samples(31.1, [0.2, 0.2])) == 0.2  # also across steps
+    assert found.largest(samples(31.2, [0.1, 0.1, 0.3])) == 0.0
+    assert found.largest(samples(31.3, [1e-4, 1e-4, 1e-4])) == 0.0
+    coarse = Saturation(sheet, until=30.0)
+    coarse.largest(samples(0.0, [0.2, 0.2, 0.2]))
+    assert coarse.largest(samples(31.0, [0.3, 0.3, 0.3])) == 0.0
+    assert coarse.largest(samples(32.0, [2.0])) == 2.0
+    assert Saturation(None, until=30.0).largest(None) == 0.0
+
+
+def test_a_rare_fix_with_the_imu_alone_beside_it_is_believed_like_the_imu():
+    fault = {"kind": "imu_disturbance", "angular_rate_deg_s": 0.3, "start_s": 40.0, "end_s": 60.0}
+    alone = recorded(fault, instruments={"gnss": {"rate_hz": 0.1}, "dvl": None, "gyrocompass": None})
+    trial = ran(alone)
+    assert trial.diagnostics["doubt.gnss"].max() == trial.diagnostics["doubt.imu"].max() == 0.0
+    assert rms(trial, alone) < 1.02 * rms(ran(alone, "ekf"), alone)
+
+
+@pytest.mark.parametrize(
+    ("rate", "beside", "expected"),
+    [(0.1, {}, "gnss"), (1.0, {}, ""), (0.1, {"dvl": {"rate_hz": 1.0, "sigma_m_s": 0.02}}, "")],
+)
+def test_a_fix_is_lone_where_it_is_rare_and_no_log_is_beside_it(rate, beside, expected):
+    instruments = recorded(instruments={"gnss": {"rate_hz": rate}, "dvl": None, **beside}).instruments
+    assert lone_fix(instruments) == expected
