@@ -36,6 +36,7 @@ AROUND = 40.0  # metres around the largest error that the map shows
 PARTS = {
     "satellites": ("satellites-harbour", ("ekf", "ekf-loose"), (0.685, 1.0)),
     "acoustic-positioning": ("usbl-inspection", ("ekf", "gnc-fgo"), (0.0, 0.44)),
+    "hypotheses": ("gnss-spoofing", ("ekf", "mh-ekf"), (0.0, 0.565)),
     "oracle": ("gnss-multipath", ("ekf", "iae", "oracle"), (0.0, 0.48)),
 }
 

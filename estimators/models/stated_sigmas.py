@@ -69,13 +69,13 @@ class _Stated(ErrorModel):
 
 
 @lru_cache(maxsize=64)
-def _stated_class(kind: type[Any]) -> type[Any]:
+def _stated_class(kind: type[object]) -> type[Any]:
     return type(f"Stated{kind.__name__}", (_Stated, kind), {"__module__": __name__})
 
 
-def _blank(kind: type[Any]) -> Any:
-    found = _stated_class(kind)
-    return found.__new__(found)
+def _blank(kind: type[object]) -> Any:
+    found: type[Any] = _stated_class(kind)  # type: ignore[arg-type]  # mypy: a class of Any has no hash
+    return object.__new__(found)
 
 
 def with_stated_sigmas(model: M, instruments: Instruments) -> M:
