@@ -18,13 +18,12 @@ import numpy as np
 from simnav.compiled import kernel
 from simnav.estimators.adaptations.choice import Choice
 from simnav.estimators.adaptations.prediction import PredictionTest
-from simnav.estimators.algebra.mixture import mixture_update
 from simnav.estimators.models.doubted_instruments import DoubtingModel
 from simnav.estimators.models.filtering import Dynamics, Prediction, Readings
 from simnav.estimators.models.roles import fixes_and_logs
 from simnav.types import Estimate, ImuSamples, InitialState, Instruments, Measurement
 
-from .imm import ImmEstimator
+from .imm import ImmEstimator, mix
 from .kalman import FilterFunctions
 
 __all__ = ["FULL", "RARE", "HypothesisFilter", "Step", "lone_fix"]
@@ -73,14 +72,7 @@ def correct_with_evidence(
     dynamics: Dynamics, choice: Choice, readings: Readings, k: int, prediction: Prediction
 ) -> float:
     """Correct the covariance by a mixture of levels, and report the logarithm of the density of the innovation."""
-    i = choice.index[readings.instrument[k]]
-    probability, count = choice.memories[choice.first[i] : choice.first[i + 1]], choice.first[i + 1] - choice.first[i]
-    levels, transition = choice.settings[i, :count], choice.settings[i, count:].reshape((count, count))
-    nis, _, evidence = mixture_update(
-        dynamics.covariance, prediction.cross, prediction.predicted, prediction.nominal, prediction.innovation, levels,
-        transition, probability, dynamics.correction,
-    )  # fmt: skip
-    readings.reported[k] = evidence
+    nis, _, readings.reported[k] = mix(dynamics, choice, readings, k, prediction)
     return nis
 
 

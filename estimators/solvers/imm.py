@@ -8,7 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from simnav.compiled import kernel
+from simnav.compiled import helper, kernel
 from simnav.estimators.adaptations.choice import Choice, choose_noise, keep_nominal
 from simnav.estimators.adaptations.noise_report import NoiseReport
 from simnav.estimators.adaptations.prediction import PredictionTest
@@ -21,7 +21,7 @@ from .filter_step import correct
 from .kalman import FilterFunctions, KalmanEstimator
 from .smoother import Smoother
 
-__all__ = ["ImmEstimator"]
+__all__ = ["ImmEstimator", "mix"]
 
 
 class ImmEstimator(KalmanEstimator):
@@ -126,20 +126,34 @@ class ImmEstimator(KalmanEstimator):
         return report
 
 
+@helper
+def mix(
+    dynamics: Dynamics, choice: Choice, readings: Readings, k: int, prediction: Prediction
+) -> tuple[float, float, float]:
+    """Correct the covariance by the mixture over the levels of an instrument, whose probabilities are updated.
+
+    Returns
+    -------
+    nis, expected, evidence : float
+        As of `simnav.estimators.algebra.mixture.mixture_update`.
+    """
+    i = choice.index[readings.instrument[k]]
+    probability, count = choice.memories[choice.first[i] : choice.first[i + 1]], choice.first[i + 1] - choice.first[i]
+    levels, transition = choice.settings[i, :count], choice.settings[i, count:].reshape((count, count))
+    return mixture_update(
+        dynamics.covariance, prediction.cross, prediction.predicted, prediction.nominal, prediction.innovation, levels,
+        transition, probability, dynamics.correction,
+    )  # fmt: skip
+
+
 @kernel(passed=True)
 def correct_by_mixture(dynamics: Dynamics, choice: Choice, readings: Readings, k: int, prediction: Prediction) -> float:
     """Correct the covariance by a mixture of levels; by the nominal noise where the prediction is wrong."""
     if readings.wrong[k]:
         readings.sigma[k, 0] = np.nan
         return correct(dynamics, choice, readings, k, prediction)
-    i = choice.index[readings.instrument[k]]
-    probability, count = choice.memories[choice.first[i] : choice.first[i + 1]], choice.first[i + 1] - choice.first[i]
-    levels, transition = choice.settings[i, :count], choice.settings[i, count:].reshape((count, count))
-    nis, expected, _ = mixture_update(
-        dynamics.covariance, prediction.cross, prediction.predicted, prediction.nominal, prediction.innovation, levels,
-        transition, probability, dynamics.correction,
-    )  # fmt: skip
-    readings.reported[k] = probability[0]
+    nis, expected, _ = mix(dynamics, choice, readings, k, prediction)
+    readings.reported[k] = choice.memories[choice.first[choice.index[readings.instrument[k]]]]
     for a in range(prediction.innovation.size):
         readings.sigma[k, a] = sqrt(expected * prediction.nominal[a, a])
     return nis
