@@ -53,7 +53,7 @@ from simnav.geometry.rotation import (
     rpy_from_dcm,
 )
 from simnav.kernel_types import Matrix, Vector
-from simnav.types import Array, Estimate, ImuSamples, InitialState, Instruments, Measurements
+from simnav.types import Array, Estimate, InitialState, Instruments, Measurements
 
 __all__ = ["ENOUGH", "LEVELLING", "SPACING_DEG", "WIDER", "CoarseAlignment", "turn"]
 
@@ -144,7 +144,7 @@ class CoarseAlignment:
         Estimate
             Of the end of the step. Its diagnostic ``aligning`` is 1.
         """
-        packet = _kept(measurements)
+        packet = measurements.kept()
         self.packets.append(packet)
         if self._levelled:
             estimate: Estimate = self._filters.update(packet)
@@ -215,12 +215,3 @@ def _with(covariance: Array, variances: tuple[float | None, ...] | list[float | 
             made[k], made[:, k] = 0.0, 0.0
             made[k, k] = variance
     return made
-
-
-def _kept(measurements: Measurements) -> Measurements:
-    """A packet of its own: the buffers of a packet are used again."""
-    imu = measurements.imu
-    if imu is not None:
-        imu = ImuSamples(**{name: np.array(getattr(imu, name)) for name in imu.__dataclass_fields__})
-    aids = [m._replace(value=m.value.copy(), side=m.side.copy()) for m in measurements.aids]
-    return Measurements(measurements.start, measurements.time, imu, aids)

@@ -231,6 +231,10 @@ class Measurement(NamedTuple):
         """The instrument, or ``INSTRUMENT:CHANNEL``: what an estimator flags, weighs and tests by itself."""
         return f"{self.instrument}:{self.channel}" if self.channel else self.instrument
 
+    def kept(self) -> Measurement:
+        """A copy with arrays of its own, for later steps."""
+        return self._replace(value=self.value.copy(), side=self.side.copy())
+
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Measurements:
@@ -264,6 +268,13 @@ class Measurements:
             if m.kind == kind or m.instrument == kind:
                 return m
         return None
+
+    def kept(self) -> Measurements:
+        """A copy with arrays of its own, for later steps: those of a packet belong to its step."""
+        imu = self.imu
+        if imu is not None:
+            imu = ImuSamples(**{name: array.copy() for name, array in vars(imu).items()})
+        return Measurements(self.start, self.time, imu, [m.kept() for m in self.aids])
 
 
 @dataclass(frozen=True, eq=False)

@@ -23,7 +23,7 @@ import copy
 import math
 from collections import defaultdict, deque
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -237,7 +237,7 @@ class LateArrivals:
         for m in [*ahead, *(self._timed(m, end) for m in measurements.aids)]:
             time = m.time
             if time > end + _LATE:
-                self._waiting.append(m._replace(value=m.value.copy(), side=m.side.copy()))
+                self._waiting.append(m.kept())
             elif time > start + TIME_TOLERANCE or (not self._history and time >= start - _LATE):
                 present.append(m)
             elif self.manner == "arrival":
@@ -295,11 +295,7 @@ class LateArrivals:
             self.manner = "arrival"
             steps.clear()
             return
-        imu = packet.imu
-        if imu is not None:  # the buffer of a packet is reused
-            imu = replace(imu, **{name: array.copy() for name, array in vars(imu).items()})
-        aids = [m._replace(value=m.value.copy(), side=m.side.copy()) for m in packet.aids]
-        steps.append(_Step(Measurements(packet.start, packet.time, imu, aids), before))
+        steps.append(_Step(packet.kept(), before))
         self._oldest = next(x.packet.start for x in steps if x.packet.time >= packet.time - self.reach)
         copies = [k for k, x in enumerate(steps) if x.before is not None and x.packet.start <= self._oldest]
         for _ in range(copies[-1]):
@@ -312,7 +308,7 @@ class LateArrivals:
         for m in late:
             k = next(k for k in reversed(range(len(steps))) if m.time > steps[k].packet.start + TIME_TOLERANCE)
             old = steps[k].packet
-            aids = sorted([*old.aids, m._replace(value=m.value.copy(), side=m.side.copy())], key=self._place)
+            aids = sorted([*old.aids, m.kept()], key=self._place)
             steps[k].packet = Measurements(old.start, old.time, old.imu, aids)
             first = min(first, k)
         wanted = {(m.source, m.time) for m in late}
