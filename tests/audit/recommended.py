@@ -38,7 +38,7 @@ __all__ = ["measured", "parts", "rows"]
 ROW, PLAIN, ORACLE, RIVALS = "mh-ekf", "ekf", "oracle", ("iae-fgo", "vb-akf")
 RUNS = int(os.environ.get("SIMNAV_AUDIT_RECOMMENDED_RUNS", "10"))
 FIRST = 9000
-TRACKS = ("aided-ins", "imu-faults", "imu-faults-underwater", "underwater", "generalisation", "recorded")
+TRACKS = ("aided-ins", "underwater", "generalisation", "recorded")
 CLEAN_SCENARIOS = ("open-sea", "mems-only", "sea-state-6", "clean-voyages")
 NEAR, CLEAN, BEYOND, HARM, SLOWER = 1.55, 1.03, 1.15, 1.1, 8.0
 HONEST, HONEST_CLEAN = (0.85, 0.99), (0.90, 0.98)
@@ -112,7 +112,7 @@ def rows(found: Mapping[str, Any]) -> Iterator[tuple[str, str, str, bool]]:
     yield line(f"{ROW}: nothing wrong, times {ORACLE}", CLEAN_SCENARIOS, [ORACLE], CLEAN)
     for name in of("aided-ins"):
         yield line(f"{ROW}: {name}, times the better of {' and '.join(RIVALS)}", [name], RIVALS, BEYOND)
-    yield line(f"{ROW}: the IMU wrong, times {PLAIN}", [*of("imu-faults"), *of("imu-faults-underwater")], [PLAIN], HARM)
+    yield line(f"{ROW}: the IMU wrong, times {PLAIN}", troubles()["imu"].scenarios, [PLAIN], HARM)
     yield line(f"{ROW}: recorded, times {PLAIN}", of("recorded"), [PLAIN], HARM)
     for group in ("underwater", "generalisation"):
         yield line(f"{ROW}: {group}, times the best", of(group), [PLAIN, *RIVALS], BEYOND)

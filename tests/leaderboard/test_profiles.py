@@ -42,16 +42,14 @@ def test_standard_has_the_same_seeds_for_all_rows_of_a_track():
         for scenario in part.scenarios:
             for row in part.estimators:
                 most[scenario, row] = max(part.runs, most.get((scenario, row), 0))
-    later = {"iae-paper", "iae-fgo-paper", "mh-ekf", "net-ekf", "net-fgo", "beams-ekf"}  # with the next edition
-    tracks = {"imu-faults", "imu-faults-underwater", "alignment"}  # likewise
-    assert {s for s, _ in most} == {h.name for h in ranked if h.track not in tracks}
+    assert {s for s, _ in most} == {h.name for h in ranked if h.track != "alignment"}
     chosen = {row for (scenario, row) in most if known[scenario].track in ("papers", "long")}
     assert 20 <= len(chosen) <= 25
     loose = {n for n in names() if getattr(find(n), "loose", False)}
     special = {"satellites": loose, "acoustic": loose, "cooperative": {"ekf-ci"}, "terrain": loose | {"terrain-pmf"}}
     few = {"papers": 10, "long": 10, "coloured": 8, "robustness": 8} | dict.fromkeys(special, 8)
     slow = {"terrain-pmf"}  # the only row that matches soundings with the chart by itself
-    assert {row for _, row in most} == slow | {n for n in names() if not describe(n).slow} - later
+    assert {row for _, row in most} == slow | {n for n in names() if not describe(n).slow}
     for (scenario, row), runs in most.items():
         track = known[scenario].track
         assert runs == (6 if scenario == "twelve-hours" else few.get(track, 30))

@@ -75,8 +75,6 @@ def test_every_scenario_tells_its_reader_what_it_is(header: Header):
         "acoustic",
         "terrain",
         "cooperative",
-        "imu-faults",
-        "imu-faults-underwater",
         "alignment",
     }
     assert scenario.track in tracks | {"training"}
