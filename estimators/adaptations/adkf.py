@@ -16,6 +16,7 @@ from simnav.structures import filled, structure
 from simnav.types import Array, Instruments
 
 from .base import Innovation
+from .inflation import inflate_all, inflate_moving
 from .noise import NoiseAdaptation, Posterior
 from .robust import igg3
 from .rules import copied
@@ -147,7 +148,7 @@ class AdaptiveFactor(NoiseAdaptation):
     factor can be used to inflate the measurement noise"): R/a for each instrument; with the residual statistic and the
     three-segment function these are IGG-III weights. By default the prediction is tested, too. If a fix and a log have
     failed their tests ``together`` times in a row, the prediction is taken as wrong: R is not changed, and the
-    covariance of position, velocity and attitude is inflated (`ErrorModel.loosen`). The covariance of the instruments'
+    covariance of position, velocity and attitude is inflated (`inflate_moving`). The covariance of the instruments'
     errors is not inflated, because these do not depend on the motion. `PredictionTest` also limits every inflation:
     eq. 28 with ten gross errors in a row would multiply the variances of unobserved states by 1e30. The covariance is
     updated in Joseph's form with the noise and P in use (the first line of eq. 29 lacks the factor).
@@ -199,6 +200,7 @@ class AdaptiveFactor(NoiseAdaptation):
         self.together = 0 if self.as_published or target == "P" else together
         self.inflates = target == "P"
         self.inflates_motion = not self.inflates
+        self.inflate = inflate_all if self.inflates else inflate_moving
 
     def reset(self, instruments: Instruments) -> None:
         """Begin a run."""

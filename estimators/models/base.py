@@ -11,7 +11,7 @@ import numpy as np
 
 from simnav.estimates import Estimates
 from simnav.estimator.needs import Needs
-from simnav.estimators.algebra.inflation import MotionStates, inflate_motion
+from simnav.estimators.algebra.inflation import ALL_STATES, MotionStates
 from simnav.geometry.rotation import left_jacobian
 from simnav.types import (
     NO_SIDE,
@@ -93,8 +93,8 @@ class ErrorModel(ABC):
     memory: ClassVar[tuple[str, ...]] = ()
     #: Indices of the attitude, a rotation vector, in the error; None for a model without attitude.
     attitude_at: ClassVar[int | None] = None
-    #: Indices of position and velocity, and of the attitude, which `loosen` inflates. Here all states and none.
-    moving: ClassVar[tuple[slice, slice]] = (slice(None), slice(0, 0))
+    #: The states whose covariance is inflated where the motion is wrong.
+    moving: ClassVar[MotionStates] = ALL_STATES
 
     @property
     def needs(self) -> Needs:
@@ -211,7 +211,7 @@ class ErrorModel(ABC):
             numbers=nothing, covariance=covariance, transition=none, process_noise=none, constants=nothing,
             decay=nothing, density=nothing, first_variances=covariance.diagonal().copy(),
             correction=np.empty(len(covariance)), next_sample=np.zeros(1, np.int64),
-            aids=aid_table([], [], []),
+            aids=aid_table([], [], []), moving=self.moving,
         )  # fmt: skip
 
     @abstractmethod
@@ -239,27 +239,6 @@ class ErrorModel(ABC):
             was not used. None in place of both where the measurements have to be used one by one.
         """
         return None
-
-    def loosen(self, covariance: Array, inflation: float, first: Array) -> None:
-        """Inflate the covariance of position, velocity and attitude in place, if the motion is wrong.
-
-        The prediction is wrong if the motion does not follow the model, or if the IMU is disturbed. Position and
-        velocity are then uncertain. The errors of the instruments have not changed. If their covariance were inflated,
-        too, they would follow the first wrong measurement.
-
-        Parameters
-        ----------
-        covariance : (n, n) array
-            Covariance P of the model's error, updated.
-        inflation : float
-            Factor on the variances, above 1.
-        first : (n,) array
-            Variances at the start of the run. The variance of the attitude is not inflated beyond this, so that
-            corrections stay in the linear range.
-        """
-        motion, attitude = self.moving
-        states = MotionStates(*motion.indices(self.size)[:2], *attitude.indices(self.size)[:2])
-        inflate_motion(covariance, inflation, first, states)
 
     def by_correction(self, jacobian: Array, correction: Array) -> Array:
         """A (m, n) Jacobian at the corrected state, taken with respect to the correction that led there.

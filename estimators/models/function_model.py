@@ -71,6 +71,7 @@ class FunctionModel(ErrorModel):
             numbers=self.numbers, covariance=covariance, transition=np.eye(n), process_noise=np.zeros((n, n)),
             constants=self.constants, decay=_NOTHING, density=_NOTHING, first_variances=covariance.diagonal().copy(),
             correction=np.empty(n), next_sample=np.zeros(1, np.int64), aids=self.table(names),
+            moving=self.moving,
         )  # fmt: skip
 
     def _alone(self) -> Dynamics:

@@ -43,6 +43,7 @@ from simnav.compiled import ready
 from simnav.estimates import Estimates
 from simnav.estimator import UnsuitableScenario
 from simnav.estimator.needs import AID, IMU, Needs
+from simnav.estimators.algebra.inflation import MotionStates
 from simnav.estimators.algebra.joseph import joseph_sequence
 from simnav.geometry.rotation import dcm_from_rpy
 from simnav.structures import filled
@@ -138,14 +139,14 @@ class InertialModel(ErrorModel):
     state = ("position", "velocity", "dcm", "bias", "calibration")
     memory = ("numbers",)
     attitude_at = ERROR.attitude
-    moving = (slice(ERROR.position, ERROR.attitude), slice(ERROR.attitude, ERROR.gyroscope_bias))
-    #: True if the kernels of `simnav.estimators.models.inertial_functions` may replace `measure`, `correct` and
-    #: `loosen`. A model with another form of one of these methods, or of those of points, sets it to False.
+    moving = MotionStates(ERROR.position, ERROR.attitude, ERROR.attitude, ERROR.gyroscope_bias)
+    #: True if the kernels of `simnav.estimators.models.inertial_functions` may replace `measure` and
+    #: `correct`. A model with another form of one of these methods, or of those of points, sets it to False.
     fused: ClassVar[bool] = True
 
     def __init_subclass__(cls) -> None:
         super().__init_subclass__()
-        own = {"measure", "correct", "loosen", "propagate_points", "observe_points"} & vars(cls).keys()
+        own = {"measure", "correct", "propagate_points", "observe_points"} & vars(cls).keys()
         if own and cls.fused and "fused" not in vars(cls):
             raise TypeError(f"{cls.__name__} has {', '.join(sorted(own))} of its own; it has to say: fused = False")
 
@@ -334,7 +335,7 @@ class InertialModel(ErrorModel):
             numbers=self.numbers, covariance=covariance, transition=self.transition, process_noise=self.process_noise,
             constants=self._noise, decay=self._decay, density=self._density,
             first_variances=covariance.diagonal().copy(), correction=np.empty(self.size), next_sample=self.next_sample,
-            aids=self.table(names),
+            aids=self.table(names), moving=self.moving,
         )  # fmt: skip
 
     def table(self, names: Sequence[str]) -> AidTable:

@@ -35,7 +35,6 @@ from simnav.types import Array, Measurement
 from .filtering import Aid, Dynamics, ModelFunctions, Prediction, Readings, aid_of
 from .inertial import InertialModel
 from .inertial_errors import ERROR
-from .inertial_functions import inflate_and_predict as inflate_linearised
 from .inertial_functions import predict as linearise
 from .inertial_functions import propagate as propagate_linearised
 from .inertial_functions import retract, state_of
@@ -279,14 +278,7 @@ def predict(dynamics: Dynamics, readings: Readings, k: int, prediction: Predicti
     return predict_through(linearise, read, dynamics, readings, k, prediction)
 
 
-@kernel(passed=True)
-def inflate_and_predict(dynamics: Dynamics, readings: Readings, k: int, prediction: Prediction) -> None:
-    """Inflate the covariance of position, velocity and attitude, and predict the reading again."""
-    inflate_linearised(dynamics, readings, k, prediction)
-    predict(dynamics, readings, k, prediction)
-
-
-POINT_FUNCTIONS = ModelFunctions(propagate, predict, retract, inflate_and_predict)
+POINT_FUNCTIONS = ModelFunctions(propagate, predict, retract)
 
 
 class InertialPoints(InertialModel, PointModel):

@@ -16,7 +16,6 @@ import numpy as np
 from simnav.compiled import helper, kernel
 from simnav.estimator import UnsuitableScenario
 from simnav.estimator.needs import Needs
-from simnav.estimators.algebra.inflation import MotionStates, inflate_motion
 from simnav.estimators.algebra.joseph import project
 from simnav.geometry.earth import radii_scalar
 from simnav.kinds import POSITION, VELOCITY, kinds_with
@@ -46,7 +45,6 @@ STATE = structure(time=float, position=3, velocity=3, heading=float)
 MOTION = structure(acceleration=float)
 #: What an instrument measures.
 A_POSITION, A_VELOCITY = range(2)
-_ALL = MotionStates(linear=0, linear_end=6, attitude=6, attitude_end=6)
 
 
 @helper
@@ -119,13 +117,6 @@ def retract(dynamics: Dynamics) -> None:
         state.velocity[i] += dx[ERROR.velocity + i]
 
 
-@kernel(passed=True)
-def inflate_and_predict(dynamics: Dynamics, readings: Readings, k: int, prediction: Prediction) -> None:
-    """Inflate the whole covariance, and predict the reading again."""
-    inflate_motion(dynamics.covariance, readings.inflation[k], dynamics.first_variances, _ALL)
-    predict(dynamics, readings, k, prediction)
-
-
 class KinematicModel(FunctionModel):
     """The model of the module; six states.
 
@@ -138,7 +129,7 @@ class KinematicModel(FunctionModel):
     """
 
     size = 6
-    equations = ModelFunctions(propagate, predict, retract, inflate_and_predict)
+    equations = ModelFunctions(propagate, predict, retract)
 
     def __init__(self, acceleration: float = 0.2):
         self.acceleration = acceleration

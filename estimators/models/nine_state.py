@@ -16,7 +16,6 @@ from __future__ import annotations
 import numpy as np
 
 from simnav.compiled import kernel
-from simnav.estimators.algebra.inflation import MotionStates, inflate_motion
 from simnav.estimators.algebra.joseph import project
 from simnav.kernel_types import Matrix, Vector
 from simnav.structures import filled
@@ -26,19 +25,12 @@ from .base import Linearised
 from .equations import equation_of
 from .filtering import Dynamics, ModelFunctions, Prediction, Readings, aid_of
 from .inertial import InertialModel
-from .inertial_errors import ERROR
 from .inertial_functions import state_of
 from .measurements import NAVIGATION_STATES, observe_inertial
 from .propagation import IMU_NOISE, Samples, correct_inertial, motion_of, propagate_inertial, time_of
 from .state_blocks import StateBlocks
 
 __all__ = ["NineStateModel"]
-
-
-#: Position and velocity, and attitude, in the error.
-_MOVING = MotionStates(
-    linear=ERROR.position, linear_end=ERROR.attitude, attitude=ERROR.attitude, attitude_end=ERROR.gyroscope_bias
-)
 
 
 @kernel
@@ -112,13 +104,6 @@ def retract(dynamics: Dynamics) -> None:
     correct_inertial(state.position, state.velocity, state.dcm, state.bias, np.empty(0), full)
 
 
-@kernel(passed=True)
-def inflate_and_predict(dynamics: Dynamics, readings: Readings, k: int, prediction: Prediction) -> None:
-    """Inflate the whole covariance of the motion, and predict the reading again."""
-    inflate_motion(dynamics.covariance, readings.inflation[k], dynamics.first_variances, _MOVING)
-    predict(dynamics, readings, k, prediction)
-
-
 class NineStateModel(InertialModel):
     """Nine states with fixed sigmas (see the module).
 
@@ -167,7 +152,7 @@ class NineStateModel(InertialModel):
         """As `ErrorModel.functions`; None if an instrument has an equation of its own, or a scale factor."""
         if self.own or self.uncalibrated:
             return None
-        return ModelFunctions(propagate, predict, retract, inflate_and_predict)
+        return ModelFunctions(propagate, predict, retract)
 
     def propagate(self, covariance: Array, until: float) -> None:
         """Advance the state and its covariance through the samples loaded."""

@@ -30,6 +30,7 @@ from simnav import kinds
 from simnav.blocks import StateBlock
 from simnav.estimator import UnsuitableScenario
 from simnav.estimator.needs import Needs
+from simnav.estimators.algebra.inflation import NO_STATES
 from simnav.structures import filled
 from simnav.types import KINDS, NO_SIDE, Array, Datasheet, Estimate, InitialState, Instruments, Measurement
 
@@ -106,7 +107,7 @@ class ShipModel(MovingModel):
 
     state = ("position", "x")
     equations: ClassVar[ModelFunctions] = SHIP_FUNCTIONS
-    moving = (slice(0, 0), slice(0, 0))  # there is no IMU: the process noise covers manoeuvres
+    moving = NO_STATES  # there is no IMU: the process noise covers manoeuvres
 
     def __init__(
         self,
@@ -152,6 +153,7 @@ class ShipModel(MovingModel):
             constants=self.constants, decay=self.decay, density=self.density,
             first_variances=covariance.diagonal().copy(), correction=np.empty(self.size),
             next_sample=np.zeros(1, np.int64), aids=self.table(names),
+            moving=self.moving,
         )  # fmt: skip
 
     def table(self, names: Sequence[str]) -> AidTable:

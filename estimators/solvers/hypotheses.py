@@ -16,6 +16,7 @@ import numpy as np
 from simnav.estimators.adaptations.base import Adaptation, Innovation
 from simnav.estimators.algebra.chi_square import chi_square_limits, normal_quantile
 from simnav.estimators.algebra.direct_update import normalised_square
+from simnav.estimators.algebra.inflation import inflate_motion
 from simnav.estimators.models.inertial_errors import ERROR
 from simnav.types import Array, Estimate, InitialState, Instruments
 
@@ -144,9 +145,10 @@ class WatchedFilter(KalmanEstimator):
     def inflate_motion(self) -> None:
         """Inflate the covariance of position, velocity and attitude; the attitude within the linear range."""
         first = self.dynamics.first_variances.copy()
-        attitude = self.model.moving[1]
+        moving = self.model.moving
+        attitude = slice(moving.attitude, moving.attitude_end)
         first[attitude] = np.maximum(first[attitude], _TILT**2)
-        self.model.loosen(self.covariance, _LOOSENED, first)
+        inflate_motion(self.covariance, _LOOSENED, first, moving)
 
 
 @dataclass

@@ -26,7 +26,7 @@ from simnav.compiled import Kernel, ready
 from simnav.estimates import Estimates
 from simnav.estimators.adaptations.base import Adaptation, Innovation
 from simnav.estimators.adaptations.choice import Choice, choose_noise, no_choice
-from simnav.estimators.adaptations.intersection import weaken_position
+from simnav.estimators.adaptations.inflation import inflate_moving
 from simnav.estimators.adaptations.noise import NoiseAdaptation
 from simnav.estimators.adaptations.noise_report import NoiseReport
 from simnav.estimators.algebra.joseph import joseph_update, project
@@ -42,7 +42,7 @@ from simnav.steps import Steps
 from simnav.types import KINDS, Array, Estimate, InitialState, Instruments, Measurement, Measurements, NavigationStates
 
 from .admission import Admission, Arrivals, together
-from .filter_step import Filter, correct, filter_step, inflate_all, use_nominal
+from .filter_step import Filter, correct, filter_step, use_nominal
 from .filter_steps import StepStates, filter_steps
 from .innovation_consistency import begun_test
 from .iterated import Iteration, absorb_iterated
@@ -65,7 +65,7 @@ class FilterFunctions(NamedTuple):
     propagate: Callable[[Dynamics, Samples, float], None]
     predict: Callable[[Dynamics, Readings, int, Prediction], bool]
     choose: Callable[[Choice, Array, Readings, int, Prediction], None]
-    inflate: Callable[[Dynamics, Readings, int, Prediction], None]
+    inflate: Callable[[Dynamics, Readings, int, Prediction], bool]
     correct: Callable[[Dynamics, Choice, Readings, int, Prediction], float]
     retract: Callable[[Dynamics], None]
     together: Callable[..., tuple[Array, Array] | None] | None = None
@@ -225,20 +225,17 @@ class KalmanEstimator(Solver):
         They are kernels where the model has its equations as kernels and nothing has to be known of a measurement in
         Python: a smoother and an iteration have to know.
         """
-        kernels, own, inflate = self._kernels(), self.adaptation, self.inflate
+        kernels, own = self._kernels(), self.adaptation
+        inflate: Callable[..., bool] = inflate_moving if own is None else own.inflate
         choose: Callable[..., None] = self.choose
         if own is None:
             choose = use_nominal
         elif isinstance(own, NoiseAdaptation) and own.ruled:
             choose = choose_noise
-        if own is None or (own.inflates and not own.inflates_position):
-            inflate = inflate_all
         single = self.smoother is not None or self.iteration is not None
         together = self.model.assimilate_together if self.model.many and own is None and not single else None
         if kernels is None or single:
             return FilterFunctions(self.propagate, self.predict, choose, inflate, self.correct, self.retract, together)
-        if own is not None and not own.inflates:
-            inflate = kernels.inflate_motion
         return FilterFunctions(kernels.propagate, kernels.predict, choose, inflate, correct, kernels.retract)
 
     def _kernels(self) -> ModelFunctions | None:
@@ -344,15 +341,6 @@ class KalmanEstimator(Solver):
         else:
             noise[...] = chosen
             readings.inflation[k] = own.inflation
-
-    def inflate(self, dynamics: Dynamics, readings: Readings, k: int, prediction: Prediction) -> None:
-        """Inflate the covariance of the motion, or that of the position, and predict again."""
-        assert self.adaptation is not None
-        if self.adaptation.inflates_position:
-            weaken_position(dynamics.covariance, readings.inflation[k])
-        else:
-            self.model.loosen(dynamics.covariance, readings.inflation[k], dynamics.first_variances)
-        self._filter.in_python.predict(dynamics, readings, k, prediction)
 
     def correct(self, dynamics: Dynamics, choice: Choice, readings: Readings, k: int, prediction: Prediction) -> float:
         """Correct the covariance, and compute the correction of the state."""

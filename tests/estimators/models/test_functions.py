@@ -72,7 +72,7 @@ def test_a_model_of_the_guide_once_in_python_and_once_compiled(plugins, tmp_path
             "\nfrom simnav.geometry", "\nfrom simnav.compiled import kernel\nfrom simnav.geometry"
         )
     )
-    assert compiled.read_text().count("@kernel") == 4
+    assert compiled.read_text().count("@kernel") == 3
     recording, trials = record(load("open-sea").model_copy(update={"duration": 60.0}), 1), []
     for path in (plugins / "drifting_buoy.py", compiled):
         estimator = KalmanEstimator(import_file(path).DriftingBuoy(), ChiSquareGate())

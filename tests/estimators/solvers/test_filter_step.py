@@ -30,8 +30,8 @@ class ByMethods(KalmanEstimator):
     """The plain filter, whose functions are methods in Python."""
 
     def functions(self):
-        choose = super().functions().choose
-        return FilterFunctions(self.propagate, self.predict, choose, self.inflate, self.correct, self.retract)
+        own = super().functions()
+        return FilterFunctions(self.propagate, self.predict, own.choose, own.inflate, self.correct, self.retract)
 
 
 def test_projection():

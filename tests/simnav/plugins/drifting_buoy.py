@@ -53,18 +53,11 @@ def retract(dynamics: Dynamics) -> None:
         state.velocity[i] += dynamics.correction[2 + i]
 
 
-def inflate_and_predict(dynamics: Dynamics, readings: Readings, k: int, prediction: Prediction) -> None:
-    for i in range(4):
-        for j in range(4):
-            dynamics.covariance[i, j] *= readings.inflation[k]
-    predict(dynamics, readings, k, prediction)
-
-
 class DriftingBuoy(FunctionModel):
     """Position and velocity, north and east, from GNSS alone."""
 
     size = 4
-    equations = ModelFunctions(propagate, predict, retract, inflate_and_predict)
+    equations = ModelFunctions(propagate, predict, retract)
 
     def observes(self, instrument):
         return instrument.kind == "gnss_position"
