@@ -230,11 +230,15 @@ class ModelFunctions(NamedTuple):
         Predicts a reading: ``predict(dynamics, readings, k, prediction)``; False where there is no such reading.
     retract : Kernel
         Adds the correction to the state: ``retract(dynamics)``.
+    difference : callable, optional
+        The error that leads from another flat state to one: ``difference(numbers, other, error)`` overwrites the (n,)
+        ``error``. Only the window of a `simnav.estimators.models.function_model.FunctionModel` asks for it.
     """
 
     propagate: Callable[..., None]
     predict: Callable[..., bool]
     retract: Callable[..., None]
+    difference: Callable[..., None] | None = None
 
 
 def room_for(count: int) -> Readings:
