@@ -13,18 +13,17 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Sequence
-from dataclasses import replace
-from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from simnav.types import Array, Measurement
+from simnav.types import Array
 
-from .base import NO_SAMPLES, Linearised
+from .base import NO_SAMPLES
 from .chain import chain_of
 from .columns import Columns
-from .filtering import AidTable, Dynamics, ModelFunctions, Prediction, Readings, ReadingsOfSteps
+from .filtering import AidTable, Dynamics
+from .flat_state import FlatStateModel
 from .moving_chain import MovingChain, MovingModel, States
 
 __all__ = ["FunctionChain", "FunctionModel"]
@@ -32,26 +31,19 @@ __all__ = ["FunctionChain", "FunctionModel"]
 _NOTHING = np.empty(0)
 
 
-class FunctionModel(MovingModel):
+class FunctionModel(FlatStateModel, MovingModel):
     """The model of the module; a subclass defines `begin`, `observes`, `table`, `estimate` and `equations`.
 
     Attributes
     ----------
-    equations : ModelFunctions
-        Its functions.
-    numbers : (s,) array
-        The flat state. Its first number is the time.
+    equations, numbers, names
+        As of `FlatStateModel`. The first of the numbers is the time.
     constants : (c,) array
         Figures of the motion.
-    names : sequence of str
-        The observed instruments of the run.
     """
 
     state = ("numbers",)
-    equations: ClassVar[ModelFunctions]
-    numbers: Array
     constants: Array = _NOTHING
-    names: Sequence[str]
 
     @abstractmethod
     def table(self, names: Sequence[str]) -> AidTable:
@@ -66,10 +58,6 @@ class FunctionModel(MovingModel):
     def time(self, time: float) -> None:
         self.numbers[0] = time
 
-    def functions(self) -> ModelFunctions:
-        """As `ErrorModel.functions`."""
-        return self.equations
-
     def dynamics(self, covariance: Array, names: Sequence[str]) -> Dynamics:
         """As `ErrorModel.dynamics`."""
         n = len(covariance)
@@ -79,61 +67,19 @@ class FunctionModel(MovingModel):
             correction=np.empty(n), next_sample=np.zeros(1, np.int64), aids=self.table(names), moving=self.moving,
         )  # fmt: skip
 
-    def _room(self) -> tuple[Dynamics, Dynamics]:
-        """For calls from outside of the loop: over the state of the model, and over a state of its own."""
-        found: tuple[Dynamics, Dynamics] | None = vars(self).get("_rooms")
-        if found is None or found[0].numbers is not self.numbers:
-            own = self.dynamics(np.eye(self.size), self.names)
-            found = self._rooms = own, replace(own, numbers=self.numbers.copy(), transition=np.eye(self.size))
-            self._readings = ReadingsOfSteps(dict(zip(self.names, own.aids.components.tolist(), strict=True)))
-        return found
-
-    def propagate(self, covariance: Array, until: float) -> None:
-        """Advance the state and its covariance."""
-        room, _ = self._room()
-        room.covariance[...] = covariance
-        self.equations.propagate(room, self.samples, until)
-        covariance[...] = room.covariance
-
     def carry(self, error: Array, elapsed: float) -> None:
         """Take an error, or several in columns, through the last propagation, in place."""
-        error[...] = self._room()[0].transition @ error
-
-    def measure(self, measurement: Measurement) -> Linearised | None:
-        """Linearise a measurement."""
-        room, _ = self._room()
-        return self._linearised(room, self._readings.fill([measurement]))
-
-    def linearise(self, name: str, time: float, value: Array, numbers: Array) -> Linearised | None:
-        """Linearise a measurement of an instrument at any (s,) state."""
-        _, room = self._room()
-        room.numbers[:] = numbers
-        return self._linearised(room, self._readings.fill([Measurement(time, name, "", value)]))
-
-    def _linearised(self, room: Dynamics, readings: Readings) -> Linearised | None:
-        """Predict the first reading: with the covariance 1, P H' is the Jacobian."""
-        room.covariance[...] = np.eye(self.size)
-        d = int(readings.components[0])
-        found = Prediction(np.empty(d), np.empty((self.size, d)), np.empty((d, d)), np.empty((d, d)), np.empty((d, d)))
-        if not self.equations.predict(room, readings, 0, found):
-            return None
-        return Linearised(found.innovation, np.ascontiguousarray(found.cross.T), found.nominal)
-
-    def correct(self, dx: Array) -> None:
-        """Add a correction to the state."""
-        room, _ = self._room()
-        room.correction[:] = dx
-        self.equations.retract(room)
+        error[...] = self._outside().transition @ error
 
     def move_all(self, states: States, elapsed: Array, jacobian: Array | None = None) -> None:
         """As `MovingModel.move_all`."""
-        _, room = self._room()
         for k, (numbers, time) in enumerate(zip(states[0], elapsed.tolist(), strict=True)):
-            room.numbers[:], room.transition[...] = numbers, np.eye(self.size)
-            self.equations.propagate(room, NO_SAMPLES, float(numbers[0]) + time)
-            numbers[:] = room.numbers
+            there = self._at(numbers)
+            there.transition[...] = np.eye(self.size)
+            self.equations.propagate(there, NO_SAMPLES, float(numbers[0]) + time)
+            numbers[:] = there.numbers
             if jacobian is not None:
-                jacobian[k] = room.transition
+                jacobian[k] = there.transition
 
     def difference_all(self, states: States, others: States) -> Array:
         """As `MovingModel.difference_all`."""
@@ -146,11 +92,11 @@ class FunctionModel(MovingModel):
 
     def retract_all(self, states: States, steps: Array) -> None:
         """As `MovingModel.retract_all`."""
-        _, room = self._room()
         for numbers, step in zip(states[0], steps, strict=True):
-            room.numbers[:], room.correction[:] = numbers, step
-            self.equations.retract(room)
-            numbers[:] = room.numbers
+            there = self._at(numbers)
+            there.correction[:] = step
+            self.equations.retract(there)
+            numbers[:] = there.numbers
 
 
 class FunctionChain(MovingChain):

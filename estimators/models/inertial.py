@@ -68,6 +68,7 @@ from .delayed import is_delayed
 from .equations import EQUATIONS, equation_of
 from .error_states import merged, merged_states
 from .filtering import Aid, AidTable, Dynamics, ModelFunctions, aid_table
+from .flat_state import FlatStateModel
 from .inertial_errors import ERROR
 from .inertial_functions import INERTIAL_FUNCTIONS
 from .lever_arms import has_measurement_function, with_lever_arms
@@ -76,7 +77,6 @@ from .measurements import (
     HEADING,
     State,
     has_heading,
-    observe,
 )
 from .propagation import (
     CLOCK,
@@ -85,9 +85,7 @@ from .propagation import (
     MOTION_NUMBERS,
     TURN_TIME,
     Samples,
-    correct_inertial,
     motion_of,
-    propagate_inertial,
 )
 from .state_blocks import StateBlocks
 
@@ -98,7 +96,7 @@ _NAV, _MOTION = ERROR.calibration, ERROR.gyroscope_bias
 _GRAVITY = 9.81
 
 
-class InertialModel(ErrorModel):
+class InertialModel(FlatStateModel):
     """The model of the module.
 
     Parameters
@@ -139,6 +137,7 @@ class InertialModel(ErrorModel):
     state = ("position", "velocity", "dcm", "bias", "calibration")
     memory = ("numbers",)
     attitude_at = ERROR.attitude
+    equations = INERTIAL_FUNCTIONS
     moving = MotionStates(ERROR.position, ERROR.attitude, ERROR.attitude, ERROR.gyroscope_bias)
     #: True if the kernels of `simnav.estimators.models.inertial_functions` may replace `measure` and
     #: `correct`. A model with another form of one of these methods, or of those of points, sets it to False.
@@ -212,7 +211,7 @@ class InertialModel(ErrorModel):
         self._bind()
         self.position[:], self.velocity[:], self.dcm[:] = start.position, start.velocity, dcm_from_rpy(start.attitude)
         self._time[0], self.motion.clock.view(CLOCK)["used"] = start.time, -1e9
-        self._jacobians = {name: np.empty((len(noise), n)) for name, noise in self.noise.items()}
+        self.names = list(self.noise)
         covariance = np.zeros((n, n))
         covariance[:_MOTION, :_MOTION] = start.covariance
         covariance[range(_MOTION, n), range(_MOTION, n)] = variance
@@ -327,7 +326,7 @@ class InertialModel(ErrorModel):
 
     def functions(self) -> ModelFunctions | None:
         """As `ErrorModel.functions`; None if an instrument has an equation or a clock of its own."""
-        return INERTIAL_FUNCTIONS if self._fused == set(self.noise) and not self.blocks.clocks else None
+        return self.equations if self._fused == set(self.noise) and not self.blocks.clocks else None
 
     def dynamics(self, covariance: Array, names: Sequence[str]) -> Dynamics:
         """As `ErrorModel.dynamics`."""
@@ -356,13 +355,8 @@ class InertialModel(ErrorModel):
     def propagate(self, covariance: Array, until: float) -> None:
         """Advance the state and its covariance through the samples loaded."""
         elapsed = until - self.time
-        if elapsed <= 0.0:
-            return
-        self.next_sample[0] = propagate_inertial.unchecked(
-            self.motion, self.samples, int(self.next_sample[0]), until, self._noise,
-            (self.transition, self.process_noise, covariance), (self.calibration, self._decay, self._density), elapsed,
-        )  # fmt: skip
-        if self.blocks.clocks:
+        super().propagate(covariance, until)
+        if elapsed > 0.0 and self.blocks.clocks:
             self.blocks.carry_values(self.calibration, _NAV, elapsed)
             self.blocks.carry_covariance(covariance, elapsed)
 
@@ -393,14 +387,11 @@ class InertialModel(ErrorModel):
                 return None
             noise = self.noise[name] if found[2] is None else self.noise[name] + found[2]
             return Linearised(*found[:2], noise)
-        jacobian, noise = self._jacobians[name], self.noise[name]
-        innovation, value = np.empty(len(noise)), measurement.value.astype(np.float64)
-        if not observe.unchecked(self.aid_parameters[name], value, self._state(), innovation, jacobian):
-            return None
-        if name in self.uncalibrated:
-            sheet = self.instruments[name]
-            noise = noise + equation_of(sheet).uncalibrated_noise(sheet, value - innovation)
-        return Linearised(innovation, jacobian, noise)
+        linearised = super().measure(measurement)
+        if linearised is None or name not in self.uncalibrated:
+            return linearised
+        sheet, predicted = self.instruments[name], measurement.value - linearised.innovation
+        return linearised._replace(noise=linearised.noise + equation_of(sheet).uncalibrated_noise(sheet, predicted))
 
     def _state(self) -> State:
         return self._viewed
@@ -461,10 +452,6 @@ class InertialModel(ErrorModel):
         joseph_sequence(covariance, residual, jacobian, noise, correction, nis, size)
         self.correct(correction)
         return nis, size
-
-    def correct(self, dx: Array) -> None:
-        """Add a correction to the state."""
-        correct_inertial(self.position, self.velocity, self.dcm, self.bias, self.calibration, dx)
 
     def estimate(self, covariance: Array) -> Estimate:
         """The state as an estimate, all nine components."""

@@ -118,6 +118,7 @@ class NineStateModel(InertialModel):
     """
 
     fused = False  # those kernels are of fifteen states
+    equations = ModelFunctions(propagate, predict, retract)
 
     def __init__(
         self,
@@ -136,9 +137,8 @@ class NineStateModel(InertialModel):
 
     def begin(self, start: InitialState, instruments: Instruments) -> Array:
         """Set the state; UnsuitableScenario without an IMU."""
-        self._unused = super().begin(start, instruments)
+        super().begin(start, instruments)
         self.size, self.blocks, self._density = 9, StateBlocks(9), self._motion
-        self._full = np.zeros(15)
         self._noise = filled(IMU_NOISE, interval=self._noise.view(IMU_NOISE)[0].interval)
         for sheet in instruments.values():
             equation = equation_of(sheet)
@@ -150,18 +150,7 @@ class NineStateModel(InertialModel):
 
     def functions(self) -> ModelFunctions | None:
         """As `ErrorModel.functions`; None if an instrument has an equation of its own, or a scale factor."""
-        if self.own or self.uncalibrated:
-            return None
-        return ModelFunctions(propagate, predict, retract)
-
-    def propagate(self, covariance: Array, until: float) -> None:
-        """Advance the state and its covariance through the samples loaded."""
-        elapsed = until - self.time
-        if elapsed <= 0.0:
-            return
-        self._unused[:] = 0.0
-        super().propagate(self._unused, until)
-        propagate_nine.unchecked(covariance, self.transition, self.process_noise, self._motion, elapsed)
+        return None if self.own or self.uncalibrated else self.equations
 
     def carry(self, error: Array, elapsed: float) -> None:
         """Take an error through the last propagation, in place."""
@@ -173,8 +162,3 @@ class NineStateModel(InertialModel):
         if linearised is None:
             return None
         return linearised._replace(jacobian=np.ascontiguousarray(linearised.jacobian[:, :9]))
-
-    def correct(self, dx: Array) -> None:
-        """Add a correction to the state."""
-        self._full[:9] = dx
-        super().correct(self._full)
