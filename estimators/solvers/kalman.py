@@ -184,7 +184,7 @@ class KalmanEstimator(Solver):
         rows = {name: row for row, name in enumerate(self._names)}
         arrivals = Arrivals(
             np.array(steps.ends), np.array(steps.readings), steps.rows_of(rows), ready(steps.time),
-            ready(steps.rows[:, 2:5]),
+            ready(steps.value[:, :3]),
         )  # fmt: skip
         size = model.size
         found = StepStates(
