@@ -28,7 +28,7 @@ from simnav.estimators.adaptations.base import Adaptation, Innovation
 from simnav.estimators.adaptations.choice import Choice, choose_noise, no_choice
 from simnav.estimators.adaptations.intersection import weaken_position
 from simnav.estimators.adaptations.noise import NoiseAdaptation
-from simnav.estimators.adaptations.noise_report import NoiseReport
+from simnav.estimators.adaptations.noise_report import CHOSEN, NoiseReport
 from simnav.estimators.algebra.joseph import joseph_update, project
 from simnav.estimators.composition import Solver
 from simnav.estimators.models.base import ErrorModel, Linearised
@@ -39,15 +39,16 @@ from simnav.estimators.models.propagation import Samples
 from simnav.estimators.models.stated_sigmas import with_stated_sigmas
 from simnav.estimators.models.suitable import ModelChoice
 from simnav.steps import Steps
+from simnav.structures import length
 from simnav.types import KINDS, Array, Estimate, InitialState, Instruments, Measurement, Measurements, NavigationStates
 
 from .admission import Admission, Arrivals, together
 from .filter_step import Filter, correct, filter_step, inflate_all, use_nominal
-from .filter_steps import StepStates, filter_steps
+from .filter_steps import FLAG, StepStates, filter_steps
 from .innovation_consistency import begun_test
 from .iterated import Iteration, absorb_iterated
 from .smoother import Smoother
-from .step_report import TESTS, StepReport, end_report, note_readings
+from .step_report import INNOVATION, TESTS, StepReport, end_report, note_readings
 
 __all__ = ["FilterFunctions", "KalmanEstimator"]
 
@@ -189,7 +190,7 @@ class KalmanEstimator(Solver):
         size = model.size
         found = StepStates(
             np.empty((t, len(self.dynamics.numbers))), np.empty((t, size, size)), np.empty((t, len(self._row))),
-            np.empty((len(steps.time), 3)),
+            np.empty((len(steps.time), length(FLAG))),
         )  # fmt: skip
         readings = self._arrays.room(int(np.diff(steps.readings).max(initial=0)))
         imu = model.samples, np.array(steps.samples)
@@ -198,7 +199,8 @@ class KalmanEstimator(Solver):
         estimates = model.estimates(found.numbers, found.covariances)
         noise = {} if self._noise_report is None else self._noise_report.table(found.reports[:, n:])
         estimates.diagnostics = {**dict(zip(self._labels, found.reports.T)), **noise, **estimates.diagnostics}
-        estimates.flagged = [(int(k), self._names[int(row)], time) for k, row, time in found.flags[:flags].tolist()]
+        rejected = found.flags.view(FLAG)[:flags, 0].tolist()
+        estimates.flagged = [(step, self._names[row], time) for step, row, time in rejected]
         return estimates
 
     def smooth(self) -> NavigationStates | None:
@@ -255,9 +257,10 @@ class KalmanEstimator(Solver):
         return StepReport(
             freedom=np.array([len(KINDS[instruments[name].kind].limits) for name in self._names], np.int64),
             skipped=self._admission.record.skipped, test=begun_test(),
-            chosen=np.empty((0, 4)) if noise is None else noise.values,
+            chosen=np.empty((0, length(CHOSEN))) if noise is None else noise.values,
             index=np.array([-1 if noise is None else names.index(name) for name in self._names], np.int64),
-            with_zero=noise is not None and noise.with_zero, innovations=np.full(2 * len(self._names), np.nan),
+            with_zero=noise is not None and noise.with_zero,
+            innovations=np.full(length(INNOVATION) * len(self._names), np.nan),
         )  # fmt: skip
 
     def _dynamics(self) -> Dynamics:
