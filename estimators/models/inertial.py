@@ -67,7 +67,7 @@ from .delayed import is_delayed
 from .equations import EQUATIONS, equation_of
 from .error_states import merged, merged_states
 from .filtering import Aid, AidTable, Dynamics, ModelFunctions, aid_table
-from .inertial_errors import ERROR
+from .inertial_errors import ERROR, PART
 from .inertial_functions import INERTIAL_FUNCTIONS
 from .lever_arms import has_measurement_function, with_lever_arms
 from .measurement_functions import MeasurementFunction
@@ -138,7 +138,7 @@ class InertialModel(ErrorModel):
     state = ("position", "velocity", "dcm", "bias", "calibration")
     memory = ("numbers",)
     attitude_at = ERROR.attitude
-    moving = (slice(ERROR.position, ERROR.attitude), slice(ERROR.attitude, ERROR.gyroscope_bias))
+    moving = (PART.motion, PART.attitude)
     #: True if the kernels of `simnav.estimators.models.inertial_functions` may replace `measure`, `correct` and
     #: `loosen`. A model with another form of one of these methods, or of those of points, sets it to False.
     fused: ClassVar[bool] = True

@@ -39,6 +39,7 @@ from .declared_errors import bias_of
 from .equations import equation_of
 from .error_states import merged_states, with_variance
 from .filtering import Aid, AidTable, Dynamics, ModelFunctions, aid_table
+from .inertial_errors import ERROR
 from .lever_arms import has_measurement_function, with_lever_arms
 from .measurements import wrap
 from .moving_chain import MovingModel
@@ -211,7 +212,7 @@ class ShipModel(MovingModel):
         P = np.zeros((n, n))
         P[:2, :2] = start.covariance[:2, :2]
         P[range(SHIP.speed, n), range(SHIP.speed, n)] = variance
-        P[SHIP.heading, SHIP.heading] = start.covariance[8, 8]
+        P[SHIP.heading, SHIP.heading] = start.covariance[ERROR.heading, ERROR.heading]
         # The initial velocity over ground is a measurement of u and c; the prior of u has no information.
         P[SHIP.speed, SHIP.speed] = 1e4
         north, east = start.velocity[:2].tolist()
@@ -303,7 +304,7 @@ class ShipModel(MovingModel):
         """As `ErrorModel.observe_own`; the state is ``position, x``."""
         position, x = state
         found = self.own[name].observe(time, value, position, x, side)
-        return None if found is None else found[:2]
+        return None if found is None else (found.innovation, found.jacobian)
 
     def correct(self, dx: Array) -> None:
         """Add a correction to the state."""

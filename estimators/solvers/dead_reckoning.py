@@ -31,6 +31,7 @@ from simnav.estimators.composition import Solver
 from simnav.estimators.models.declared_errors import bias_of, bias_of_triad
 from simnav.estimators.models.equations import equation_of
 from simnav.estimators.models.error_states import merged, with_variance
+from simnav.estimators.models.inertial_errors import ERROR
 from simnav.estimators.models.measurements import radii, wrap
 from simnav.geometry.earth import gravity
 from simnav.geometry.rotation import dcm_from_rotation_vector, dcm_from_rpy, rpy_from_dcm
@@ -113,7 +114,7 @@ class DeadReckoningEstimator(Solver):
 
         P = np.zeros((6, 6))
         P[:2, :2] = start.covariance[:2, :2]
-        P[_ERROR.heading, _ERROR.heading] = start.covariance[8, 8]
+        P[_ERROR.heading, _ERROR.heading] = start.covariance[ERROR.heading, ERROR.heading]
         self._gyro_walk = 0.0
         if self._imu is not None:
             drift = bias_of_triad(self._imu.gyroscope, "deg_s")

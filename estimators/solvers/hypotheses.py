@@ -210,7 +210,8 @@ class Hypothesis:
         assert one.covariance is not None
         assert origin.covariance is not None
         age = one.time - origin.time
-        missing = origin.covariance[8, 8] + self.drift * age**2 + noise * age - one.covariance[8, 8]
+        variance, known = origin.covariance.diagonal()[ERROR.heading], one.covariance.diagonal()[ERROR.heading]
+        missing = variance + self.drift * age**2 + noise * age - known
         if missing > 0.0:
             since = difference(one, origin)
             assert one.velocity is not None
