@@ -172,8 +172,8 @@ class ShipObservation(MeasurementFunction):
 class ShipReadings(ChannelReadings):
     """The readings of all channels of an instrument, at the states ``position, x`` of a ship."""
 
-    def _navigation(self, states: Sequence[Array], row: NDArray[np.intp], own: Array) -> tuple[Array, ...]:
-        return states[0].take(row, axis=0), *_kinematics(own)
+    def _navigation(self, states: Sequence[Array], row: NDArray[np.intp], own: Array) -> Kinematics:
+        return Kinematics(states[0].take(row, axis=0), *_kinematics(own))
 
     def _by_navigation(self, derivative: Array, own: Array, jacobian: Array) -> None:
         c, s, u = np.cos(own[:, SHIP.heading, None]), np.sin(own[:, SHIP.heading, None]), own[:, SHIP.speed, None]

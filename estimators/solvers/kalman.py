@@ -359,19 +359,17 @@ class KalmanEstimator(Solver):
 
     def correct(self, dynamics: Dynamics, choice: Choice, readings: Readings, k: int, prediction: Prediction) -> float:
         """Correct the covariance, and compute the correction of the state."""
-        innovation, cross, predicted, _, noise = prediction
         covariance, correction, iteration = self.covariance, dynamics.correction, self.iteration
         if iteration is not None and iteration.applies(self.model, covariance):
-            observation = innovation, cross, predicted, noise
-            nis, count = absorb_iterated(
-                self.model, self._measurements[k], observation, covariance, correction, iteration
-            )
+            measurement = self._measurements[k]
+            nis, count = absorb_iterated(self.model, measurement, prediction, covariance, correction, iteration)
             self._iterations, self._iterated = max(self._iterations, count), True
         else:
             self._iterated = False
-            nis = joseph_update.unchecked(covariance, cross, predicted + noise, innovation, correction)
+            spread = prediction.predicted + prediction.noise
+            nis = joseph_update.unchecked(covariance, prediction.cross, spread, prediction.innovation, correction)
         if nis >= 0.0 and self.smoother is not None:
-            self.smoother.use(correction, self._linearised, noise)
+            self.smoother.use(correction, self._linearised, prediction.noise)
         return nis
 
     def retract(self, dynamics: Dynamics) -> None:
