@@ -221,7 +221,8 @@ class ShipModel(MovingModel):
         ground = Aid(VELOCITY, np.zeros(3), -1, -1)
         observe_ship(ground, filled(SHIP_NOISE), self.position, self.x, north, east, residual, H, noise)
         cross = P @ H.T
-        noise = start.covariance[3:5, 3:5] + self.sway**2 * np.eye(2)
+        horizontal = slice(ERROR.velocity, ERROR.velocity + 2)
+        noise = start.covariance[horizontal, horizontal] + self.sway**2 * np.eye(2)
         gain = np.linalg.solve(H @ cross + noise, cross.T).T
         self.x += gain @ residual
         joseph = np.eye(n) - gain @ H

@@ -287,8 +287,8 @@ class DeadReckoningEstimator(Solver):
                 merged(bias_of_triad(triad, unit))[0].variance
                 for triad, unit in ((self._imu.gyroscope, "deg_s"), (self._imu.accelerometer, "m_s2"))
             )
-            tilt = np.diag(start)[6:8] + acceleration / 9.81**2 + turning * LEVEL_TIME**2
-        full[range(6, 8), range(6, 8)] = tilt
+            tilt = np.diag(start)[ERROR.attitude : ERROR.heading] + acceleration / 9.81**2 + turning * LEVEL_TIME**2
+        full[range(ERROR.attitude, ERROR.heading), range(ERROR.attitude, ERROR.heading)] = tilt
         age = self._time - self._started
         drift_down = float(tilt.mean()) * float(v[:2] @ v[:2]) * age**2 + sigma**2 * age
         full[2, 2] = start[2, 2] + drift_down

@@ -167,8 +167,8 @@ class HeadingBank(Solver):
             if len(offsets) > 1:
                 narrow = min(1.0, _OVERLAP * _step(offsets) / sigma)
                 covariance = start.covariance.copy()
-                covariance[8] *= narrow
-                covariance[:, 8] *= narrow
+                covariance[ERROR.heading] *= narrow
+                covariance[:, ERROR.heading] *= narrow
                 attitude = start.attitude + np.array([0.0, 0.0, offset])
                 own = replace(start, attitude=np.asarray(wrap_angle(attitude)), covariance=covariance)
             one.reset(own, instruments)
