@@ -42,19 +42,51 @@ def adaptive_window(variance: float, nominal: float, low: float, high: float, sh
     return (shortest + longest) // 2 if variance > low * nominal else shortest
 
 
-#: Columns of a row of a window: v; then, each (m, m), v v', e e', and H P H' or minus H P+ H'.
+class _Epoch(NamedTuple):
+    """What a window keeps of an innovation of m components, or its sums over some of them.
+
+    Attributes
+    ----------
+    innovation : (m,) array
+        The innovation v.
+    square, residual : (m, m) array
+        v v', and e e' of the residual e.
+    predicted : (m, m) array
+        H P H', or minus H P+ H'.
+    """
+
+    innovation: Vector
+    square: Matrix
+    residual: Matrix
+    predicted: Matrix
+
+
+@helper
+def _width(m: int) -> int:
+    """Number of elements of a row of a window, of innovations of m components."""
+    return m + 3 * m * m
+
+
+@helper
+def _epoch(row: Vector, m: int) -> _Epoch:
+    """The parts of a row of a window, or of the sums over its rows; views."""
+    first, second, third = m, m + m * m, m + 2 * m * m
+    return _Epoch(
+        row[:first], row[first:second].reshape((m, m)), row[second:third].reshape((m, m)), row[third:].reshape((m, m))
+    )
+
+
 @helper
 def _push(rows: Matrix, count: int, innovation: Vector, residual: Vector, sign: float, predicted: Matrix) -> None:
     """Overwrite the oldest row with that of the present epoch."""
-    m, row = innovation.size, rows[count % rows.shape[0]]
-    at = m
+    m = innovation.size
+    epoch = _epoch(rows[count % rows.shape[0]], m)
     for i in range(m):
-        row[i] = innovation[i]
+        epoch.innovation[i] = innovation[i]
         for j in range(m):
-            row[at] = innovation[i] * innovation[j]
-            row[at + m * m] = residual[i] * residual[j]
-            row[at + 2 * m * m] = sign * predicted[i, j]
-            at += 1
+            epoch.square[i, j] = innovation[i] * innovation[j]
+            epoch.residual[i, j] = residual[i] * residual[j]
+            epoch.predicted[i, j] = sign * predicted[i, j]
 
 
 @helper
@@ -103,7 +135,7 @@ def _average(
     Parameters
     ----------
     rows : (r, ...) array
-        Ring buffer of the rows of `_push`, one row for each epoch.
+        Ring buffer of the rows of `_push`, one `_Epoch` each.
     count : int
         Number of epochs so far; the last r of them are in the buffer.
     predicted, nominal : (m, m) arrays
@@ -124,14 +156,14 @@ def _average(
     """
     shortest, longest = window.shortest, window.longest
     m, ring, sums = nominal.shape[0], rows.shape[0], np.zeros(rows.shape[1])
-    length, n = shortest, 0
+    total, length, n = _epoch(sums, m), shortest, 0
     if longest > shortest and count > 1:
         n = min(longest, count, ring)
         _sums(rows, count, n, sums)
         variance, trace = 0.0, 0.0
         for i in range(m):
-            mean = sums[i] / n
-            variance += sums[m + i * (m + 1)] / n - mean * mean
+            mean = total.innovation[i] / n
+            variance += total.square[i, i] / n - mean * mean
             trace += nominal[i, i] + predicted[i, i]
         length = adaptive_window(variance, trace, window.low, window.high, shortest, longest)
     if n != min(length, count, ring):
@@ -139,29 +171,33 @@ def _average(
         _sums(rows, count, n, sums)
     for i in range(m):
         for j in range(m):
-            at = m + i * m + j
-            subtracted = n * predicted[i, j] if newest else sums[at + 2 * m * m]
-            mean = (sums[at + m * m] - subtracted + (length - n) * nominal[i, j]) / length
+            subtracted = n * predicted[i, j] if newest else total.predicted[i, j]
+            mean = (total.residual[i, j] - subtracted + (length - n) * nominal[i, j]) / length
             estimate[i, j] += forgetting * (mean - estimate[i, j])
     return length
 
 
+#: Between them is the mean square of innovations that do not contradict the datasheet, in units of its variance.
+LIMITS = structure(lower=float, upper=float)
+
+
 @cache
-def _contradiction(length: int, significance: float) -> tuple[float, float]:
-    """Lower and upper limit of the mean of ``length`` squared unit normals, each with the tail ``significance``."""
+def _contradiction(length: int, significance: float) -> Array:
+    """`LIMITS` of the mean of ``length`` squared unit normals, each with the tail ``significance``."""
     if significance >= 1.0:
-        return np.inf, 0.0
+        return filled(LIMITS, lower=np.inf, upper=0.0)
     from scipy.special import chdtri
 
-    return float(chdtri(length, 1.0 - significance)) / length, float(chdtri(length, significance)) / length
+    lower, upper = (float(chdtri(length, p)) / length for p in (1.0 - significance, significance))
+    return filled(LIMITS, lower=lower, upper=upper)
 
 
 #: Smallest and largest length of the window; bounds v_min and v_max; weight of the new estimate; whether the newest
-#: H P H' is subtracted, the data are residuals, and NumPy bounds the estimate; bounds of the variance ratios; lower and
-#: upper limit of a mean square, for the shortest, the middle and the longest window.
+#: H P H' is subtracted, the data are residuals, and NumPy bounds the estimate; bounds of the variance ratios; `LIMITS`
+#: of the shortest, the middle and the longest window.
 SETTINGS = structure(
     shortest=int, longest=int, low=float, high=float, forgetting=float, newest=int, residual=int, full=int,
-    lowest=float, highest=float, of_shortest=2, of_middle=2, of_longest=2,
+    lowest=float, highest=float, of_shortest=length(LIMITS), of_middle=length(LIMITS), of_longest=length(LIMITS),
 )  # fmt: skip
 #: Number of rows so far, whether there is an estimate, and its elements. In the memory the rows of `_push` follow.
 MEMORY = structure(count=int, begun=int, estimate=9)
@@ -171,7 +207,7 @@ _HEAD = length(MEMORY)
 @helper
 def _rows(settings: Array, memory: Array, m: int) -> Array:
     """The ring buffer in the memory."""
-    count, width = settings.view(SETTINGS)[0].longest, m + 3 * m * m
+    count, width = settings.view(SETTINGS)[0].longest, _width(m)
     return memory[_HEAD : _HEAD + count * width].reshape((count, width))
 
 
@@ -188,13 +224,13 @@ def _remember(settings: Vector, memory: Vector, innovation: Vector, predicted: M
 
 @helper
 def _contradicted(limits: Array, residual: int, estimate: Array, nominal: Array, predicted: Array) -> bool:
-    """Whether the innovations, or residuals, contradict the nominal noise in a component."""
-    low, high = limits[0], limits[1]
+    """Whether the innovations, or residuals, contradict the nominal noise in a component: beyond some `LIMITS`."""
+    allowed = limits[:].view(LIMITS)[0]
     for i in range(nominal.shape[0]):
         noise, prior = nominal[i, i], predicted[i, i]
         # Variance of the squared quantity: an innovation, or a residual, which is R S^-1 times the innovation.
         variance = noise * noise / (noise + prior) if residual else noise + prior
-        if not low <= 1.0 + (estimate[i, i] - noise) / variance <= high:
+        if not allowed.lower <= 1.0 + (estimate[i, i] - noise) / variance <= allowed.upper:
             return True
     return False
 
@@ -325,7 +361,7 @@ class InnovationBased(EstimatedNoise):
 
     def begun(self, longer: float, m: int) -> Array:
         """As `EstimatedNoise.begun`: an empty window."""
-        return np.concatenate([filled(MEMORY), np.zeros(round(self.longest * longer) * (m + 3 * m * m))])
+        return np.concatenate([filled(MEMORY), np.zeros(round(self.longest * longer) * _width(m))])
 
     def estimate(self, innovation: Innovation) -> Array:
         """The bounded estimate of a full matrix, or the nominal noise."""

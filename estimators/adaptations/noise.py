@@ -192,7 +192,7 @@ class NoiseAdaptation(Adaptation):
 
     def report_number(self, name: str, number: float) -> None:
         """Report a number of an instrument. It stays until the next one."""
-        self.report.values[self.index[name], 3] = number
+        self.report.rows[self.index[name]].number = number
 
     def diagnostics(self) -> dict[str, float | Array]:
         """The sigmas last used, and other reported values."""

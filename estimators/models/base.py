@@ -29,13 +29,10 @@ from .filtering import Dynamics, ModelFunctions, aid_table
 from .measurement_functions import MeasurementFunction
 from .propagation import Samples
 
-__all__ = ["NO_SAMPLES", "ErrorModel", "Linearised", "Observation"]
+__all__ = ["NO_SAMPLES", "ErrorModel", "Linearised"]
 
 #: Of a step without an IMU.
 NO_SAMPLES = Samples(np.empty(0), np.empty(0), np.empty((0, 3)), np.empty((0, 3)))
-#: A measurement of m components with the covariance P of n states: innovation (m,), P H' (n, m), H P H' (m, m) and
-#: noise (m, m).
-Observation = tuple[Array, Array, Array, Array]
 
 
 class Linearised(NamedTuple):

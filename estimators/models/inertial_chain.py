@@ -22,6 +22,7 @@ from .chain import Chain, chain_of
 from .columns import Columns
 from .filtering import Aid
 from .inertial import InertialModel
+from .inertial_errors import ERROR
 from .inertial_functions import INERTIAL_FUNCTIONS
 from .intermediate_states import IntermediateStates, add_noise, through_one
 from .marginalisation import Reference
@@ -112,7 +113,7 @@ def _move_between(first: int, end: int, w: InertialWindow) -> None:
         w.between.transition, w.between.shift, w.between.jacobian, w.predicted, w.moved,
     )  # fmt: skip
     n, c = shift.shape[1], now.calibration.shape[1]
-    moved, dx = np.empty(n), np.zeros(15 + c)
+    moved, dx = np.empty(n), np.zeros(ERROR.calibration + c)
     for k in range(first, end):
         for i in range(3):
             now.position[k, i], now.velocity[k, i] = predicted.position[k, i], predicted.velocity[k, i]
@@ -153,7 +154,7 @@ def _linearise_readings(w: InertialWindow, rows: Rows, first: int) -> None:
     aids, equations, states, now, rate = w.window.aids, w.equations, w.states, w.moved, w.predicted.raw_rate
     node, between, residual, jacobian = aids.node, aids.between, aids.residual, aids.jacobian
     n, begin, end = jacobian.shape[2], _first_aid(w, rows, first), rows.first_aid + rows.aids
-    innovation, wide, b0 = np.empty(3), np.zeros((3, 15)), rows.first_between
+    innovation, wide, b0 = np.empty(3), np.zeros((3, ERROR.calibration)), rows.first_between
     if rows.between and begin < end:
         at = b0 + rows.between
         while at > b0 and w.between.node[at - 1] >= node[begin]:
@@ -174,12 +175,12 @@ def _linearise_readings(w: InertialWindow, rows: Rows, first: int) -> None:
             )  # fmt: skip
         d = observe_inertial(
             Aid(equations.code[s], equations.lever_arm[s], equations.bias_at[s], equations.scale_at[s]),
-            aids.value[i], state, innovation, jacobian[i] if n >= 15 else wide,
+            aids.value[i], state, innovation, jacobian[i] if n >= ERROR.calibration else wide,
         )  # fmt: skip
         aids.components[i] = d
         for r in range(3):
             residual[i, r] = innovation[r] if r < d else 0.0
-        if n < 15:
+        if n < ERROR.calibration:
             for r in range(3):
                 for c in range(n):
                     jacobian[i, r, c] = wide[r, c]
@@ -200,7 +201,7 @@ def _refer_to_nodes(w: InertialWindow, rows: Rows, first: int) -> None:
                 add_noise(
                     aids.jacobian[i], aids.components[i], between.noise[k], aids.noise[i], aids.whitener[i], work
                 )  # fmt: skip
-            through_one(between.jacobian[k], min(15, n), aids.jacobian[i], work)
+            through_one(between.jacobian[k], min(ERROR.calibration, n), aids.jacobian[i], work)
         aids.norm[i] = whiten_one(aids.residual[i], aids.whitener[i], aids.whitened[i])
 
 
@@ -223,12 +224,12 @@ def _retract(w: InertialWindow, rows: Rows, step: Matrix) -> None:
     rows : Rows
         Where it is.
     step : (K, n) array
-        Corrections, with a rotation vector at 6:9 that turns the attitude from the left; its first row is that of the
-        first node.
+        Corrections, of which the rotation vector at `ERROR.attitude` turns the attitude from the left; its first row
+        is that of the first node.
     """
     states, motions, between, shift = w.states, w.window.motions, w.between, w.window.prior.shift
     n, k0, m0, count = step.shape[1], rows.first_node, rows.first_motion, rows.nodes
-    dx, before = np.zeros(max(n, 15)), np.empty(n)
+    dx, before = np.zeros(max(n, ERROR.calibration)), np.empty(n)
     for k in range(count):
         row, m = k0 + k, m0 + k
         for j in range(n):
@@ -263,7 +264,7 @@ class InertialChain(Chain):
         Of 15 states, with or without calibration states, or the 9-state model.
     """
 
-    coupled = 15
+    coupled = ERROR.calibration
     front: InertialModel
 
     @property
@@ -345,7 +346,7 @@ class InertialChain(Chain):
 
     def observe(self, first: int, row: NDArray[np.int64], states: Columns, prefix: str, jacobian: Array) -> None:
         """As `Chain.observe`, for readings whose kind has a measurement equation of its own."""
-        wide = jacobian if self.size >= 15 else np.zeros((len(jacobian), 3, 15))
+        wide = jacobian if self.size >= ERROR.calibration else np.zeros((len(jacobian), 3, ERROR.calibration))
         position, velocity, dcm, bias, calibration = (states[prefix + name] for name in self.front.state)
         arrays = [states[name] for name in self.node_arrays]
         inertial = arrays[0] if len(arrays) == 1 else np.hstack(arrays)

@@ -67,13 +67,14 @@ def propagate_points(before: Vector, after: Vector, constants: Vector, decay: Ve
 
     Parameters
     ----------
-    before, after : (45 + n - 15,) arrays
-        The flat state (`simnav.estimators.models.propagation.motion_of`) at the start and at the end of the piece.
+    before, after : (MOTION_NUMBERS + c,) arrays
+        The flat state (`simnav.estimators.models.propagation.motion_of`) with c calibration states, at the start and at
+        the end of the piece.
     constants : (9,) array
         An `IMU_NOISE`.
-    decay : (n - 15,) array
+    decay : (c,) array
         Inverse correlation times of the calibration states [1/s].
-    errors : (k, n) array
+    errors : (k, ERROR.calibration + c) array
         Differences of the points from the state at the start; overwritten with those at the end.
     """
     start, end = motion_of(before), motion_of(after)
@@ -106,7 +107,7 @@ def propagate_points(before: Vector, after: Vector, constants: Vector, decay: Ve
     p, v, m = np.empty(3), np.empty(3), np.empty((3, 3))
     for k in range(errors.shape[0]):
         still = True
-        for j in range(15):
+        for j in range(ERROR.calibration):
             still = still and errors[k, j] == 0.0
         if still:
             continue
@@ -202,11 +203,11 @@ def observe_points(
                 x = atan2(sin(x), cos(x))
             if known == 0:  # a point near the vertical
                 x = 0.0
-                for j in range(3, 15):
+                for j in range(ERROR.velocity, ERROR.calibration):
                     x += linear[i, j] * errors[k, j]
-            for j in range(3):
+            for j in range(ERROR.position, ERROR.velocity):
                 x += linear[i, j] * errors[k, j]
-            for j in range(15, n):
+            for j in range(ERROR.calibration, n):
                 x += linear[i, j] * errors[k, j]
             differences[k, i] = x
 
@@ -234,7 +235,7 @@ def move_in_pieces(
         The IMU samples of the step.
     until : float
         The time, later than that of the state [s].
-    numbers : (45 + n - 15,) array
+    numbers : (MOTION_NUMBERS + c,) array
         The flat state.
     constants, decay, errors
         As of `propagate_points`.

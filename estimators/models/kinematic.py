@@ -27,7 +27,7 @@ from .equations import equation_of
 from .error_states import with_variance
 from .filtering import Aid, AidTable, Dynamics, ModelFunctions, Prediction, Readings, aid_table
 from .function_model import FunctionModel
-from .inertial_errors import ERROR
+from .inertial_errors import ERROR, PART
 from .propagation import Samples
 
 __all__ = ["KinematicModel"]
@@ -158,7 +158,7 @@ class KinematicModel(FunctionModel):
         self.constants = filled(MOTION, acceleration=self.acceleration**2)
         slow = [with_variance(np.zeros(3), bias_of(r).processes) for r in receivers]
         self._slow = np.diag(np.max(slow, axis=0))
-        return np.array(start.covariance[:6, :6])
+        return np.array(start.covariance[PART.motion, PART.motion])
 
     def table(self, names: Sequence[str]) -> AidTable:
         """The receivers, with the variances of their noise; what a lever arm does beside the heading is noise."""
@@ -173,8 +173,9 @@ class KinematicModel(FunctionModel):
     def estimate(self, covariance: Array) -> Estimate:
         """Position and velocity."""
         state = self.numbers.view(STATE)[0]
-        full = np.zeros((9, 9))
-        full[:6, :6] = covariance
-        full[:3, :3] += self._slow
-        full[range(3, 6), range(3, 6)] += SEAWAY**2
+        full = np.zeros((ERROR.gyroscope_bias, ERROR.gyroscope_bias))
+        full[PART.motion, PART.motion] = covariance
+        full[PART.position, PART.position] += self._slow
+        velocity = range(ERROR.velocity, ERROR.attitude)
+        full[velocity, velocity] += SEAWAY**2
         return Estimate(self.time, state.position.copy(), state.velocity.copy(), None, full)

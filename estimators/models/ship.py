@@ -41,6 +41,7 @@ from .equations import equation_of
 from .error_states import merged_states, with_variance
 from .filtering import Aid, AidTable, Dynamics, ModelFunctions, aid_table
 from .flat_state import FlatStateModel
+from .inertial_errors import ERROR
 from .lever_arms import has_measurement_function, with_lever_arms
 from .measurements import wrap
 from .moving_chain import MovingModel
@@ -212,7 +213,7 @@ class ShipModel(FlatStateModel, MovingModel):
         P = np.zeros((n, n))
         P[:2, :2] = start.covariance[:2, :2]
         P[range(SHIP.speed, n), range(SHIP.speed, n)] = variance
-        P[SHIP.heading, SHIP.heading] = start.covariance[8, 8]
+        P[SHIP.heading, SHIP.heading] = start.covariance[ERROR.heading, ERROR.heading]
         # The initial velocity over ground is a measurement of u and c; the prior of u has no information.
         P[SHIP.speed, SHIP.speed] = 1e4
         north, east = start.velocity[:2].tolist()
@@ -221,7 +222,8 @@ class ShipModel(FlatStateModel, MovingModel):
         ground = Aid(VELOCITY, np.zeros(3), -1, -1)
         observe_ship(ground, filled(SHIP_NOISE), self.position, self.x, north, east, residual, H, noise)
         cross = P @ H.T
-        noise = start.covariance[3:5, 3:5] + self.sway**2 * np.eye(2)
+        horizontal = slice(ERROR.velocity, ERROR.velocity + 2)
+        noise = start.covariance[horizontal, horizontal] + self.sway**2 * np.eye(2)
         gain = np.linalg.solve(H @ cross + noise, cross.T).T
         self.x += gain @ residual
         joseph = np.eye(n) - gain @ H
@@ -291,7 +293,7 @@ class ShipModel(FlatStateModel, MovingModel):
         """As `ErrorModel.observe_own`; the state is ``position, x``."""
         position, x = state
         found = self.own[name].observe(time, value, position, x, side)
-        return None if found is None else found[:2]
+        return None if found is None else (found.innovation, found.jacobian)
 
     def move_all(self, states: tuple[Array, ...], elapsed: Array, jacobian: Array | None = None) -> None:
         """As `MovingModel.move_all`."""

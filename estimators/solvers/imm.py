@@ -122,7 +122,7 @@ class ImmEstimator(KalmanEstimator):
     def _reported_noise(self, instruments: Instruments) -> NoiseReport:
         """The roots of the expected variances, and the probabilities of the lowest level."""
         report = NoiseReport(instruments, self._names, "quiet", with_zero=True)
-        report.values[:, 3] = self._filter.choice.memories.reshape(len(instruments), -1)[:, 0]
+        report.rows["number"] = self._filter.choice.memories.reshape(len(instruments), -1)[:, 0]
         return report
 
 

@@ -28,7 +28,7 @@ from simnav.estimators.adaptations.base import Adaptation, Innovation
 from simnav.estimators.adaptations.choice import Choice, choose_noise, no_choice
 from simnav.estimators.adaptations.inflation import inflate_moving
 from simnav.estimators.adaptations.noise import NoiseAdaptation
-from simnav.estimators.adaptations.noise_report import NoiseReport
+from simnav.estimators.adaptations.noise_report import CHOSEN, NoiseReport
 from simnav.estimators.algebra.joseph import joseph_update, project
 from simnav.estimators.composition import Solver
 from simnav.estimators.models.base import ErrorModel, Linearised
@@ -39,15 +39,16 @@ from simnav.estimators.models.propagation import Samples
 from simnav.estimators.models.stated_sigmas import with_stated_sigmas
 from simnav.estimators.models.suitable import ModelChoice
 from simnav.steps import Steps
+from simnav.structures import length
 from simnav.types import KINDS, Array, Estimate, InitialState, Instruments, Measurement, Measurements, NavigationStates
 
 from .admission import Admission, Arrivals, together
 from .filter_step import Filter, correct, filter_step, use_nominal
-from .filter_steps import StepStates, filter_steps
+from .filter_steps import FLAG, StepStates, filter_steps
 from .innovation_consistency import begun_test
 from .iterated import Iteration, absorb_iterated
 from .smoother import Smoother
-from .step_report import TESTS, StepReport, end_report, note_readings
+from .step_report import INNOVATION, TESTS, StepReport, end_report, note_readings
 
 __all__ = ["FilterFunctions", "KalmanEstimator"]
 
@@ -184,12 +185,12 @@ class KalmanEstimator(Solver):
         rows = {name: row for row, name in enumerate(self._names)}
         arrivals = Arrivals(
             np.array(steps.ends), np.array(steps.readings), steps.rows_of(rows), ready(steps.time),
-            ready(steps.rows[:, 2:5]),
+            ready(steps.value[:, :3]),
         )  # fmt: skip
         size = model.size
         found = StepStates(
             np.empty((t, len(self.dynamics.numbers))), np.empty((t, size, size)), np.empty((t, len(self._row))),
-            np.empty((len(steps.time), 3)),
+            np.empty((len(steps.time), length(FLAG))),
         )  # fmt: skip
         readings = self._arrays.room(int(np.diff(steps.readings).max(initial=0)))
         imu = model.samples, np.array(steps.samples)
@@ -198,7 +199,8 @@ class KalmanEstimator(Solver):
         estimates = model.estimates(found.numbers, found.covariances)
         noise = {} if self._noise_report is None else self._noise_report.table(found.reports[:, n:])
         estimates.diagnostics = {**dict(zip(self._labels, found.reports.T)), **noise, **estimates.diagnostics}
-        estimates.flagged = [(int(k), self._names[int(row)], time) for k, row, time in found.flags[:flags].tolist()]
+        rejected = found.flags.view(FLAG)[:flags, 0].tolist()
+        estimates.flagged = [(step, self._names[row], time) for step, row, time in rejected]
         return estimates
 
     def smooth(self) -> NavigationStates | None:
@@ -252,9 +254,10 @@ class KalmanEstimator(Solver):
         return StepReport(
             freedom=np.array([len(KINDS[instruments[name].kind].limits) for name in self._names], np.int64),
             skipped=self._admission.record.skipped, test=begun_test(),
-            chosen=np.empty((0, 4)) if noise is None else noise.values,
+            chosen=np.empty((0, length(CHOSEN))) if noise is None else noise.values,
             index=np.array([-1 if noise is None else names.index(name) for name in self._names], np.int64),
-            with_zero=noise is not None and noise.with_zero, innovations=np.full(2 * len(self._names), np.nan),
+            with_zero=noise is not None and noise.with_zero,
+            innovations=np.full(length(INNOVATION) * len(self._names), np.nan),
         )  # fmt: skip
 
     def _dynamics(self) -> Dynamics:
@@ -344,19 +347,17 @@ class KalmanEstimator(Solver):
 
     def correct(self, dynamics: Dynamics, choice: Choice, readings: Readings, k: int, prediction: Prediction) -> float:
         """Correct the covariance, and compute the correction of the state."""
-        innovation, cross, predicted, _, noise = prediction
         covariance, correction, iteration = self.covariance, dynamics.correction, self.iteration
         if iteration is not None and iteration.applies(self.model, covariance):
-            observation = innovation, cross, predicted, noise
-            nis, count = absorb_iterated(
-                self.model, self._measurements[k], observation, covariance, correction, iteration
-            )
+            measurement = self._measurements[k]
+            nis, count = absorb_iterated(self.model, measurement, prediction, covariance, correction, iteration)
             self._iterations, self._iterated = max(self._iterations, count), True
         else:
             self._iterated = False
-            nis = joseph_update.unchecked(covariance, cross, predicted + noise, innovation, correction)
+            spread = prediction.predicted + prediction.noise
+            nis = joseph_update.unchecked(covariance, prediction.cross, spread, prediction.innovation, correction)
         if nis >= 0.0 and self.smoother is not None:
-            self.smoother.use(correction, self._linearised, noise)
+            self.smoother.use(correction, self._linearised, prediction.noise)
         return nis
 
     def retract(self, dynamics: Dynamics) -> None:
