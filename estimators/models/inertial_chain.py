@@ -14,13 +14,13 @@ from numpy.typing import NDArray
 from simnav.compiled import helper, kernel
 from simnav.estimators.algebra.block_tridiagonal import after_step, error_after_step, whiten_one
 from simnav.estimators.algebra.factors import Rows, Window
-from simnav.kernel_types import IntegerVector, Matrix, Stack
+from simnav.kernel_types import Matrix, Stack
 from simnav.records import Record
 from simnav.types import Array, InitialState, Instruments
 
 from .chain import Chain, chain_of
 from .columns import Columns
-from .filtering import Aid
+from .filtering import AidTable, aid_of
 from .inertial import InertialModel
 from .inertial_errors import ERROR
 from .inertial_functions import INERTIAL_FUNCTIONS
@@ -44,25 +44,6 @@ class MovedStates(Record):
     calibration: Matrix
 
 
-class Equations(Record):
-    """The measurement equations of the instruments, see `simnav.estimators.models.measurements.Aid`.
-
-    Attributes
-    ----------
-    code : (i,) array of int
-        Measurement equation; `simnav.estimators.models.measurements.OWN` where it is a function of the kind.
-    lever_arm : (i, 3) array
-        In body axes [m].
-    bias_at, scale_at : (i,) array of int
-        Places of bias and scale factor in the error; -1 for none.
-    """
-
-    code: IntegerVector
-    lever_arm: Matrix
-    bias_at: IntegerVector
-    scale_at: IntegerVector
-
-
 class InertialWindow(Record):
     """The window of an inertial model: nodes and factors, the inertial states of its nodes, and what lies between."""
 
@@ -71,7 +52,7 @@ class InertialWindow(Record):
     between: IntermediateStates
     predicted: InertialStates
     moved: MovedStates
-    equations: Equations
+    instruments: AidTable
 
 
 @kernel
@@ -151,7 +132,7 @@ def _linearise_motion(w: InertialWindow, rows: Rows, first: int) -> None:
 @kernel
 def _linearise_readings(w: InertialWindow, rows: Rows, first: int) -> None:
     """Predict the readings of a node or of later ones whose equation is compiled, at nodes or intermediate states."""
-    aids, equations, states, now, rate = w.window.aids, w.equations, w.states, w.moved, w.predicted.raw_rate
+    aids, instruments, states, now, rate = w.window.aids, w.instruments, w.states, w.moved, w.predicted.raw_rate
     node, between, residual, jacobian = aids.node, aids.between, aids.residual, aids.jacobian
     n, begin, end = jacobian.shape[2], _first_aid(w, rows, first), rows.first_aid + rows.aids
     innovation, wide, b0 = np.empty(3), np.zeros((3, ERROR.calibration)), rows.first_between
@@ -162,7 +143,7 @@ def _linearise_readings(w: InertialWindow, rows: Rows, first: int) -> None:
         _move_between(at, b0 + rows.between, w)
     for i in range(begin, end):
         s = aids.instrument[i]
-        if equations.code[s] == OWN:
+        if instruments.code[s] == OWN:
             continue
         if between[i] >= 0:
             k = b0 + between[i] - rows.base_between
@@ -174,7 +155,7 @@ def _linearise_readings(w: InertialWindow, rows: Rows, first: int) -> None:
                 states.calibration[k],
             )  # fmt: skip
         d = observe_inertial(
-            Aid(equations.code[s], equations.lever_arm[s], equations.bias_at[s], equations.scale_at[s]),
+            aid_of(instruments, s),
             aids.value[i], state, innovation, jacobian[i] if n >= ERROR.calibration else wide,
         )  # fmt: skip
         aids.components[i] = d
@@ -276,14 +257,8 @@ class InertialChain(Chain):
         """One node, at the start; its covariance. UnsuitableScenario without an IMU."""
         covariance = super().begin(start, instruments)
         front = self.front
-        nothing = Aid(0, np.zeros(3), -1, -1)
-        known = [Aid(*front.aid_parameters.get(name, nothing)) for name in self.names]
-        self._equations = Equations(
-            code=np.array([OWN if name in front.own else aid.code for name, aid in zip(self.names, known)], np.int64),
-            lever_arm=np.array([aid.lever_arm for aid in known], dtype=np.float64).reshape(-1, 3),
-            bias_at=np.array([aid.bias_at for aid in known], dtype=np.int64),
-            scale_at=np.array([aid.scale_at for aid in known], dtype=np.int64),
-        )
+        self._instruments = front.table(self.names)
+        self._instruments.code[[name in front.own for name in self.names]] = OWN
         self.functions = INERTIAL_FACTORS if front.functions() is INERTIAL_FUNCTIONS else None
         if self.functions is not None:
             self.dynamics = front.dynamics(covariance, self.names)
@@ -303,7 +278,7 @@ class InertialChain(Chain):
         return InertialWindow(
             window=self.window, states=self.nodes.record(InertialStates), between=self._states_between,
             predicted=self.between.record(InertialStates), moved=self.between.record(MovedStates, "now_"),
-            equations=self._equations,
+            instruments=self._instruments,
         )  # fmt: skip
 
     def growing(self, count: int) -> Growing:
@@ -352,7 +327,7 @@ class InertialChain(Chain):
         inertial = arrays[0] if len(arrays) == 1 else np.hstack(arrays)
         self.observe_own(first, row, wide, position, velocity, dcm, inertial, bias, calibration)
         if wide is not jacobian:
-            own = self._equations.code[self.aids["instrument"][first:]] == OWN
+            own = self._instruments.code[self.aids["instrument"][first:]] == OWN
             here = np.flatnonzero((row[first:] >= 0) & own) + first
             jacobian[here] = wide[here, :, : self.size]
 
