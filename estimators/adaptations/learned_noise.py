@@ -88,8 +88,9 @@ def set_by_network(
     part = 1.0 - exp(-max(time - last, 0.0) / _MEMORY) if last == last else 0.3
     groups.usual[group] += part * (size - groups.usual[group])
     groups.time[group] = time
-    output = advance(settings[_WEIGHTS:], kept.inputs[:], memory[HIDDEN : HIDDEN + own.units])
-    weight: float = max(1.0 / (1.0 + exp(-output)), own.least)
+    logit = np.empty(1)
+    advance(settings[_WEIGHTS:], kept.inputs[:], memory[HIDDEN : HIDDEN + own.units], logit)
+    weight: float = max(1.0 / (1.0 + exp(-logit[0])), own.least)
     for i in range(m):
         for j in range(m):
             noise[i, j] /= weight

@@ -24,6 +24,7 @@ from simnav.structures import length, structure
 from simnav.types import Array, Datasheet, InitialState, Instruments, Measurements
 
 from .file import Network
+from .recurrent import advance, flat, shapes
 
 __all__ = [
     "INPUT", "INPUTS", "PERIOD", "RECIPE", "VELOCITIES", "VERSION", "VelocityNetwork", "VelocitySeconds", "shapes_of",
@@ -56,11 +57,7 @@ def shapes_of(arrays: Mapping[str, Array]) -> dict[str, tuple[int, ...]]:
     """The shapes that the arrays of a network should have, by the width of its output weight."""
     weight = arrays.get("output_weight")
     units = weight.shape[-1] if weight is not None and weight.ndim == 2 else 0
-    rows, inputs = 3 * units, length(INPUT)
-    return {
-        "input_weight": (rows, inputs), "input_bias": (rows,), "memory_weight": (rows, units), "memory_bias": (rows,),
-        "output_weight": (_OUTPUTS, units), "output_bias": (_OUTPUTS,),
-    }  # fmt: skip
+    return shapes(length(INPUT), units) | {"output_weight": (_OUTPUTS, units), "output_bias": (_OUTPUTS,)}
 
 
 class VelocitySeconds:
@@ -158,7 +155,7 @@ class VelocityNetwork:
     """
 
     def __init__(self, network: Network):
-        self._arrays = network.arrays
+        self._weights = flat(network.arrays)
         self._memory = np.zeros(network.arrays["output_weight"].shape[1])
 
     @staticmethod
@@ -182,13 +179,8 @@ class VelocityNetwork:
         (3,) array
             Standard deviation of its error, in speeds.
         """
-        own, m = self._arrays, len(self._memory)
-        given = own["input_weight"] @ inputs + own["input_bias"]
-        kept = own["memory_weight"] @ self._memory + own["memory_bias"]
-        reset, keep = np.split(1.0 / (1.0 + np.exp(-(given + kept)[: 2 * m])), 2)
-        new = np.tanh(given[2 * m :] + reset * kept[2 * m :])
-        self._memory = (1.0 - keep) * new + keep * self._memory
-        output = own["output_weight"] @ self._memory + own["output_bias"]
+        output = np.empty(_OUTPUTS)
+        advance(self._weights, inputs, self._memory, output)
         return output[:3], np.exp(np.clip(output[3:], LOWEST, HIGHEST))
 
     @staticmethod
