@@ -406,17 +406,15 @@ class InertialModel(FlatStateModel):
     def observe_own(
         self, name: str, time: float, value: Array, state: tuple[Array, ...], side: Array = NO_SIDE
     ) -> tuple[Array, Array] | None:
-        """As `ErrorModel.observe_own`; the state is position, velocity, DCM, angular rate, bias and calibration."""
-        found = self._linearise_own(name, time, value, state, side)
+        """As `ErrorModel.observe_own`; the state is that of `State`."""
+        found = self._linearise_own(name, time, value, State(*state), side)
         return None if found is None else found[:2]
 
     def _linearise_own(
-        self, name: str, time: float, value: Array, state: tuple[Array, ...], side: Array
+        self, name: str, time: float, value: Array, state: State, side: Array
     ) -> tuple[Array, Array, Array | None] | None:
-        position, velocity, dcm, rate, bias, calibration = state
-        own, size = self.own[name], _NAV + len(calibration)
-        point = own.point(time, position, velocity, dcm, rate, bias, calibration, side)
-        return own.linearise(point, value, calibration, size, self.bias_at.get(name, -1))
+        own, size = self.own[name], _NAV + len(state.calibration)
+        return own.linearise(own.point(time, state, side), value, state.calibration, size, self.bias_at.get(name, -1))
 
     def nominal_noise(self, measurement: Measurement) -> Array | None:
         """The noise of the datasheet; None if the noise depends on the state."""

@@ -313,7 +313,7 @@ class InertialPoints(InertialModel, PointModel):
         name = measurement.instrument
         if name in self.own:
             own = self.own[name]
-            point = own.point(measurement.time, *self.state_of_own(), measurement.side)
+            point = own.point(measurement.time, self.state_of_own(), measurement.side)
             found = own.differences(point, errors, self.bias_at.get(name, -1), NAVIGATION_STATES)
             assert found is not None  # `measure` says something of it
             return found

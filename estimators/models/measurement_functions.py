@@ -34,6 +34,7 @@ from .channels import ChannelDatasheet, whole
 from .delayed import acceleration, is_delayed
 from .inertial_errors import PART
 from .lever_arms import observation_of
+from .measurements import State
 
 __all__ = ["Kinematics", "MeasurementFunction"]
 
@@ -131,37 +132,23 @@ class MeasurementFunction:
         """Itself: it never changes, and an estimator that takes late readings is copied in each step."""
         return self
 
-    def point(
-        self,
-        time: float,
-        position: Array,
-        velocity: Array,
-        dcm: Array,
-        rate: Array,
-        bias: Array,
-        values: Array,
-        side: Array = NO_SIDE,
-    ) -> NavigationPoint:
+    def point(self, time: float, state: State, side: Array = NO_SIDE) -> NavigationPoint:
         """The state for the function.
 
         Parameters
         ----------
         time : float
             Time of validity [s].
-        position, velocity, dcm
-            As of `simnav.kinds.NavigationPoint`.
-        rate : (3,) or (6,) array
-            Output of the gyroscopes [rad/s], and where a delay needs it that of the accelerometers [m/s^2].
-        bias : (3 or more,) array
-            Their biases [rad/s], [m/s^2].
-        values : (m,) array
-            The states among which those of the blocks are.
+        state : State
+            Where a delay needs it, the specific force as measured [m/s^2] is behind the angular rate.
         side : (s,) array
             Side information of the reading.
         """
+        position, velocity, dcm, rate, bias = state.position, state.velocity, state.dcm, state.rate, state.bias
         turning = rate[:3] - bias[:3] - dcm.T @ earth_rate(position[0])
         moved = acceleration(position, velocity, dcm, rate[3:] - bias[3:6]) if len(rate) == 6 else None
-        return NavigationPoint(time, position, velocity, dcm, turning, self.blocks(values), self.channel, side, moved)
+        blocks = self.blocks(state.calibration)
+        return NavigationPoint(time, position, velocity, dcm, turning, blocks, self.channel, side, moved)
 
     def blocks(self, values: Array) -> Mapping[str, Array]:
         """The values of the blocks, by name."""

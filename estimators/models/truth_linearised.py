@@ -340,7 +340,7 @@ class TruthLinearisedModel(ErrorModel):
         The nominal rate is as measured, so the swing of a lever arm has the whole bias of the gyroscopes in it.
         """
         own = self.nominal.own[measurement.instrument]
-        point = own.point(measurement.time, *self.nominal.state_of_own(), side=measurement.side)
+        point = own.point(measurement.time, self.nominal.state_of_own(), measurement.side)
         return -own.by_angular_rate(point)
 
     def correct(self, dx: Array) -> None:
