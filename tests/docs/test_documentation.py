@@ -162,12 +162,13 @@ def test_a_log_becomes_a_scenario(tmp_path, monkeypatch):
     monkeypatch.delenv("SIMNAV_DATA", raising=False)
     page = "tutorials/log-to-rank.md"
     lines = commands(page)
-    assert [line.split()[1] for line in lines] == ["simulate", "run", "evaluate"]
+    assert [line.split()[1] for line in lines] == ["simulate", "check", "run", "evaluate"]
     simnav(tmp_path, lines[0])
     assert blocks(page, "")[1].splitlines() == (tmp_path / "data/voyage/gnss.csv").read_text().splitlines()[:2]
     scenario, outage = blocks(page, "toml")
     (tmp_path / "voyage.toml").write_text(scenario + outage)
-    assert "ship-ekf" in simnav(tmp_path, lines[1])
+    assert "can be run" in simnav(tmp_path, lines[1])
+    assert "ship-ekf" in simnav(tmp_path, lines[2])
     assert [f.kind for f in load(str(tmp_path / "voyage.toml")).faults] == ["outage"]
 
 
