@@ -78,6 +78,7 @@ def test_the_site_builds_without_warnings(tmp_path):
     assert "not ranked" in rows
     assert "horizontal_rmse" in (tmp_path / "reference" / "scores.html").read_text()
     assert "multipath" in (tmp_path / "reference" / "instruments.html").read_text()
+    assert "<td>Recorded voyages</td>" in (tmp_path / "reference" / "scenarios.html").read_text()
     assert (tmp_path / "tutorials" / "first-estimator.ipynb").is_file()
     assert "first-estimator.ipynb" in (tmp_path / "tutorials" / "first-estimator.html").read_text()
     assert "until_decided" in (tmp_path / "reference" / "python.html").read_text()
