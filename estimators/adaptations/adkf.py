@@ -8,7 +8,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from simnav.compiled import Kernel, helper, kernel
+from simnav.compiled import helper, kernel
 from simnav.estimators.algebra.direct_update import normalised_square
 from simnav.estimators.models.filtering import Prediction, Readings
 from simnav.kernel_types import Vector
@@ -224,7 +224,7 @@ class AdaptiveFactor(NoiseAdaptation):
     """
 
     SMALLEST = 1e-3
-    rule: Kernel[..., float] = whitened_three_segment
+    rule: Callable[..., float] = whitened_three_segment
     reported = "factor"
 
     def __init__(

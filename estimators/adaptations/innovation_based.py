@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cache
 from typing import Literal, NamedTuple
 
 import numpy as np
 
-from simnav.compiled import Kernel, helper, kernel
+from simnav.compiled import helper, kernel
 from simnav.estimators.algebra.direct_update import posterior
 from simnav.estimators.models.filtering import Prediction, Readings
 from simnav.kernel_types import Matrix, Vector
@@ -297,7 +298,7 @@ class InnovationBased(EstimatedNoise):
         (`EstimatedNoise`), and one of a wrong prediction (`PredictionTest`).
     """
 
-    rule: Kernel[..., float] = from_innovations
+    rule: Callable[..., float] = from_innovations
     reported = "window"
 
     def __init__(

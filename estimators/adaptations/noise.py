@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from types import FunctionType
 from typing import ClassVar, Literal
 
 import numpy as np
 
-from simnav.compiled import Kernel, ready
+from simnav.compiled import ready
 from simnav.estimators.algebra.direct_update import posterior
 from simnav.estimators.models.filtering import Prediction, Readings, room_for
 from simnav.types import KINDS, Array, Instruments
@@ -88,7 +89,7 @@ class NoiseAdaptation(Adaptation):
     together = 3
     #: The function that chooses (`simnav.estimators.adaptations.rules`), of the class or of the instance; None if there
     #: is none.
-    rule: Kernel[..., float] | None = None
+    rule: Callable[..., float] | None = None
     #: Whether a method of the class chooses in place of the rule of its base.
     in_its_own_way: ClassVar[bool] = False
     #: What the number that the rule returns is reported as.
@@ -98,9 +99,11 @@ class NoiseAdaptation(Adaptation):
 
     def __init_subclass__(cls) -> None:
         super().__init_subclass__()
-        own = vars(cls).keys()
-        if own & {"rule", "adapt", "choose", "estimate"}:
+        own = vars(cls)
+        if own.keys() & {"rule", "adapt", "choose", "estimate"}:
             cls.in_its_own_way = "rule" not in own
+        if isinstance(rule := own.get("rule"), FunctionType):
+            cls.rule = staticmethod(rule)  # a plain function would be a method of the instance
 
     def reset(self, instruments: Instruments) -> None:
         """Begin a run."""
@@ -184,7 +187,7 @@ class NoiseAdaptation(Adaptation):
             prediction.noise[...] = chosen
         return 0.0
 
-    def ask(self, rule: Kernel[..., float], innovation: Innovation, noise: Array) -> float:
+    def ask(self, rule: Callable[..., float], innovation: Innovation, noise: Array) -> float:
         """What a kernel of a rule returns for a measurement; it overwrites the noise."""
         memory = self.memory_of(innovation.measurement.instrument)
         return rule(*memory, self.rule_common, self._reading, 0, as_prediction(innovation, noise))
