@@ -139,7 +139,8 @@ def test_an_adaptation_that_chooses_in_its_own_way_is_asked(recording_of, run_ov
 
     run_over(KalmanEstimator(InertialModel(), Own()), recording_of(2, 5.0))
     assert asked
-    assert SageHusa().ruled and not Own().ruled
+    assert SageHusa().ruled
+    assert not Own().ruled
     instruments = recording_of(2, 5.0).instruments
     for full in (False, True):
         adaptation = SageHusa(full=full)
