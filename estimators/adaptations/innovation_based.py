@@ -106,7 +106,7 @@ class _Window(NamedTuple):
     ----------
     length : int
         Length of the window.
-    count : int
+    rows : int
         Number of rows in it; less than the length until it is full.
     squares : (m, m) array
         Sum of v v', or of e e'.
@@ -115,7 +115,7 @@ class _Window(NamedTuple):
     """
 
     length: int
-    count: int
+    rows: int
     squares: Matrix
     prior: Matrix
 
@@ -171,7 +171,7 @@ def _estimate(settings: Vector, memory: Vector, prediction: Prediction, window: 
     estimate = kept.estimate[: m * m].reshape((m, m))
     for i in range(m):
         for j in range(m):
-            mean = (window.squares[i, j] - window.prior[i, j] + (n - window.count) * nominal[i, j]) / n
+            mean = (window.squares[i, j] - window.prior[i, j] + (n - window.rows) * nominal[i, j]) / n
             estimate[i, j] += forgetting * (mean - estimate[i, j])
     limits = own.of_shortest if n == own.shortest else own.of_longest if n == own.longest else own.of_middle
     for i in range(m):
@@ -230,7 +230,7 @@ def from_innovations_as_printed(
     window = _window(settings, memory, prediction)
     for i in range(prediction.innovation.size):
         for j in range(prediction.innovation.size):
-            window.prior[i, j] = window.count * prediction.predicted[i, j]
+            window.prior[i, j] = window.rows * prediction.predicted[i, j]
     return _estimate(settings, memory, prediction, window, _of_innovations(prediction))
 
 
