@@ -215,25 +215,18 @@ class ErrorModel(ABC):
     def correct(self, dx: Array) -> None:
         """Add a correction to the state."""
 
-    def assimilate_together(
-        self, measurements: Sequence[Measurement], covariance: Array, correction: Array
-    ) -> tuple[Array, Array] | None:
-        """Use measurements of one time, each with its nominal noise, linearised at the state before the first.
+    def measure_together(self, measurements: Sequence[Measurement]) -> Linearised | None:
+        """Linearise k measurements of one time at the present state, as `measure` does one, with the nominal noise.
 
         Parameters
         ----------
         measurements : sequence of Measurement
             Readings of channels of one instrument (`many`).
-        covariance : (n, n) array
-            Covariance of the model's error, updated.
-        correction : (n,) array
-            Overwritten with the correction of the state by all of them.
 
         Returns
         -------
-        nis, size : (k,) array
-            Normalised innovation squared and norm of each innovation, given the measurements before it; -1 for one that
-            was not used. None in place of both where the measurements have to be used one by one.
+        Linearised or None
+            Innovations (k, m), Jacobians (k, m, n) and noise (k, m, m); None if they have to be measured one by one.
         """
         return None
 

@@ -44,7 +44,6 @@ from simnav.estimates import Estimates
 from simnav.estimator import UnsuitableScenario
 from simnav.estimator.needs import AID, IMU, Needs
 from simnav.estimators.algebra.inflation import MotionStates
-from simnav.estimators.algebra.joseph import joseph_sequence
 from simnav.geometry.rotation import dcm_from_rpy
 from simnav.structures import filled
 from simnav.types import (
@@ -432,24 +431,19 @@ class InertialModel(FlatStateModel):
         more = None if many is None else many.more_noise([m.side for m in measurements])
         return None if more is None else self.noise[name] + more
 
-    def assimilate_together(
-        self, measurements: Sequence[Measurement], covariance: Array, correction: Array
-    ) -> tuple[Array, Array] | None:
-        """As `ErrorModel.assimilate_together`, where a kind predicts many readings at one time."""
+    def measure_together(self, measurements: Sequence[Measurement]) -> Linearised | None:
+        """As `ErrorModel.measure_together`, where a kind predicts many readings at one time."""
         times, names, _, values, _, sides = zip(*measurements)
         many = self._many_of.get(names[0])
         if many is None or many.biased or many.has_noise or not self.fused:
             return None
         k, side, (beyond, unit) = len(names), np.array(sides), self._beyond[names[0]]
         noise = beyond + many.noise(side)[:, :, None] * unit
-        residual, jacobian = many.linearise(
+        innovation, jacobian = many.linearise(
             np.array(times), np.array(values), many.channels(names), [array[None] for array in self._state()],
             np.zeros(k, dtype=np.intp), side, _NAV,
         )  # fmt: skip
-        nis, size = np.empty(k), np.empty(k)
-        joseph_sequence(covariance, residual, jacobian, noise, correction, nis, size)
-        self.correct(correction)
-        return nis, size
+        return Linearised(innovation, jacobian, noise)
 
     def estimate(self, covariance: Array) -> Estimate:
         """The state as an estimate, all nine components."""

@@ -17,7 +17,7 @@ Source: P. D. Groves 2013, sections 3.2 and 3.4.3.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -49,18 +49,19 @@ from .innovation_consistency import begun_test
 from .iterated import Iteration, absorb_iterated
 from .smoother import Smoother
 from .step_report import INNOVATION, TESTS, StepReport, end_report, note_readings
+from .step_together import step_together
 
 __all__ = ["FilterFunctions", "KalmanEstimator"]
 
-#: Methods of a step; a subclass that has one of its own takes the steps of a run one by one.
-_STEPWISE = ("update", "_use", "_note", "_estimate")
+#: Methods of a step, which compiled steps do not call.
+_OF_A_STEP = ("update", "_use", "_note", "_estimate")
 
 
 class FilterFunctions(NamedTuple):
     """The functions of a filter, see `simnav.estimators.solvers.filter_step.Filter`.
 
-    ``together`` uses readings of one time of the channels of an instrument by one call
-    (`ErrorModel.assimilate_together`); None: they are used one by one.
+    ``predict_together`` predicts readings of one time of the channels of an instrument, so that they are used by one
+    call (`simnav.estimators.solvers.step_together`); None: they are used one by one.
     """
 
     propagate: Callable[[Dynamics, Samples, float], None]
@@ -69,11 +70,11 @@ class FilterFunctions(NamedTuple):
     inflate: Callable[[Dynamics, Readings, int, Prediction], bool]
     correct: Callable[[Dynamics, Choice, Readings, int, Prediction], float]
     retract: Callable[[Dynamics], None]
-    together: Callable[..., tuple[Array, Array] | None] | None = None
+    predict_together: Callable[[Sequence[Measurement]], Linearised | None] | None = None
 
     def replaced(self, **functions: Callable[..., Any]) -> FilterFunctions:
         """Some functions in place of others; readings are then used one by one."""
-        return self._replace(**functions, together=None)
+        return self._replace(**functions, predict_together=None)
 
 
 class KalmanEstimator(Solver):
@@ -143,9 +144,6 @@ class KalmanEstimator(Solver):
         self._noise_report = self._reported_noise(instruments)
         self._report = self._begun_report(instruments)
         self._row = np.empty(len(self._labels) + self._report.chosen.size)
-        told = self.adaptation is None or type(self.adaptation).diagnostics is NoiseAdaptation.diagnostics
-        own = any(getattr(type(self), name) is not getattr(KalmanEstimator, name) for name in _STEPWISE)
-        self._takes_steps = self._compiled and told and not own and not self._owners
         if self.smoother is not None:
             self.smoother.begin(self.model, [instruments[name] for name in self._names])
 
@@ -178,7 +176,7 @@ class KalmanEstimator(Solver):
 
     def update_all(self, steps: Steps) -> Estimates | None:
         """Take several steps in compiled code, where the whole filter is."""
-        if not self._takes_steps:
+        if not self._steps_are_compiled:
             return None
         model, n, t = self.model, len(self._labels), len(steps)
         model.load(steps.imu)
@@ -202,6 +200,17 @@ class KalmanEstimator(Solver):
         rejected = found.flags.view(FLAG)[:flags, 0].tolist()
         estimates.flagged = [(step, self._names[row], time) for step, row, time in rejected]
         return estimates
+
+    @property
+    def _steps_are_compiled(self) -> bool:
+        """Whether compiled code does all that `update` does. Means over channels are made in Python."""
+        own = self.adaptation
+        return (
+            self._compiled
+            and not self._owners
+            and (own is None or type(own).diagnostics is NoiseAdaptation.diagnostics)
+            and all(getattr(type(self), name) is getattr(KalmanEstimator, name) for name in _OF_A_STEP)
+        )
 
     def smooth(self) -> NavigationStates | None:
         """The smoother's trajectory at the ends of all steps; None before the first, and without a smoother."""
@@ -227,16 +236,17 @@ class KalmanEstimator(Solver):
         They are kernels where the model has its equations as kernels and nothing has to be known of a measurement in
         Python: a smoother and an iteration have to know.
         """
-        kernels, own = self._kernels(), self.adaptation
+        own, kernels, model = self.adaptation, self._kernels(), self.model
         inflate: Callable[..., bool] = inflate_moving if own is None else own.inflate
         choose: Callable[..., None] = self.choose
         if own is None:
             choose = use_nominal
         elif isinstance(own, NoiseAdaptation) and own.ruled:
             choose = choose_noise
-        single = self.smoother is not None or self.iteration is not None
-        together = self.model.assimilate_together if self.model.many and own is None and not single else None
-        if kernels is None or single:
+        if self.smoother is not None or self.iteration is not None:
+            return FilterFunctions(self.propagate, self.predict, choose, inflate, self.correct, self.retract)
+        if kernels is None:
+            together = model.measure_together if model.many and own is None else None
             return FilterFunctions(self.propagate, self.predict, choose, inflate, self.correct, self.retract, together)
         return FilterFunctions(kernels.propagate, kernels.predict, choose, inflate, correct, kernels.retract)
 
@@ -246,7 +256,8 @@ class KalmanEstimator(Solver):
 
     def _reported_noise(self, instruments: Instruments) -> NoiseReport | None:
         """Where the noise is reported that `choose_noise` chooses; None if it does not choose."""
-        return self.adaptation.report if self._reports and isinstance(self.adaptation, NoiseAdaptation) else None
+        own = self.adaptation
+        return own.report if isinstance(own, NoiseAdaptation) and self._filter.choose is choose_noise else None
 
     def _begun_report(self, instruments: Instruments) -> StepReport:
         """What is reported of the steps of a run, before the first."""
@@ -268,12 +279,10 @@ class KalmanEstimator(Solver):
         """The filter of a run, with all that its functions work on."""
         self.dynamics = self._dynamics()
         functions = self.functions()._asdict()
-        self._together = functions.pop("together")
-        self._reports = functions["choose"] is choose_noise
-        choice = self.choice(instruments)
-        if self.adaptation is None and not self._reports and not all(isinstance(f, Kernel) for f in functions.values()):
-            functions["choose"] = self.choose
-        return Filter(dynamics=self.dynamics, choice=choice, **functions)
+        self._predict_together = functions.pop("predict_together")
+        if functions["choose"] is use_nominal and not all(isinstance(f, Kernel) for f in functions.values()):
+            functions["choose"] = self.choose  # a loop in Python copies an array sooner than it calls a kernel
+        return Filter(dynamics=self.dynamics, choice=self.choice(instruments), **functions)
 
     def choice(self, instruments: Instruments) -> Choice:
         """How the noise of each reading is chosen in a run."""
@@ -285,13 +294,15 @@ class KalmanEstimator(Solver):
     def _advance(self, admitted: Sequence[Measurement], until: float, flagged: list[tuple[str, float]]) -> None:
         """Use the admitted measurements of a step, and propagate to its end."""
         model = self.model
-        samples = model.samples
-        for group in self._groups(admitted):
-            end = until if group is admitted else min(group[0].time, until)
-            if group is admitted or len(group) == 1 or not self._use_together(group, end):
-                self._use(group, samples, end, flagged)
+        if self._predict_together is None:
+            self._use(admitted, model.samples, until, flagged)
+            return
+        for group in together(admitted, self._owners):
+            end = min(group[0].time, until)
+            if len(group) == 1 or not self._use_together(group, end):
+                self._use(group, model.samples, end, flagged)
         if model.time < until:
-            self._use((), samples, until, flagged)
+            self._use((), model.samples, until, flagged)
 
     def _use(
         self,
@@ -365,22 +376,15 @@ class KalmanEstimator(Solver):
         if not self._iterated:
             self.model.correct(dynamics.correction)
 
-    def _groups(self, measurements: Sequence[Measurement]) -> Iterable[Sequence[Measurement]]:
-        """The measurements in one group, or those of the channels of one instrument at one time in one if quicker."""
-        return [measurements] if self._together is None else together(measurements, self._owners)
-
-    def _use_together(self, group: Sequence[Measurement], until: float) -> bool:
-        """Use the measurements of a group; False if they have to be used one by one."""
-        self._filter.in_python.propagate(self.dynamics, self.model.samples, until)
-        assert self._together is not None
-        used = self._together(group, self.covariance, self.dynamics.correction)
-        if used is None:
+    def _use_together(self, measurements: Sequence[Measurement], until: float) -> bool:
+        """Use measurements of one time by one call; False if they have to be used one by one."""
+        assert self._predict_together is not None
+        f, samples = self._filter.in_python, self.model.samples
+        readings = step_together(f, self._predict_together, measurements, self._arrays, samples, until)
+        if readings is None:
             return False
-        readings, count = self._arrays.fill(group), len(group)
-        readings.nis[:count], readings.size[:count] = used
-        readings.rejected[:count], readings.sigma[:count, 0], readings.reported[:count] = False, np.nan, 0.0
-        self._measurements = group
-        self._note(readings, count)
+        self._measurements = measurements
+        self._note(readings, len(measurements))
         return True
 
     def _note(self, readings: Readings, count: int) -> None:
