@@ -53,7 +53,7 @@ from .filtering import Dynamics
 from .intermediate_states import IntermediateStates
 from .marginalisation import Reference, keep_covariance, marginalise, subtract_step
 
-__all__ = ["Chain", "ChainStates", "FactorFunctions", "MotionSinceNode", "attach_one", "begin_motion", "chain_of"]
+__all__ = ["Chain", "FactorFunctions", "MotionSinceNode", "attach_one", "begin_motion", "chain_of"]
 
 
 class MotionSinceNode(Record):
@@ -110,28 +110,6 @@ class FactorFunctions(NamedTuple):
     choose: Callable[..., bool]
     make_node: Callable[..., NewRows]
     attach: Callable[..., NewRows]
-
-
-class ChainStates(NamedTuple):
-    """Copies of the arrays of a chain that a step changes.
-
-    Attributes
-    ----------
-    nodes : dict of str to array
-        The arrays of the nodes' states, by name.
-    begin_shift, end_shift : (K - 1, n) array
-        Shifts of the nodes of each motion since it was linearised.
-    between_shift : (B, n) array
-        Those of the nodes before the intermediate states.
-    prior_shift : (n,) array
-        That of the first node since its prior.
-    """
-
-    nodes: dict[str, Array]
-    begin_shift: Array
-    end_shift: Array
-    between_shift: Array
-    prior_shift: Array
 
 
 class Chain(ABC):
@@ -407,20 +385,19 @@ class Chain(ABC):
         """The intermediate states as kernels take them."""
         return self._made.once(IntermediateStates, lambda: self.between.record(IntermediateStates))
 
-    def copy_states(self) -> ChainStates:
-        """Copies of the arrays that `retract` changes, for `restore_states`."""
-        return ChainStates(
-            nodes={name: self.nodes[name].copy() for name in self.front.state},
-            begin_shift=self.motions["begin_shift"].copy(), end_shift=self.motions["end_shift"].copy(),
-            between_shift=self.between["shift"].copy(), prior_shift=self.prior.shift.copy(),
-        )  # fmt: skip
+    def _changed(self) -> list[Array]:
+        """Views of the arrays that `retract` changes."""
+        motions, nodes = self.motions, [self.nodes[name] for name in self.front.state]
+        return [*nodes, motions["begin_shift"], motions["end_shift"], self.between["shift"], self.prior.shift]
 
-    def restore_states(self, states: ChainStates) -> None:
+    def copy_states(self) -> list[Array]:
+        """Copies of what `retract` changes, for `restore_states`."""
+        return [array.copy() for array in self._changed()]
+
+    def restore_states(self, states: list[Array]) -> None:
         """Take a `retract` back."""
-        for name, value in states.nodes.items():
-            self.nodes[name][...] = value
-        self.motions["begin_shift"][...], self.motions["end_shift"][...] = states.begin_shift, states.end_shift
-        self.between["shift"][...], self.prior.shift[...] = states.between_shift, states.prior_shift
+        for array, value in zip(self._changed(), states, strict=True):
+            array[...] = value
 
     def estimate(self, covariance: Array) -> Estimate:
         """The front as an estimate."""
