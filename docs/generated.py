@@ -24,9 +24,9 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
         "reference/scores.md": scores(),
         "reference/instruments.md": instruments(),
     }
-    (python,) = (file for file in files if file.src_uri == "reference/python.md")
-    files.remove(python)
-    pages["reference/python.md"] = f"{python.content_string}\n{calls()}"
+    for path, made in (("reference/python.md", calls), ("reference/scenarios.md", tracks)):
+        (page,) = (file for file in files if file.src_uri == path)
+        pages[path] = f"{page.content_string}\n{made()}"
     for path, text in pages.items():
         if (stands := files.get_file_from_path(path)) is not None:
             files.remove(stands)
@@ -59,6 +59,33 @@ def calls() -> str:
             parts += [f"{section}: {_escaped(re.sub(chr(10) + '    ', ': ', body).replace(chr(10), ' '))}"
                       for section, body in ends]  # fmt: skip
     return "\n\n".join(parts) + "\n"
+
+
+def tracks() -> str:
+    """The tracks of the catalogue: name, title, instruments and scenarios, and whether the standard result has them."""
+    from simnav.leaderboard.profiles import read_profile
+    from simnav.leaderboard.ranking.similar_scenarios import carried
+    from simnav.leaderboard.ranking.tracks import catalogued, tracks_of
+
+    found = catalogued()
+    ranked = {name for part in read_profile("standard").parts for name in part.scenarios}
+    lines = []
+    for track in tracks_of(found, {name: header.track for name, header in found.items()}):
+        carry = [carried(found[name]) for name in track.scenarios]
+        always = frozenset.intersection(*(c.always for c in carry))
+        some = frozenset.union(*(c.always | c.sometimes for c in carry)) - always
+        kinds = "; ".join(filter(None, [_kinds(always), f"some: {_kinds(some)}" if some else ""]))
+        board = any(found[name].name in ranked or name in ranked for name in track.scenarios)
+        cells = (f"`{track.name}`", track.title, kinds, str(len(track.scenarios)), "yes" if board else "no")
+        lines.append(_line(cells))
+    text = "In commands a track is called by its name (`simnav campaign -s aided-ins`), and on the board by its title. "
+    text += "`post-processing` has the scenarios of `aided-ins` and `underwater`."
+    head = _head("name", "title", "instruments", "scenarios", "in the standard result")
+    return "\n\n".join(("## Tracks", NOTE.replace("page", "table"), text, "\n".join((*head, *lines)))) + "\n"
+
+
+def _kinds(kinds: Iterable[str]) -> str:
+    return ", ".join(f"`{kind}`" for kind in sorted(kinds))
 
 
 def commands() -> str:

@@ -37,6 +37,22 @@ _SAME = 1e-6  # a fix from before the step by less than this is of the step [s]
 _STILL = np.zeros(3)
 
 
+class _Limits(NamedTuple):
+    """The limits of the test.
+
+    Attributes
+    ----------
+    square : float
+        Limit of chi-square for one fix.
+    direction, distance : float
+        Normal quantiles from which fixes have a direction, and are too far away.
+    """
+
+    square: float
+    direction: float
+    distance: float
+
+
 class _Receivers(Record):
     """The r receivers of a run, and the course of each.
 
@@ -52,8 +68,8 @@ class _Receivers(Record):
         Variances of a fix, north and east [m^2].
     swing : (r,) array
         Square of the lever arm, which is the variance of a fix where the heading is not known [m^2].
-    limits : (3,) array
-        Limit of chi-square for one fix; normal quantiles of a direction, and of too large a distance.
+    limits : _Limits
+        Of the test.
     """
 
     courses: Courses
@@ -61,7 +77,7 @@ class _Receivers(Record):
     arm: Matrix
     variance: Matrix
     swing: Vector
-    limits: Vector
+    limits: _Limits
 
 
 class _Estimate(NamedTuple):
@@ -99,8 +115,8 @@ def _add_fix(receivers: _Receivers, row: int, time: float, latitude: float, long
     east = (longitude - position[1]) * (prime_vertical + position[2]) * cos(position[0]) - east
     u, v = north / sqrt(estimate.north + first), east / sqrt(estimate.east + second)
     if isfinite(u + v):
-        add_innovation(course, row, u, v, 0.0, 2, time, u * u + v * v > limits[0])
-        against = is_correlated(course, row, limits[1]) and is_large(course, row, limits[2])
+        add_innovation(course, row, u, v, 0.0, 2, time, u * u + v * v > limits.square)
+        against = is_correlated(course, row, limits.direction) and is_large(course, row, limits.distance)
         receivers.against[row] = receivers.against[row] + 1 if against else 0
 
 
@@ -175,7 +191,6 @@ class FixTest:
     PATIENCE = 5  # fixes in a row that must contradict
 
     def __init__(self, instruments: Instruments):
-        quantiles = normal_quantile(self.PERSISTENT), normal_quantile(self.SOUND)
         kinds = kinds_with("position", "horizontal_position")
         sheets = [s for s in instruments.values() if s.kind in kinds]
         self._rows = {sheet.name: row for row, sheet in enumerate(sheets)}
@@ -184,7 +199,10 @@ class FixTest:
             courses=no_innovations(len(sheets)), against=np.zeros(len(sheets), np.int64), arm=arms,
             variance=np.array([_variance(sheet)[:2] for sheet in sheets]).reshape(-1, 2),
             swing=np.array([hypot(*arm) ** 2 for arm in arms.tolist()]),
-            limits=np.array([chi_square_limits(self.SOUND)[2], *quantiles]),
+            limits=_Limits(
+                square=chi_square_limits(self.SOUND)[2], direction=normal_quantile(self.PERSISTENT),
+                distance=normal_quantile(self.SOUND),
+            ),
         )  # fmt: skip
         self.contradicted = False
 
@@ -227,7 +245,7 @@ class FixTest:
             return
         rows, step, starts = steps.rows_of(self._rows), steps.step, np.array([steps.start, *steps.ends[:-1]])
         at = np.flatnonzero((rows >= 0) & (steps.time > starts[step] - _SAME))
-        fixes = _Fixes(step[at], rows[at], steps.time[at], np.ascontiguousarray(steps.rows[at, 2:4]))
+        fixes = _Fixes(step[at], rows[at], steps.time[at], np.ascontiguousarray(steps.value[at, :2]))
         answers = _Answers(
             ready(estimates.time), ready(position),
             np.zeros((t, 3)) if estimates.velocity is None else ready(estimates.velocity),

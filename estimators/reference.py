@@ -11,7 +11,7 @@ and, with a smoother after the oracle, those of smoothed output, too.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import sqrt
 
@@ -29,7 +29,7 @@ from simnav.spec import SpecError
 from simnav.trial import run_trial
 from simnav.types import Array
 
-__all__ = ["OracleRun", "ReferenceFigure", "oracle_run", "reference_figure"]
+__all__ = ["OracleRun", "ReferenceFigure", "oracle_run"]
 
 _HORIZONTAL = (0, 1)
 
@@ -142,39 +142,6 @@ class ReferenceFigure:
             scenario, len(runs), sqrt(float(np.mean(rms**2))), sqrt(float(np.mean(bound**2))),
             ratio, _standard_error(square) / (2.0 * ratio), float(np.mean(consistency)), _standard_error(consistency),
         )  # fmt: skip
-
-
-def reference_figure(scenario: Scenario, seeds: Iterable[int]) -> ReferenceFigure:
-    """The reference figure of a simulated scenario, in real time.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        A simulated scenario, not a recorded one.
-    seeds : iterable of int
-        Seeds of the runs; 200 runs give a standard error of a few per cent.
-
-    Returns
-    -------
-    ReferenceFigure
-        The figure over all runs.
-
-    Raises
-    ------
-    SpecError
-        If the scenario is a recorded one, or the oracle fails on a run.
-    ValueError
-        If there are fewer than two seeds.
-
-    Examples
-    --------
-    >>> from simnav.scenario import load
-    >>> voyage = load("open-sea").model_copy(update={"duration": 20.0})
-    >>> found = reference_figure(voyage, range(4))
-    >>> found.runs, 0.3 < found.ratio < 3.0
-    (4, True)
-    """
-    return ReferenceFigure.of(scenario.id, [oracle_run(scenario, seed) for seed in seeds])
 
 
 def _standard_error(values: Array) -> float:

@@ -1,6 +1,6 @@
 """A policy with a memory on the tuning task: recurrent PPO of sb3-contrib, beside the plain filter.
 
-Install the extra ``rl`` (``pip install simnav[rl]``) and run it; it takes about half an hour on two cores::
+Install the extra ``rl`` (``pip install '.[rl]'``) and run it; it takes about half an hour on two cores::
 
     python examples/recurrent_policy.py
 

@@ -1,6 +1,6 @@
 """Stable-Baselines3 on the tuning task: PPO learns how noisy a receiver is, and becomes an estimator.
 
-Install the extra ``rl`` (``pip install simnav[rl]``) and run it; it takes less than ten minutes on two cores::
+Install the extra ``rl`` (``pip install '.[rl]'``) and run it; it takes less than ten minutes on two cores::
 
     python examples/stable_baselines.py --output policy.npz
 

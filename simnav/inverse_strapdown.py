@@ -253,15 +253,17 @@ def sample_from_motion(
     ratio = _ratio(0.25 * _square((x0, x1, x2)))
     r = 0.5 * ratio * x0, 0.5 * ratio * x1, 0.5 * ratio * x2
     # alpha from phi = (I + [alpha'/12 x]) alpha
-    h = memory[0] * TWELFTH, memory[1] * TWELFTH, memory[2] * TWELFTH
+    last_angle, last_velocity = memory[:3], memory[3:]
+    h = last_angle[0] * TWELFTH, last_angle[1] * TWELFTH, last_angle[2] * TWELFTH
     a = _solved(h, r)
     change = _velocity_change(c, v, w, z, (e0, e2), (k0, k1, k2), local.gravity, dt)
     angle2 = _square(r)
     sa, b = rotation_coefficients(angle2)
     k = 1.0 / 6.0 - angle2 * (1.0 / 120.0) if angle2 < 1e-3 else (1.0 - sa) / angle2
     m, inverse = _cofactors(r, h, angle2, b, k)
-    n = _nu(change, (memory[3], memory[4], memory[5]), a, m, inverse)
-    memory[0], memory[1], memory[2], memory[3], memory[4], memory[5] = a[0], a[1], a[2], n[0], n[1], n[2]
+    n = _nu(change, (last_velocity[0], last_velocity[1], last_velocity[2]), a, m, inverse)
+    last_angle[0], last_angle[1], last_angle[2] = a
+    last_velocity[0], last_velocity[1], last_velocity[2] = n
     inverse = 1.0 / dt
     return IdealSample(
         angular_rate=(a[0] * inverse, a[1] * inverse, a[2] * inverse),
@@ -417,14 +419,15 @@ def ideal_samples(block: Any, n: int, memory: Array, rate: Array, force: Array) 
             x = three_at(block.twice_sine, k)
             ratio = _ratio(0.25 * _square(x))
             put_three(phi, k, (0.5 * ratio * x[0], 0.5 * ratio * x[1], 0.5 * ratio * x[2]))
-    a = memory[0], memory[1], memory[2]
+    last_angle, last_velocity = memory[:3], memory[3:]
+    a = last_angle[0], last_angle[1], last_angle[2]
     put_three(alpha, 0, a)
     for k in range(m):
         a = _solved((a[0] * TWELFTH, a[1] * TWELFTH, a[2] * TWELFTH), three_at(phi, k))
         put_three(new, k, a)
         east = 0.5 * (velocity[1, k] + after[1, k])
         end[1, k] = position[1, k] + interval[k] * east * block.per_east[k]
-    memory[0], memory[1], memory[2] = a
+    last_angle[0], last_angle[1], last_angle[2] = a
     for k in range(m):
         block.square[k] = _square(three_at(phi, k))
     _coefficients(block, n)
@@ -433,14 +436,14 @@ def ideal_samples(block: Any, n: int, memory: Array, rate: Array, force: Array) 
         cofactors, inverse = _cofactors(three_at(phi, k), h, block.square[k], block.b[k], block.c[k])
         put_matrix(block.cofactors, k, cofactors)
         block.inverse[k] = inverse
-    nu = memory[3], memory[4], memory[5]
+    nu = last_velocity[0], last_velocity[1], last_velocity[2]
     for k in range(m):
         a = three_at(new, k)
         nu = _nu(three_at(block.change, k), nu, a, matrix_at(block.cofactors, k), block.inverse[k])
         inverse = 1.0 / interval[k]
         rate[k, 0], rate[k, 1], rate[k, 2] = a[0] * inverse, a[1] * inverse, a[2] * inverse
         force[k, 0], force[k, 1], force[k, 2] = nu[0] * inverse, nu[1] * inverse, nu[2] * inverse
-    memory[3], memory[4], memory[5] = nu
+    last_velocity[0], last_velocity[1], last_velocity[2] = nu
 
 
 @kernel

@@ -77,6 +77,11 @@ class Steps:
         return self.rows[:, 1]
 
     @property
+    def value(self) -> Array:
+        """(k, w) array: the components of each reading's value, and what stands behind them in `rows`."""
+        return self.rows[:, 2:]
+
+    @property
     def step(self) -> Integers:
         """(k,) array: the number of the step of each reading."""
         return np.repeat(np.arange(len(self)), np.diff(self.readings))

@@ -11,16 +11,17 @@ import numpy as np
 from simnav.compiled import helper, kernel
 from simnav.estimators.algebra.direct_update import normalised_square
 from simnav.estimators.models.filtering import Prediction, Readings
-from simnav.kernel_types import Matrix, Vector
+from simnav.kernel_types import Vector
 from simnav.structures import filled, structure
 from simnav.types import Array, Instruments
 
 from .base import Innovation
+from .inflation import inflate_all, inflate_moving
 from .noise import NoiseAdaptation, Posterior
 from .robust import igg3
 from .rules import copied
 
-__all__ = ["FACTORS", "AdaptiveFactor", "adkf_noise", "exponential", "three_segment", "two_segment"]
+__all__ = ["FACTORS", "AdaptiveFactor", "exponential", "three_segment", "two_segment"]
 
 Statistic = Literal["discrepancy", "residual", "ratio"]
 Factor = Literal["two-segment", "three-segment", "exponential"]
@@ -58,54 +59,109 @@ FACTORS: Mapping[str, Callable[[float, float, float], float]] = {
 }
 
 
+#: Thresholds of the factor function and its exponent; the smallest factor.
+SETTINGS = structure(c0=float, c1=float, two=float, smallest=float)
+
+
 @helper
-def _published_residual(residual: Vector, predicted: Matrix, noise: Matrix) -> float:
-    """Eq. 31: v'v / sqrt(tr S)."""
+def _whitened(prediction: Prediction) -> float:
+    """The residual statistic ``sqrt(v' S^-1 v / m)``; -1 if S is singular."""
+    innovation, _, predicted, nominal, _ = prediction
+    nis = normalised_square(innovation, predicted, nominal)
+    return -1.0 if nis < 0.0 else sqrt(nis / innovation.size)
+
+
+@helper
+def _printed(prediction: Prediction) -> float:
+    """The residual statistic as printed, eq. 31: v'v / sqrt(tr S)."""
+    innovation, _, predicted, nominal, _ = prediction
     square, trace = 0.0, 0.0
-    for i in range(residual.size):
-        square += residual[i] * residual[i]
-        trace += predicted[i, i] + noise[i, i]
+    for i in range(innovation.size):
+        square += innovation[i] * innovation[i]
+        trace += predicted[i, i] + nominal[i, i]
     return square / sqrt(trace)
 
 
-#: Whether the statistic is the printed one; which factor function (neither: the exponential one), with its thresholds
-#: and its exponent; and the smallest factor.
-SETTINGS = structure(printed=int, two_segment=int, three_segment=int, c0=float, c1=float, two=float, smallest=float)
+@helper
+def _divide(prediction: Prediction, statistic: float, factor: float, smallest: float) -> float:
+    """Divide the nominal noise by a factor. The result is the factor, or 0 for a singular S; R is then the nominal."""
+    nominal, noise = prediction.nominal, prediction.noise
+    copied(nominal, noise)
+    if statistic < 0.0:
+        return 0.0
+    factor = max(factor, smallest)
+    if factor != 1.0:
+        for i in range(nominal.shape[0]):
+            for j in range(nominal.shape[0]):
+                noise[i, j] = nominal[i, j] / factor
+    return factor
 
 
 @kernel(passed=True)
-def adkf_noise(
+def whitened_two_segment(
     settings: Vector, memory: Vector, common: Vector, readings: Readings, k: int, prediction: Prediction
 ) -> float:
-    """Divide the nominal noise by the factor of the residual statistic (`AdaptiveFactor`).
+    """Divide R by the factor of eq. 34 for the whitened residual; the result is that of `_divide`."""
+    own, statistic = settings.view(SETTINGS)[0], _whitened(prediction)
+    return _divide(prediction, statistic, two_segment(statistic, own.c0, own.c1), float(own.smallest))
 
-    Returns
-    -------
-    float
-        The factor; 0 if S is singular, and then the noise is the nominal one.
-    """
-    innovation, _, predicted, nominal, noise = prediction
-    own = settings.view(SETTINGS)[0]
-    copied(nominal, noise)
-    if own.printed:
-        statistic = _published_residual(innovation, predicted, nominal)
-    else:
-        nis = normalised_square(innovation, predicted, nominal)
-        if nis < 0.0:
-            return 0.0
-        statistic = sqrt(nis / innovation.size)
-    if own.two_segment:
-        factor = two_segment(statistic, own.c0, own.c1)
-    elif own.three_segment:
-        factor = three_segment(statistic, own.c0, own.c1, own.two)
-    else:
-        factor = exponential(statistic, own.c0, own.c1, own.two)
-    factor = max(factor, float(own.smallest))
-    if factor != 1.0:
-        for i in range(innovation.size):
-            for j in range(innovation.size):
-                noise[i, j] = nominal[i, j] / factor
-    return factor
+
+@kernel(passed=True)
+def whitened_three_segment(
+    settings: Vector, memory: Vector, common: Vector, readings: Readings, k: int, prediction: Prediction
+) -> float:
+    """Divide R by the factor of eq. 35 for the whitened residual; the result is that of `_divide`."""
+    own, statistic = settings.view(SETTINGS)[0], _whitened(prediction)
+    return _divide(prediction, statistic, three_segment(statistic, own.c0, own.c1, own.two), float(own.smallest))
+
+
+@kernel(passed=True)
+def whitened_exponential(
+    settings: Vector, memory: Vector, common: Vector, readings: Readings, k: int, prediction: Prediction
+) -> float:
+    """Divide R by the factor of eq. 36 for the whitened residual; the result is that of `_divide`."""
+    own, statistic = settings.view(SETTINGS)[0], _whitened(prediction)
+    return _divide(prediction, statistic, exponential(statistic, own.c0, own.c1, own.two), float(own.smallest))
+
+
+@kernel(passed=True)
+def printed_two_segment(
+    settings: Vector, memory: Vector, common: Vector, readings: Readings, k: int, prediction: Prediction
+) -> float:
+    """Divide R by the factor of eq. 34 for the residual as printed; the result is that of `_divide`."""
+    own, statistic = settings.view(SETTINGS)[0], _printed(prediction)
+    return _divide(prediction, statistic, two_segment(statistic, own.c0, own.c1), float(own.smallest))
+
+
+@kernel(passed=True)
+def printed_three_segment(
+    settings: Vector, memory: Vector, common: Vector, readings: Readings, k: int, prediction: Prediction
+) -> float:
+    """Divide R by the factor of eq. 35 for the residual as printed; the result is that of `_divide`."""
+    own, statistic = settings.view(SETTINGS)[0], _printed(prediction)
+    return _divide(prediction, statistic, three_segment(statistic, own.c0, own.c1, own.two), float(own.smallest))
+
+
+@kernel(passed=True)
+def printed_exponential(
+    settings: Vector, memory: Vector, common: Vector, readings: Readings, k: int, prediction: Prediction
+) -> float:
+    """Divide R by the factor of eq. 36 for the residual as printed; the result is that of `_divide`."""
+    own, statistic = settings.view(SETTINGS)[0], _printed(prediction)
+    return _divide(prediction, statistic, exponential(statistic, own.c0, own.c1, own.two), float(own.smallest))
+
+
+#: The rules of the residual statistic, by its form and by the factor function.
+WHITENED = {
+    "two-segment": whitened_two_segment,
+    "three-segment": whitened_three_segment,
+    "exponential": whitened_exponential,
+}
+PRINTED = {
+    "two-segment": printed_two_segment,
+    "three-segment": printed_three_segment,
+    "exponential": printed_exponential,
+}
 
 
 class _Preset(NamedTuple):
@@ -147,7 +203,7 @@ class AdaptiveFactor(NoiseAdaptation):
     factor can be used to inflate the measurement noise"): R/a for each instrument; with the residual statistic and the
     three-segment function these are IGG-III weights. By default the prediction is tested, too. If a fix and a log have
     failed their tests ``together`` times in a row, the prediction is taken as wrong: R is not changed, and the
-    covariance of position, velocity and attitude is inflated (`ErrorModel.loosen`). The covariance of the instruments'
+    covariance of position, velocity and attitude is inflated (`inflate_moving`). The covariance of the instruments'
     errors is not inflated, because these do not depend on the motion. `PredictionTest` also limits every inflation:
     eq. 28 with ten gross errors in a row would multiply the variances of unobserved states by 1e30. The covariance is
     updated in Joseph's form with the noise and P in use (the first line of eq. 29 lacks the factor).
@@ -169,7 +225,7 @@ class AdaptiveFactor(NoiseAdaptation):
     """
 
     SMALLEST = 1e-3
-    rule = adkf_noise
+    rule: Callable[..., float] = whitened_three_segment
     reported = "factor"
 
     def __init__(
@@ -195,10 +251,11 @@ class AdaptiveFactor(NoiseAdaptation):
         self.c1 = PRESETS[preset].c1 if c1 is None else c1
         if not (self.c0 > 0.0 and (factor != "three-segment" or self.c1 > self.c0)):
             raise ValueError(f"c0 = {self.c0:g} and c1 = {self.c1:g}: it must be 0 < c0 < c1")
-        self.function, self.factor = factor, FACTORS[factor]
+        self.factor, self.rule = FACTORS[factor], (PRINTED if self.as_published else WHITENED)[factor]
         self.together = 0 if self.as_published or target == "P" else together
         self.inflates = target == "P"
         self.inflates_motion = not self.inflates
+        self.inflate = inflate_all if self.inflates else inflate_moving
 
     def reset(self, instruments: Instruments) -> None:
         """Begin a run."""
@@ -212,17 +269,14 @@ class AdaptiveFactor(NoiseAdaptation):
 
     def settings_of(self, longer: float) -> Array:
         """As `NoiseAdaptation.settings_of`."""
-        return filled(
-            SETTINGS, printed=self.as_published, two_segment=self.function == "two-segment",
-            three_segment=self.function == "three-segment", c0=self.c0, c1=self.c1, two=2.0, smallest=self.SMALLEST,
-        )  # fmt: skip
+        return filled(SETTINGS, c0=self.c0, c1=self.c1, two=2.0, smallest=self.SMALLEST)
 
     def choose(self, innovation: Innovation) -> Array:
         """The noise to use: R divided by the factor if R is the target. Otherwise sets the inflation of P."""
         noise: Array = innovation.noise
         if self.statistic == "residual":
             noise = np.empty_like(innovation.noise)
-            factor = self.ask(adkf_noise, innovation, noise)
+            factor = self.ask(self.rule, innovation, noise)
         elif normalised_square(innovation.residual, innovation.predicted, innovation.noise) < 0.0:
             factor = 0.0
         else:

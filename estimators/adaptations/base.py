@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import ClassVar, NamedTuple
 
 from simnav.types import Array, Instruments, Measurement
+
+from .inflation import inflate_moving
 
 __all__ = ["Adaptation", "Innovation"]
 
@@ -54,22 +57,20 @@ class Adaptation:
         Factor by which the solver multiplies the covariance of the prediction, before it uses the measurement of the
         last call of `adapt`. Adaptations use it if the prediction is wrong and not the measurement.
     inflates : bool
-        True if all of P is multiplied by ``inflation``. A window has no covariance of a prediction, and refuses such
-        an adaptation.
-    inflates_position : bool
-        True if the covariance of the horizontal position is multiplied by ``inflation``, and what is known beside it
-        and independently of it is kept (`simnav.estimators.adaptations.intersection.weaken_position`). ``inflates`` is
-        then true as well.
+        True if the covariance of the prediction is always inflated, and not only where the motion is wrong. A window
+        has no such covariance, and refuses such an adaptation.
+    inflate : callable
+        What of the covariance is inflated (`simnav.estimators.adaptations.inflation`).
     inflates_motion : bool
-        Whether the covariance of the motion is inflated, and no other (`ErrorModel.loosen`). A window weighs motion by
-        its own residuals, and leaves this out.
+        Whether the covariance of the motion is inflated, and no other. A window weighs motion by its own residuals, and
+        leaves this out.
     reads_truth : bool
         Whether it needs the truth of a run, by a method ``reveal``; only an oracle passes it on.
     """
 
     inflation: float = 1.0
     inflates: bool = False
-    inflates_position: bool = False
+    inflate: Callable[..., bool] = inflate_moving
     inflates_motion: bool = False
     reads_truth: ClassVar[bool] = False
 

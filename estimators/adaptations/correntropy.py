@@ -10,54 +10,28 @@ import numpy as np
 from simnav.compiled import helper, kernel
 from simnav.estimators.algebra.direct_update import posterior
 from simnav.estimators.models.filtering import Prediction, Readings
-from simnav.kernel_types import Matrix, Vector
+from simnav.kernel_types import Vector
 from simnav.structures import filled, structure
 from simnav.types import Array
 
 from .noise import WeightedNoise
 
-__all__ = ["MaximumCorrentropy", "correntropy_noise", "correntropy_rule"]
+__all__ = ["MaximumCorrentropy", "from_prediction", "from_update"]
+
+
+#: Bandwidth [sigma], smallest weight, and largest number of iterations.
+SETTINGS = structure(bandwidth=float, smallest=float, iterations=int)
 
 
 @helper
-def correntropy_noise(
-    innovation: Vector,
-    predicted: Matrix,
-    nominal: Matrix,
-    bandwidth: float,
-    smallest: float,
-    iterations: int,
-    from_update: bool,
-    noise: Matrix,
-) -> float:
-    """The fixed-point iteration (see `MaximumCorrentropy`).
-
-    Parameters
-    ----------
-    innovation : (m,) array
-        Measurement minus its prediction.
-    predicted, nominal : (m, m) arrays
-        H P H' and R.
-    bandwidth, smallest : float
-        Bandwidth of the kernel [sigma], and the smallest weight of a measurement.
-    iterations : int
-        Largest number of fixed-point iterations.
-    from_update : bool
-        True: start from the residual after the plain update; False: from the innovation.
-    noise : (m, m) array
-        Overwritten with R divided by the weights.
-
-    Returns
-    -------
-    float
-        The smallest weight of a component.
-    """
-    m = innovation.size
-    residual, weights, after = innovation.copy(), np.zeros(m), np.empty((m, m))
-    if from_update:
-        posterior(innovation, predicted, nominal, residual, after)
+def _iterate(settings: Vector, prediction: Prediction, residual: Vector) -> float:
+    """The fixed-point iteration of `MaximumCorrentropy` from a residual, which is overwritten; the smallest weight."""
+    own = settings.view(SETTINGS)[0]
+    innovation, _, predicted, nominal, noise = prediction
+    bandwidth, smallest, m = own.bandwidth, own.smallest, innovation.size
+    weights, after = np.zeros(m), np.empty((m, m))
     least = 1.0
-    for k in range(iterations):
+    for k in range(own.iterations):
         least, settled = 1.0, True
         for i in range(m):
             w = max(exp(-0.5 * residual[i] * residual[i] / (bandwidth * bandwidth * nominal[i, i])), smallest)
@@ -67,26 +41,29 @@ def correntropy_noise(
         for i in range(m):
             for j in range(m):
                 noise[i, j] = nominal[i, j] / sqrt(weights[i] * weights[j])
-        if least > 0.7 or settled or k == iterations - 1:
+        if least > 0.7 or settled or k == own.iterations - 1:
             break  # a further iteration would hardly change the weights
         posterior(innovation, predicted, noise, residual, after)
     return least
 
 
-#: Bandwidth [sigma], smallest weight, largest number of iterations, and whether the first follows the update.
-SETTINGS = structure(bandwidth=float, smallest=float, iterations=int, from_update=int)
+@kernel(passed=True)
+def from_update(
+    settings: Vector, memory: Vector, common: Vector, readings: Readings, k: int, prediction: Prediction
+) -> float:
+    """Divide R by the weights, from the residual after the plain update; the smallest weight of a component."""
+    innovation, _, predicted, nominal, _ = prediction
+    residual, after = innovation.copy(), np.empty((innovation.size, innovation.size))
+    posterior(innovation, predicted, nominal, residual, after)
+    return _iterate(settings, prediction, residual)
 
 
 @kernel(passed=True)
-def correntropy_rule(
+def from_prediction(
     settings: Vector, memory: Vector, common: Vector, readings: Readings, k: int, prediction: Prediction
 ) -> float:
-    """Call `correntropy_noise`."""
-    own = settings.view(SETTINGS)[0]
-    innovation, _, predicted, nominal, noise = prediction
-    return correntropy_noise(
-        innovation, predicted, nominal, own.bandwidth, own.smallest, own.iterations, own.from_update > 0, noise
-    )
+    """Divide R by the weights, from the innovation; the smallest weight of a component."""
+    return _iterate(settings, prediction, prediction.innovation.copy())
 
 
 class MaximumCorrentropy(WeightedNoise):
@@ -114,7 +91,7 @@ class MaximumCorrentropy(WeightedNoise):
         The first weights are those of the residual after the plain update, or those of the innovation.
     """
 
-    rule = correntropy_rule
+    rule = from_update
 
     def __init__(
         self,
@@ -132,10 +109,8 @@ class MaximumCorrentropy(WeightedNoise):
         if begin not in ("update", "prediction"):
             raise ValueError(f"begin = {begin!r}: it must be 'update' or 'prediction'")
         self.bandwidth, self.iterations, self.smallest, self.begin = bandwidth, iterations, smallest, begin
+        self.rule = from_update if begin == "update" else from_prediction
 
     def settings_of(self, longer: float) -> Array:
         """As `NoiseAdaptation.settings_of`."""
-        return filled(
-            SETTINGS, bandwidth=self.bandwidth, smallest=self.smallest, iterations=self.iterations,
-            from_update=self.begin == "update",
-        )  # fmt: skip
+        return filled(SETTINGS, bandwidth=self.bandwidth, smallest=self.smallest, iterations=self.iterations)

@@ -12,6 +12,7 @@ from simnav.kernel_types import Vector
 from simnav.structures import filled, structure
 from simnav.types import Array
 
+from .inflation import inflate_all
 from .noise import NoiseAdaptation
 from .rules import copied
 
@@ -51,7 +52,7 @@ class FadingMemory(NoiseAdaptation):
 
     rule = fading_noise
     together = 0
-    inflates = True
+    inflates, inflate = True, inflate_all
 
     def __init__(self, memory: float = 1000.0):
         if not memory > 0.0:

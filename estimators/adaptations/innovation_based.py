@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cache
 from typing import Literal, NamedTuple
 
@@ -15,11 +16,11 @@ from simnav.structures import filled, length, structure
 from simnav.types import Array
 
 from .base import Innovation
-from .noise import EstimatedNoise, Scope
+from .noise import EstimatedNoise, Scope, as_prediction
 from .rules import copied
 from .scaled_noise import bound
 
-__all__ = ["FixedWindow", "InnovationBased", "adaptive_window", "innovation_noise"]
+__all__ = ["FixedWindow", "InnovationBased", "adaptive_window"]
 
 
 @helper
@@ -42,19 +43,51 @@ def adaptive_window(variance: float, nominal: float, low: float, high: float, sh
     return (shortest + longest) // 2 if variance > low * nominal else shortest
 
 
-#: Columns of a row of a window: v; then, each (m, m), v v', e e', and H P H' or minus H P+ H'.
+class _Epoch(NamedTuple):
+    """What a window keeps of an innovation of m components, or its sums over some of them.
+
+    Attributes
+    ----------
+    innovation : (m,) array
+        The innovation v.
+    square, residual : (m, m) array
+        v v', and e e' of the residual e.
+    predicted : (m, m) array
+        H P H', or minus H P+ H'.
+    """
+
+    innovation: Vector
+    square: Matrix
+    residual: Matrix
+    predicted: Matrix
+
+
+@helper
+def _width(m: int) -> int:
+    """Number of elements of a row of a window, of innovations of m components."""
+    return m + 3 * m * m
+
+
+@helper
+def _epoch(row: Vector, m: int) -> _Epoch:
+    """The parts of a row of a window, or of the sums over its rows; views."""
+    first, second, third = m, m + m * m, m + 2 * m * m
+    return _Epoch(
+        row[:first], row[first:second].reshape((m, m)), row[second:third].reshape((m, m)), row[third:].reshape((m, m))
+    )
+
+
 @helper
 def _push(rows: Matrix, count: int, innovation: Vector, residual: Vector, sign: float, predicted: Matrix) -> None:
     """Overwrite the oldest row with that of the present epoch."""
-    m, row = innovation.size, rows[count % rows.shape[0]]
-    at = m
+    m = innovation.size
+    epoch = _epoch(rows[count % rows.shape[0]], m)
     for i in range(m):
-        row[i] = innovation[i]
+        epoch.innovation[i] = innovation[i]
         for j in range(m):
-            row[at] = innovation[i] * innovation[j]
-            row[at + m * m] = residual[i] * residual[j]
-            row[at + 2 * m * m] = sign * predicted[i, j]
-            at += 1
+            epoch.square[i, j] = innovation[i] * innovation[j]
+            epoch.residual[i, j] = residual[i] * residual[j]
+            epoch.predicted[i, j] = sign * predicted[i, j]
 
 
 @helper
@@ -70,98 +103,26 @@ def _sums(rows: Array, count: int, n: int, sums: Array) -> None:
         r = r + 1 if r + 1 < ring else 0
 
 
-class _Window(NamedTuple):
-    """The length of a window.
-
-    Attributes
-    ----------
-    shortest, longest : int
-        Smallest and largest length; equal for a fixed one.
-    low, high : float
-        Bounds v_min and v_max of the ratio of variances between which the length is adapted.
-    """
-
-    shortest: int
-    longest: int
-    low: float
-    high: float
-
-
-@helper
-def _average(
-    rows: Matrix,
-    count: int,
-    predicted: Matrix,
-    nominal: Matrix,
-    window: _Window,
-    newest: bool,
-    forgetting: float,
-    estimate: Matrix,
-) -> int:
-    """Noise from the last innovations (eqs. 16-20).
-
-    Parameters
-    ----------
-    rows : (r, ...) array
-        Ring buffer of the rows of `_push`, one row for each epoch.
-    count : int
-        Number of epochs so far; the last r of them are in the buffer.
-    predicted, nominal : (m, m) arrays
-        H P H' and R.
-    window : _Window
-        The lengths that it may have.
-    newest : bool
-        True: subtract the newest H P H' from all epochs; False: from each epoch its own.
-    forgetting : float
-        Weight of the mean in the new estimate (a of eq. 18).
-    estimate : (m, m) array
-        The last estimate of R; updated.
-
-    Returns
-    -------
-    int
-        Length of the window.
-    """
-    shortest, longest = window.shortest, window.longest
-    m, ring, sums = nominal.shape[0], rows.shape[0], np.zeros(rows.shape[1])
-    length, n = shortest, 0
-    if longest > shortest and count > 1:
-        n = min(longest, count, ring)
-        _sums(rows, count, n, sums)
-        variance, trace = 0.0, 0.0
-        for i in range(m):
-            mean = sums[i] / n
-            variance += sums[m + i * (m + 1)] / n - mean * mean
-            trace += nominal[i, i] + predicted[i, i]
-        length = adaptive_window(variance, trace, window.low, window.high, shortest, longest)
-    if n != min(length, count, ring):
-        n = min(length, count, ring)
-        _sums(rows, count, n, sums)
-    for i in range(m):
-        for j in range(m):
-            at = m + i * m + j
-            subtracted = n * predicted[i, j] if newest else sums[at + 2 * m * m]
-            mean = (sums[at + m * m] - subtracted + (length - n) * nominal[i, j]) / length
-            estimate[i, j] += forgetting * (mean - estimate[i, j])
-    return length
+#: Between them is the mean square of innovations that do not contradict the datasheet, in units of its variance.
+LIMITS = structure(lower=float, upper=float)
 
 
 @cache
-def _contradiction(length: int, significance: float) -> tuple[float, float]:
-    """Lower and upper limit of the mean of ``length`` squared unit normals, each with the tail ``significance``."""
+def _contradiction(length: int, significance: float) -> Array:
+    """`LIMITS` of the mean of ``length`` squared unit normals, each with the tail ``significance``."""
     if significance >= 1.0:
-        return np.inf, 0.0
+        return filled(LIMITS, lower=np.inf, upper=0.0)
     from scipy.special import chdtri
 
-    return float(chdtri(length, 1.0 - significance)) / length, float(chdtri(length, significance)) / length
+    lower, upper = (float(chdtri(length, p)) / length for p in (1.0 - significance, significance))
+    return filled(LIMITS, lower=lower, upper=upper)
 
 
-#: Smallest and largest length of the window; bounds v_min and v_max; weight of the new estimate; whether the newest
-#: H P H' is subtracted, the data are residuals, and NumPy bounds the estimate; bounds of the variance ratios; lower and
-#: upper limit of a mean square, for the shortest, the middle and the longest window.
+#: Smallest and largest length of the window; bounds v_min and v_max; weight of the new estimate; bounds of the variance
+#: ratios; `LIMITS` of the shortest, the middle and the longest window.
 SETTINGS = structure(
-    shortest=int, longest=int, low=float, high=float, forgetting=float, newest=int, residual=int, full=int,
-    lowest=float, highest=float, of_shortest=2, of_middle=2, of_longest=2,
+    shortest=int, longest=int, low=float, high=float, forgetting=float, lowest=float, highest=float,
+    of_shortest=length(LIMITS), of_middle=length(LIMITS), of_longest=length(LIMITS),
 )  # fmt: skip
 #: Number of rows so far, whether there is an estimate, and its elements. In the memory the rows of `_push` follow.
 MEMORY = structure(count=int, begun=int, estimate=9)
@@ -171,67 +132,166 @@ _HEAD = length(MEMORY)
 @helper
 def _rows(settings: Array, memory: Array, m: int) -> Array:
     """The ring buffer in the memory."""
-    count, width = settings.view(SETTINGS)[0].longest, m + 3 * m * m
+    count, width = settings.view(SETTINGS)[0].longest, _width(m)
     return memory[_HEAD : _HEAD + count * width].reshape((count, width))
 
 
+class _Window(NamedTuple):
+    """The last innovations, or residuals, of a window.
+
+    Attributes
+    ----------
+    length : int
+        Length of the window.
+    rows : int
+        Number of rows in it; less than the length until it is full.
+    squares : (m, m) array
+        Sum of v v', or of e e'.
+    prior : (m, m) array
+        Sum of the H P H' that is subtracted, or of minus H P+ H'.
+    """
+
+    length: int
+    rows: int
+    squares: Matrix
+    prior: Matrix
+
+
 @kernel
-def _remember(settings: Vector, memory: Vector, innovation: Vector, predicted: Matrix, noise: Matrix) -> None:
-    """Store the residual after an update with the noise."""
-    m = innovation.size
+def _window(settings: Vector, memory: Vector, prediction: Prediction) -> _Window:
+    """The window with its length (eqs. 19 and 20), and its sums."""
+    predicted, nominal = prediction.predicted, prediction.nominal
+    own, count, m = settings.view(SETTINGS)[0], memory[:_HEAD].view(MEMORY)[0].count, nominal.shape[0]
+    rows, shortest, longest = _rows(settings, memory, m), own.shortest, own.longest
+    sums, length, n = np.zeros(rows.shape[1]), shortest, 0
+    total = _epoch(sums, m)
+    if longest > shortest and count > 1:
+        n = min(longest, count)
+        _sums(rows, count, n, sums)
+        variance, trace = 0.0, 0.0
+        for i in range(m):
+            mean = total.innovation[i] / n
+            variance += total.square[i, i] / n - mean * mean
+            trace += nominal[i, i] + predicted[i, i]
+        length = adaptive_window(variance, trace, own.low, own.high, shortest, longest)
+    if n != min(length, count):
+        n = min(length, count)
+        _sums(rows, count, n, sums)
+    return _Window(length, n, total.residual, total.predicted)
+
+
+@kernel
+def _estimate(settings: Vector, memory: Vector, prediction: Prediction, window: _Window, variance: Vector) -> float:
+    """Estimate the noise from a window (eqs. 16-18), and use it if the window contradicts the nominal one.
+
+    Parameters
+    ----------
+    settings, memory : array
+        As of a rule; the estimate in the memory is updated.
+    prediction : Prediction
+        Its noise is overwritten: with the estimate within its bounds, or with the nominal noise.
+    window : _Window
+        The window.
+    variance : (m,) array
+        Expected mean square of what is in the window, for each component.
+
+    Returns
+    -------
+    float
+        Length of the window; its negative if the nominal noise is contradicted.
+    """
+    nominal = prediction.nominal
+    own, kept, m, n = settings.view(SETTINGS)[0], memory[:_HEAD].view(MEMORY)[0], nominal.shape[0], window.length
+    forgetting = own.forgetting
+    if not kept.begun:
+        kept.begun, forgetting = 1, 1.0
+    estimate = kept.estimate[: m * m].reshape((m, m))
+    for i in range(m):
+        for j in range(m):
+            mean = (window.squares[i, j] - window.prior[i, j] + (n - window.rows) * nominal[i, j]) / n
+            estimate[i, j] += forgetting * (mean - estimate[i, j])
+    limits = own.of_shortest if n == own.shortest else own.of_longest if n == own.longest else own.of_middle
+    allowed = limits[:].view(LIMITS)[0]
+    for i in range(m):
+        if not allowed.lower <= 1.0 + (estimate[i, i] - nominal[i, i]) / variance[i] <= allowed.upper:
+            bound(estimate, nominal, own.lowest, own.highest, prediction.noise)
+            return -float(n)
+    copied(nominal, prediction.noise)
+    return float(n)
+
+
+@helper
+def _add_innovation(settings: Vector, memory: Vector, prediction: Prediction) -> None:
+    """Put an innovation into the window."""
+    innovation, kept = prediction.innovation, memory[:_HEAD].view(MEMORY)[0]
+    rows = _rows(settings, memory, innovation.size)
+    _push(rows, kept.count, innovation, innovation, 1.0, prediction.predicted)
+    kept.count += 1
+
+
+@kernel
+def _add_residual(settings: Vector, memory: Vector, prediction: Prediction) -> None:
+    """Put the residual after an update with the noise of a prediction into the window."""
+    innovation, _, predicted, _, noise = prediction
+    m, kept = innovation.size, memory[:_HEAD].view(MEMORY)[0]
     residual, after = np.empty(m), np.empty((m, m))
     posterior(innovation, predicted, noise, residual, after)
-    kept = memory[:_HEAD].view(MEMORY)[0]
     _push(_rows(settings, memory, m), kept.count, innovation, residual, -1.0, after)
     kept.count += 1
 
 
 @helper
-def _contradicted(limits: Array, residual: int, estimate: Array, nominal: Array, predicted: Array) -> bool:
-    """Whether the innovations, or residuals, contradict the nominal noise in a component."""
-    low, high = limits[0], limits[1]
-    for i in range(nominal.shape[0]):
-        noise, prior = nominal[i, i], predicted[i, i]
-        # Variance of the squared quantity: an innovation, or a residual, which is R S^-1 times the innovation.
-        variance = noise * noise / (noise + prior) if residual else noise + prior
-        if not low <= 1.0 + (estimate[i, i] - noise) / variance <= high:
-            return True
-    return False
+def _of_innovations(prediction: Prediction) -> Vector:
+    """Variances of the components of an innovation."""
+    variance = np.empty(prediction.innovation.size)
+    for i in range(variance.size):
+        variance[i] = prediction.nominal[i, i] + prediction.predicted[i, i]
+    return variance
 
 
 @kernel(passed=True)
-def innovation_noise(
+def from_innovations(
     settings: Vector, memory: Vector, common: Vector, readings: Readings, k: int, prediction: Prediction
 ) -> float:
-    """Estimate the noise (`InnovationBased`), and write it into ``noise`` within its bounds, or the nominal one.
+    """Estimate the noise from innovations, each with the H P H' of its own epoch; the result is that of `_estimate`."""
+    _add_innovation(settings, memory, prediction)
+    window = _window(settings, memory, prediction)
+    return _estimate(settings, memory, prediction, window, _of_innovations(prediction))
 
-    Returns
-    -------
-    float
-        Length of the window; its negative if the innovations contradict the nominal noise.
-    """
-    innovation, _, predicted, nominal, noise = prediction
-    m = innovation.size
-    own, kept = settings.view(SETTINGS)[0], memory[:_HEAD].view(MEMORY)[0]
-    rows = _rows(settings, memory, m)
-    if not own.residual:
-        _push(rows, kept.count, innovation, innovation, 1.0, predicted)
-        kept.count += 1
-    forgetting = own.forgetting
-    if not kept.begun:
-        kept.begun, forgetting = 1, 1.0
-    estimate = kept.estimate[: m * m].reshape((m, m))
-    window = _Window(own.shortest, own.longest, own.low, own.high)
-    n = _average(rows, kept.count, predicted, nominal, window, own.newest > 0, forgetting, estimate)
-    limits = own.of_shortest if n == own.shortest else own.of_longest if n == own.longest else own.of_middle
-    contradicted = _contradicted(limits, own.residual, estimate, nominal, predicted)
-    if contradicted:
-        bound(estimate, nominal, own.lowest, own.highest, noise)
-    else:
-        copied(nominal, noise)
-    if own.residual and not own.full:
-        _remember(settings, memory, innovation, predicted, noise)
-    return -float(n) if contradicted else float(n)
+
+@kernel(passed=True)
+def from_innovations_as_printed(
+    settings: Vector, memory: Vector, common: Vector, readings: Readings, k: int, prediction: Prediction
+) -> float:
+    """Estimate the noise from innovations, all with the newest H P H'; the result is that of `_estimate`."""
+    _add_innovation(settings, memory, prediction)
+    window = _window(settings, memory, prediction)
+    for i in range(prediction.innovation.size):
+        for j in range(prediction.innovation.size):
+            window.prior[i, j] = window.rows * prediction.predicted[i, j]
+    return _estimate(settings, memory, prediction, window, _of_innovations(prediction))
+
+
+@kernel
+def _from_earlier_residuals(
+    settings: Vector, memory: Vector, common: Vector, readings: Readings, k: int, prediction: Prediction
+) -> float:
+    """Estimate the noise from the residuals of earlier epochs; the result is that of `_estimate`."""
+    variance = np.empty(prediction.innovation.size)
+    for i in range(variance.size):  # a residual is R S^-1 times the innovation
+        noise = prediction.nominal[i, i]
+        variance[i] = noise * noise / (noise + prediction.predicted[i, i])
+    return _estimate(settings, memory, prediction, _window(settings, memory, prediction), variance)
+
+
+@kernel(passed=True)
+def from_residuals(
+    settings: Vector, memory: Vector, common: Vector, readings: Readings, k: int, prediction: Prediction
+) -> float:
+    """Estimate the noise from the residuals of earlier epochs, and keep that of this one; as `_estimate`."""
+    found = _from_earlier_residuals(settings, memory, common, readings, k, prediction)
+    _add_residual(settings, memory, prediction)
+    return found
 
 
 class InnovationBased(EstimatedNoise):
@@ -276,7 +336,7 @@ class InnovationBased(EstimatedNoise):
         (`EstimatedNoise`), and one of a wrong prediction (`PredictionTest`).
     """
 
-    rule = innovation_noise
+    rule: Callable[..., float] = from_innovations
     reported = "window"
 
     def __init__(
@@ -309,15 +369,15 @@ class InnovationBased(EstimatedNoise):
         self.significance = significance
         self.source, self.shortest, self.longest = source, shortest, longest
         self.low, self.high, self.forgetting, self.newest = low, high, forgetting, newest
+        of_innovations = from_innovations_as_printed if newest else from_innovations
+        self.rule = of_innovations if source == "innovation" else from_residuals
 
     def settings_of(self, longer: float) -> Array:
         """As `EstimatedNoise.settings_of`."""
         shortest, longest = round(self.shortest * longer), round(self.longest * longer)
-        residual = self.source == "residual"
         return filled(
             SETTINGS, shortest=shortest, longest=longest, low=self.low, high=self.high,
-            forgetting=1.0 - (1.0 - self.forgetting) ** (1.0 / longer), newest=self.newest and not residual,
-            residual=residual, full=self.full, lowest=self.lowest**2, highest=self.highest**2,
+            forgetting=1.0 - (1.0 - self.forgetting) ** (1.0 / longer), lowest=self.lowest**2, highest=self.highest**2,
             of_shortest=_contradiction(shortest, self.significance),
             of_middle=_contradiction((shortest + longest) // 2, self.significance),
             of_longest=_contradiction(longest, self.significance),
@@ -325,19 +385,20 @@ class InnovationBased(EstimatedNoise):
 
     def begun(self, longer: float, m: int) -> Array:
         """As `EstimatedNoise.begun`: an empty window."""
-        return np.concatenate([filled(MEMORY), np.zeros(round(self.longest * longer) * (m + 3 * m * m))])
+        return np.concatenate([filled(MEMORY), np.zeros(round(self.longest * longer) * _width(m))])
 
     def estimate(self, innovation: Innovation) -> Array:
         """The bounded estimate of a full matrix, or the nominal noise."""
-        m, residual, predicted, nominal, *_ = innovation
-        own, noise = self.memory_of(m.instrument), nominal
-        found = self.ask(innovation_noise, innovation, np.empty_like(nominal))
-        self.report_number(m.instrument, found)
+        name, nominal, noise = innovation.measurement.instrument, innovation.noise, np.empty_like(innovation.noise)
+        residuals = self.rule is from_residuals
+        found = self.ask(_from_earlier_residuals if residuals else self.rule, innovation, noise)
+        self.report_number(name, found)
+        settings, memory = self.memory_of(name)
         if found < 0.0:
-            elements = own[1][:_HEAD].view(MEMORY)[0].estimate[: nominal.size]
+            elements = memory[:_HEAD].view(MEMORY)[0].estimate[: nominal.size]
             noise = self.bounded(elements.reshape(nominal.shape), nominal)
-        if self.source == "residual":
-            _remember(*own, residual, predicted, noise)
+        if residuals:
+            _add_residual(settings, memory, as_prediction(innovation, noise))
         return noise
 
     def said(self, numbers: Array) -> Array:

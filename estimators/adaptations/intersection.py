@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from simnav.estimators.models.filtering import Dynamics, Prediction, Readings
 from simnav.types import KINDS, Array, Instruments
 
 from .base import Adaptation, Innovation
@@ -59,6 +60,12 @@ def weaken_position(covariance: Array, factor: float) -> None:
     covariance += (factor - 1.0) * columns @ np.linalg.solve(columns[:2], columns.T)
 
 
+def inflate_position(dynamics: Dynamics, readings: Readings, k: int, prediction: Prediction) -> bool:
+    """Weaken the position by the inflation of a reading, which is then to be predicted again."""
+    weaken_position(dynamics.covariance, float(readings.inflation[k]))
+    return True
+
+
 class CovarianceIntersection(Adaptation):
     """Uses ranges with messages of other vessels by covariance intersection, and every other measurement as it is.
 
@@ -82,7 +89,7 @@ class CovarianceIntersection(Adaptation):
     """
 
     inflates = True
-    inflates_position = True
+    inflate = staticmethod(inflate_position)
 
     def reset(self, instruments: Instruments) -> None:
         """Begin a run."""

@@ -39,7 +39,8 @@ __all__ = ["INPUTS", "MEMORY", "RECIPE", "VERSION", "LearnedNoise", "learned_noi
 RECIPE, VERSION = "noise-network", 1
 #: The inputs: three standardised components, size of the innovation, certainty of the prediction, time since the last
 #: reading, group of the instrument, and the mean size of the innovations of each group.
-NUMBER_OF_INPUTS = 6 + 2 * GROUPS
+INPUT = structure(component=3, magnitude=float, certainty=float, elapsed=float, group=GROUPS, usual=GROUPS)
+NUMBER_OF_INPUTS = length(INPUT)
 #: Names of the inputs, in order.
 INPUTS = (
     "component_0", "component_1", "component_2", "size", "certainty", "elapsed", "is_fix", "is_velocity", "is_heading",
@@ -74,20 +75,22 @@ def set_by_network(
     if not (square >= 0.0 and before >= 0.0 and u0 * u0 + u1 * u1 + u2 * u2 < LARGEST * LARGEST):
         return 0.0  # the filter is lost, and its innovations say nothing of the noise
     size = log1p(sqrt(square / m))
-    inputs, elapsed = kept.inputs[:], time - kept.heard
-    inputs[0], inputs[1], inputs[2], inputs[3] = asinh(u0), asinh(u1), asinh(u2), size
-    inputs[4] = min(max(log(before / m + 1e-12), -10.0), 10.0) / 3.0
-    inputs[5] = log1p(max(elapsed, 0.0)) if elapsed == elapsed else 0.0
+    inputs, elapsed = kept.inputs[:].view(INPUT)[0], time - kept.heard
+    inputs.component[0], inputs.component[1], inputs.component[2] = asinh(u0), asinh(u1), asinh(u2)
+    inputs.magnitude = size
+    inputs.certainty = min(max(log(before / m + 1e-12), -10.0), 10.0) / 3.0
+    inputs.elapsed = log1p(max(elapsed, 0.0)) if elapsed == elapsed else 0.0
     for g in range(GROUPS):
-        inputs[6 + g] = 1.0 if g == group else 0.0
-        inputs[6 + GROUPS + g] = groups.usual[g]
+        inputs.group[g] = 1.0 if g == group else 0.0
+        inputs.usual[g] = groups.usual[g]
     kept.heard = time
     last = groups.time[group]
     part = 1.0 - exp(-max(time - last, 0.0) / _MEMORY) if last == last else 0.3
     groups.usual[group] += part * (size - groups.usual[group])
     groups.time[group] = time
-    output = advance(settings[_WEIGHTS:], inputs, memory[HIDDEN : HIDDEN + own.units])
-    weight: float = max(1.0 / (1.0 + exp(-output)), own.least)
+    logit = np.empty(1)
+    advance(settings[_WEIGHTS:], kept.inputs[:], memory[HIDDEN : HIDDEN + own.units], logit)
+    weight: float = max(1.0 / (1.0 + exp(-logit[0])), own.least)
     for i in range(m):
         for j in range(m):
             noise[i, j] /= weight

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from types import FunctionType
 from typing import ClassVar, Literal
 
 import numpy as np
 
-from simnav.compiled import Kernel, ready
+from simnav.compiled import ready
 from simnav.estimators.algebra.direct_update import posterior
 from simnav.estimators.models.filtering import Prediction, Readings, room_for
 from simnav.types import KINDS, Array, Instruments
@@ -18,7 +19,7 @@ from .noise_report import NoiseReport
 from .prediction import PredictionTest
 from .scaled_noise import bound, scale
 
-__all__ = ["EstimatedNoise", "NoiseAdaptation", "Posterior", "Scope", "WeightedNoise", "scaled"]
+__all__ = ["EstimatedNoise", "NoiseAdaptation", "Posterior", "Scope", "WeightedNoise", "as_prediction", "scaled"]
 
 Scope = Literal["fixes", "all"]
 _NO_COVARIANCE = _NO_CROSS = np.empty((0, 0))
@@ -64,6 +65,11 @@ def scaled(noise: Array, factors: list[float]) -> Array:
     return product
 
 
+def as_prediction(innovation: Innovation, noise: Array) -> Prediction:
+    """An innovation as a rule takes it, with the noise that it overwrites."""
+    return Prediction(innovation.residual, _NO_CROSS, innovation.predicted, innovation.noise, noise)
+
+
 class NoiseAdaptation(Adaptation):
     """An adaptation that reports the sigma that it used: ``sigma_<component>.<instrument>``, for example
     ``sigma_north.gnss``. A subclass says its rule, or defines `choose` in Python.
@@ -81,9 +87,11 @@ class NoiseAdaptation(Adaptation):
     """
 
     together = 3
-    #: The kernel that chooses (`simnav.estimators.adaptations.rules`); None if there is none, as for a subclass that
-    #: chooses in its own way.
-    rule: ClassVar[Kernel[..., float] | None] = None
+    #: The function that chooses (`simnav.estimators.adaptations.rules`), of the class or of the instance; None if there
+    #: is none.
+    rule: Callable[..., float] | None = None
+    #: Whether a method of the class chooses in place of the rule of its base.
+    in_its_own_way: ClassVar[bool] = False
     #: What the number that the rule returns is reported as.
     reported: ClassVar[str] = ""
     #: Whether the rule estimates the noise, so that the last one stands while a prediction is poor.
@@ -91,8 +99,11 @@ class NoiseAdaptation(Adaptation):
 
     def __init_subclass__(cls) -> None:
         super().__init_subclass__()
-        if {"adapt", "choose", "estimate"} & vars(cls).keys() and "rule" not in vars(cls):
-            cls.rule = None
+        own = vars(cls)
+        if own.keys() & {"rule", "adapt", "choose", "estimate"}:
+            cls.in_its_own_way = "rule" not in own
+        if isinstance(rule := own.get("rule"), FunctionType):
+            cls.rule = staticmethod(rule)  # a plain function would be a method of the instance
 
     def reset(self, instruments: Instruments) -> None:
         """Begin a run."""
@@ -111,7 +122,7 @@ class NoiseAdaptation(Adaptation):
     @property
     def ruled(self) -> bool:
         """Whether a rule does all that `choose` does, with the parameters of this adaptation."""
-        return self.rule is not None
+        return self.rule is not None and not self.in_its_own_way
 
     def settings_of(self, longer: float) -> Array:
         """What the rule needs to know of an instrument with so many measurements in a second, at least 1."""
@@ -176,11 +187,10 @@ class NoiseAdaptation(Adaptation):
             prediction.noise[...] = chosen
         return 0.0
 
-    def ask(self, rule: Kernel[..., float], innovation: Innovation, noise: Array) -> float:
+    def ask(self, rule: Callable[..., float], innovation: Innovation, noise: Array) -> float:
         """What a kernel of a rule returns for a measurement; it overwrites the noise."""
-        m, residual, predicted, nominal, *_ = innovation
-        prediction = Prediction(residual, _NO_CROSS, predicted, nominal, noise)
-        return rule(*self.memory_of(m.instrument), self.rule_common, self._reading, 0, prediction)
+        memory = self.memory_of(innovation.measurement.instrument)
+        return rule(*memory, self.rule_common, self._reading, 0, as_prediction(innovation, noise))
 
     def choose(self, innovation: Innovation) -> Array | None:
         """The (m, m) noise to use, or None to reject the measurement; for an adaptation without a rule."""
@@ -192,7 +202,7 @@ class NoiseAdaptation(Adaptation):
 
     def report_number(self, name: str, number: float) -> None:
         """Report a number of an instrument. It stays until the next one."""
-        self.report.values[self.index[name], 3] = number
+        self.report.rows[self.index[name]].number = number
 
     def diagnostics(self) -> dict[str, float | Array]:
         """The sigmas last used, and other reported values."""

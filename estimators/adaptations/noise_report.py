@@ -3,12 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from simnav.structures import length, structure
 from simnav.types import KINDS, Array, Instruments
 
-__all__ = ["NoiseReport"]
+__all__ = ["CHOSEN", "NoiseReport"]
+
+#: What was chosen for an instrument: three sigmas, in the units of ``KINDS[kind].errors``, and a further number.
+CHOSEN = structure(sigma=3, number=float)
 
 
 class NoiseReport:
@@ -30,48 +36,62 @@ class NoiseReport:
     Attributes
     ----------
     values : (j, 4) array
-        Three sigmas and the number of each instrument; NaN for what there is not.
-    columns : list of (str, int)
-        Label and place in ``values`` of each sigma.
+        `CHOSEN` of each instrument; NaN for what there is not.
+    sigmas : list of (str, int, int)
+        Label, row and component of each reported sigma.
     numbers : list of (str, int)
-        The same of each number.
+        Label and row of each reported number.
     """
 
     def __init__(
-        self, instruments: Instruments, names: Sequence[str], number: str = "",
-        said: Callable[[Array], Array] | None = None, with_zero: bool = False,
-    ):  # fmt: skip
-        self.values, self._said, self.with_zero = np.full((len(instruments), 4), np.nan), said, with_zero
-        self.columns: list[tuple[str, int]] = []
+        self,
+        instruments: Instruments,
+        names: Sequence[str],
+        number: str = "",
+        said: Callable[[Array], Array] | None = None,
+        with_zero: bool = False,
+    ):
+        self.values, self._said, self.with_zero = np.full((len(instruments), length(CHOSEN)), np.nan), said, with_zero
+        self.sigmas: list[tuple[str, int, int]] = []
         self.numbers: list[tuple[str, int]] = []
+        rows = self.rows
         for row, (name, sheet) in enumerate(instruments.items()):
-            self.values[row, : len(sheet.sigma)] = sheet.sigma
+            rows[row].sigma[: len(sheet.sigma)] = sheet.sigma
             if name in names:
-                self.columns += [(f"sigma_{e}.{name}", 4 * row + a) for a, e in enumerate(KINDS[sheet.kind].errors)]
-                self.numbers += [(f"{number}.{name}", 4 * row + 3)] if number else []
+                self.sigmas += [(f"sigma_{e}.{name}", row, a) for a, e in enumerate(KINDS[sheet.kind].errors)]
+                self.numbers += [(f"{number}.{name}", row)] if number else []
+
+    @property
+    def rows(self) -> NDArray[Any]:
+        """(j,) array of `CHOSEN`: the values by name, a view."""
+        return self.values.view(CHOSEN)[:, 0]
 
     def note(self, row: int, sigma: Sequence[float], number: float) -> None:
         """Report what was chosen for an instrument: nothing if the first sigma is NaN."""
         if sigma[0] == sigma[0]:
-            self.values[row, : len(sigma)] = sigma
+            chosen = self.rows[row]
+            chosen.sigma[: len(sigma)] = sigma
             if number:
-                self.values[row, 3] = number
+                chosen.number = number
 
     def diagnostics(self) -> dict[str, float | Array]:
         """The present values by their labels."""
-        values = self.values.ravel().tolist()
-        found: dict[str, float | Array] = {label: values[at] for label, at in self.columns}
+        rows = self.rows
+        sigma = rows["sigma"].tolist()
+        found: dict[str, float | Array] = {label: sigma[row][a] for label, row, a in self.sigmas}
         if self.numbers:
-            numbers = self.said(self.values[:, 3]).tolist()
-            found |= {label: numbers[at // 4] for label, at in self.numbers if numbers[at // 4] == numbers[at // 4]}
+            numbers = self.said(rows["number"]).tolist()
+            found |= {label: numbers[row] for label, row in self.numbers if numbers[row] == numbers[row]}
         return found
 
     def table(self, values: Array) -> dict[str, Array]:
-        """The values of t steps by their labels, from a (t, 4 j) array; no number that has not been reported."""
-        found = {label: values[:, at] for label, at in self.columns}
-        for label, at in self.numbers:
-            if values[-1, at] == values[-1, at]:
-                found[label] = self.said(values[:, at])
+        """The values of t steps by their labels, from (t, 4 j) `values`; no number that has not been reported."""
+        rows = values.view(CHOSEN)
+        found = {label: rows["sigma"][:, row, a] for label, row, a in self.sigmas}
+        for label, row in self.numbers:
+            numbers = rows["number"][:, row]
+            if numbers[-1] == numbers[-1]:
+                found[label] = self.said(numbers)
         return found
 
     def said(self, numbers: Array) -> Array:

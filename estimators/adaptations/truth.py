@@ -20,7 +20,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import partial
 from itertools import product
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -44,6 +44,27 @@ CERTAIN = 0.95
 _POINTS = 14
 #: Faults with these effects are states (`simnav.sensors.faults.Effect`).
 LASTING = ("lasting", "growing")
+
+
+class _TrueError(NamedTuple):
+    """What is known of the error of a measurement.
+
+    Attributes
+    ----------
+    noise : (d, d) array
+        Covariance with the true sigma.
+    faults : list of int
+        The faults that are neither steps of the noise nor states.
+    stream : AidStream
+        The instrument's measurements.
+    place : int
+        Index of the measurement in it.
+    """
+
+    noise: Array
+    faults: list[int]
+    stream: AidStream
+    place: int
 
 
 class TrueNoise(Adaptation):
@@ -116,8 +137,8 @@ class TrueNoise(Adaptation):
         stream, times = self._streams[source]
         return stream, min(int(np.searchsorted(times, time - 1e-9)), len(times) - 1)
 
-    def _white(self, innovation: Innovation) -> tuple[Array, list[int], AidStream, int]:
-        """Noise with the true sigma; the faults that are neither noise steps nor states; stream and index."""
+    def _white(self, innovation: Innovation) -> _TrueError:
+        """What is known of the error of a measurement."""
         m = innovation.measurement
         stream, k = self._label(m.source, m.time)
         d = len(innovation.residual)
@@ -128,7 +149,7 @@ class TrueNoise(Adaptation):
         faults = (
             [j for j, f in enumerate(self.faults) if bits >> j & 1 and effect_of(f.kind) != "noise"] if bits else []
         )
-        return noise, faults, stream, k
+        return _TrueError(noise, faults, stream, k)
 
     def _variance(self, j: int, stream: AidStream, k: int, d: int) -> Array | None:
         """The variance that fault j adds to a measurement; None if the measurement must be rejected."""
@@ -171,7 +192,7 @@ class FaultTimes(TrueNoise):
         """The true noise of a measurement without a fault; None with one."""
         m = innovation.measurement
         stream, k = self._label(m.source, m.time)
-        return None if self._bits(stream, k) else self._white(innovation)[0]
+        return None if self._bits(stream, k) else self._white(innovation).noise
 
 
 class NominalNoise(TrueNoise):
@@ -191,7 +212,7 @@ class NominalNoise(TrueNoise):
         m = innovation.measurement
         stream, k = self._label(m.source, m.time)
         steps = sum(1 << j for j, f in enumerate(self.faults) if effect_of(f.kind) == "noise")
-        return innovation.noise if int(stream.faults[k]) & steps else self._white(innovation)[0]
+        return innovation.noise if int(stream.faults[k]) & steps else self._white(innovation).noise
 
 
 class MixtureNoise(TrueNoise):

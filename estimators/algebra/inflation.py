@@ -10,7 +10,7 @@ import numpy as np
 from simnav.compiled import kernel
 from simnav.kernel_types import Matrix, Vector
 
-__all__ = ["MotionStates", "inflate_motion"]
+__all__ = ["ALL_STATES", "NO_STATES", "MotionStates", "inflate_motion"]
 
 
 class MotionStates(NamedTuple):
@@ -19,7 +19,7 @@ class MotionStates(NamedTuple):
     Attributes
     ----------
     linear, linear_end : int
-        First index of position and velocity, and the index after their last.
+        First index of position and velocity, and the index after their last, or more where they are all that there is.
     attitude, attitude_end : int
         The same of the attitude.
     """
@@ -28,6 +28,10 @@ class MotionStates(NamedTuple):
     linear_end: int
     attitude: int
     attitude_end: int
+
+
+#: Position and velocity are all states; nothing is motion that may be wrong.
+ALL_STATES, NO_STATES = MotionStates(0, 10**9, 0, 0), MotionStates(0, 0, 0, 0)
 
 
 @kernel
@@ -46,7 +50,7 @@ def inflate_motion(covariance: Matrix, inflation: float, first: Vector, moving: 
         Where they are in the state.
     """
     sigma = np.ones(covariance.shape[0])
-    for i in range(moving.linear, moving.linear_end):
+    for i in range(moving.linear, min(moving.linear_end, covariance.shape[0])):
         sigma[i] = sqrt(inflation)
     for i in range(moving.attitude, moving.attitude_end):
         factor = first[i] / covariance[i, i]

@@ -30,7 +30,7 @@ from simnav.estimators.models.propagation import (
     advance_inertial,
 )
 from simnav.estimators.models.suitable import Suitable
-from simnav.estimators.solvers.admission import LATE
+from simnav.estimators.solvers.admission import LATE, is_usable
 from simnav.estimators.solvers.kalman import KalmanEstimator
 from simnav.kernel_types import FlagVector, IntegerMatrix, IntegerVector, Matrix, Stack, Vector
 from simnav.sensors.stepwise import Delivered, ImuSteps
@@ -254,10 +254,8 @@ def navigate(
                 d, t = instruments.components[b, i], when[b, j]
                 if d == 0:  # it is none of those that the filter uses
                     continue
-                plausible = since - LATE <= t <= until[b] + LATE and t > used[b, i]
-                for k in range(d):
-                    plausible = plausible and -limits[b, i, k] < value[b, j, k] < limits[b, i, k]
-                if not plausible:
+                begin, end = since - LATE, until[b] + LATE
+                if not is_usable(t, value[b, j], used[b, i], limits[b, i, :d], begin, end):
                     continue
                 used[b, i] = t
                 stop = min(t, until[b])

@@ -11,7 +11,7 @@ import numpy as np
 
 from simnav.estimates import Estimates
 from simnav.estimator.needs import Needs
-from simnav.estimators.algebra.inflation import MotionStates, inflate_motion
+from simnav.estimators.algebra.inflation import ALL_STATES, MotionStates
 from simnav.geometry.rotation import left_jacobian
 from simnav.types import (
     NO_SIDE,
@@ -29,13 +29,10 @@ from .filtering import Dynamics, ModelFunctions, aid_table
 from .measurement_functions import MeasurementFunction
 from .propagation import Samples
 
-__all__ = ["NO_SAMPLES", "ErrorModel", "Linearised", "Observation"]
+__all__ = ["NO_SAMPLES", "ErrorModel", "Linearised"]
 
 #: Of a step without an IMU.
 NO_SAMPLES = Samples(np.empty(0), np.empty(0), np.empty((0, 3)), np.empty((0, 3)))
-#: A measurement of m components with the covariance P of n states: innovation (m,), P H' (n, m), H P H' (m, m) and
-#: noise (m, m).
-Observation = tuple[Array, Array, Array, Array]
 
 
 class Linearised(NamedTuple):
@@ -93,8 +90,8 @@ class ErrorModel(ABC):
     memory: ClassVar[tuple[str, ...]] = ()
     #: Indices of the attitude, a rotation vector, in the error; None for a model without attitude.
     attitude_at: ClassVar[int | None] = None
-    #: Indices of position and velocity, and of the attitude, which `loosen` inflates. Here all states and none.
-    moving: ClassVar[tuple[slice, slice]] = (slice(None), slice(0, 0))
+    #: The states whose covariance is inflated where the motion is wrong.
+    moving: ClassVar[MotionStates] = ALL_STATES
 
     @property
     def needs(self) -> Needs:
@@ -211,55 +208,27 @@ class ErrorModel(ABC):
             numbers=nothing, covariance=covariance, transition=none, process_noise=none, constants=nothing,
             decay=nothing, density=nothing, first_variances=covariance.diagonal().copy(),
             correction=np.empty(len(covariance)), next_sample=np.zeros(1, np.int64),
-            aids=aid_table([], [], []),
+            aids=aid_table([], [], []), moving=self.moving,
         )  # fmt: skip
 
     @abstractmethod
     def correct(self, dx: Array) -> None:
         """Add a correction to the state."""
 
-    def assimilate_together(
-        self, measurements: Sequence[Measurement], covariance: Array, correction: Array
-    ) -> tuple[Array, Array] | None:
-        """Use measurements of one time, each with its nominal noise, linearised at the state before the first.
+    def measure_together(self, measurements: Sequence[Measurement]) -> Linearised | None:
+        """Linearise k measurements of one time at the present state, as `measure` does one, with the nominal noise.
 
         Parameters
         ----------
         measurements : sequence of Measurement
             Readings of channels of one instrument (`many`).
-        covariance : (n, n) array
-            Covariance of the model's error, updated.
-        correction : (n,) array
-            Overwritten with the correction of the state by all of them.
 
         Returns
         -------
-        nis, size : (k,) array
-            Normalised innovation squared and norm of each innovation, given the measurements before it; -1 for one that
-            was not used. None in place of both where the measurements have to be used one by one.
+        Linearised or None
+            Innovations (k, m), Jacobians (k, m, n) and noise (k, m, m); None if they have to be measured one by one.
         """
         return None
-
-    def loosen(self, covariance: Array, inflation: float, first: Array) -> None:
-        """Inflate the covariance of position, velocity and attitude in place, if the motion is wrong.
-
-        The prediction is wrong if the motion does not follow the model, or if the IMU is disturbed. Position and
-        velocity are then uncertain. The errors of the instruments have not changed. If their covariance were inflated,
-        too, they would follow the first wrong measurement.
-
-        Parameters
-        ----------
-        covariance : (n, n) array
-            Covariance P of the model's error, updated.
-        inflation : float
-            Factor on the variances, above 1.
-        first : (n,) array
-            Variances at the start of the run. The variance of the attitude is not inflated beyond this, so that
-            corrections stay in the linear range.
-        """
-        motion, attitude = self.moving
-        states = MotionStates(*motion.indices(self.size)[:2], *attitude.indices(self.size)[:2])
-        inflate_motion(covariance, inflation, first, states)
 
     def by_correction(self, jacobian: Array, correction: Array) -> Array:
         """A (m, n) Jacobian at the corrected state, taken with respect to the correction that led there.

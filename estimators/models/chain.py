@@ -385,18 +385,19 @@ class Chain(ABC):
         """The intermediate states as kernels take them."""
         return self._made.once(IntermediateStates, lambda: self.between.record(IntermediateStates))
 
+    def _changed(self) -> list[Array]:
+        """Views of the arrays that `retract` changes."""
+        motions, nodes = self.motions, [self.nodes[name] for name in self.front.state]
+        return [*nodes, motions["begin_shift"], motions["end_shift"], self.between["shift"], self.prior.shift]
+
     def copy_states(self) -> list[Array]:
-        """Copies of the arrays that `retract` changes, for `restore_states`."""
-        changed = [self.nodes[name].copy() for name in self.front.state]
-        shifts = self.motions["begin_shift"], self.motions["end_shift"], self.between["shift"], self.prior.shift
-        return [*changed, *(shift.copy() for shift in shifts)]
+        """Copies of what `retract` changes, for `restore_states`."""
+        return [array.copy() for array in self._changed()]
 
     def restore_states(self, states: list[Array]) -> None:
         """Take a `retract` back."""
-        for name, value in zip(self.front.state, states[:-4], strict=True):
-            self.nodes[name][...] = value
-        self.motions["begin_shift"][...], self.motions["end_shift"][...] = states[-4:-2]
-        self.between["shift"][...], self.prior.shift[...] = states[-2:]
+        for array, value in zip(self._changed(), states, strict=True):
+            array[...] = value
 
     def estimate(self, covariance: Array) -> Estimate:
         """The front as an estimate."""

@@ -20,7 +20,8 @@ from simnav.types import Array
 
 from .ambiguity import innovation_of
 from .channels import ChannelDatasheet, whole
-from .measurement_functions import MeasurementFunction
+from .inertial_errors import PART
+from .measurement_functions import Kinematics, MeasurementFunction
 
 __all__ = ["ChannelReadings", "channel_readings_of"]
 
@@ -132,8 +133,8 @@ class ChannelReadings:
         blocks = {name: np.broadcast_to(zero, (len(time), zero.shape[1])) for name, zero in self._zeros.items()}
         for name, at in self._at:
             blocks[name] = own[:, at]
-        position, velocity, dcm, turning = self._navigation(states, row, own)
-        points = NavigationPoints(time, position, velocity, dcm, turning, blocks, channel, side)
+        motion = self._navigation(states, row, own)
+        points = NavigationPoints(time=time, **motion._asdict(), blocks=blocks, channel=channel, side=side)
         reading, given = self._observations(points, self._sheet)
         jacobian = np.empty((len(time), value.shape[1], offset + own.shape[1])) if out is None else out
         jacobian[...] = 0.0
@@ -148,15 +149,15 @@ class ChannelReadings:
             reading[biased] = self.kind.add_error(reading[biased], own[biased[:, None], columns - offset])
         return innovation_of(self.kind, self._sheet, value, reading), jacobian
 
-    def _navigation(self, states: Sequence[Array], row: NDArray[np.intp], own: Array) -> tuple[Array, ...]:
-        """Position, velocity, DCM and angular rate at each of n readings; ``own`` is the (n, m) calibration there."""
+    def _navigation(self, states: Sequence[Array], row: NDArray[np.intp], own: Array) -> Kinematics:
+        """The motion at each of n readings; ``own`` is the (n, m) calibration there."""
         position, velocity, dcm, rate, bias, _ = states
         turning = rate[:, :3] - bias[:, :3] - np.einsum("nji,nj->ni", dcm, earth_rate(position[:, 0]))
-        return tuple(column.take(row, axis=0) for column in (position, velocity, dcm, turning))
+        return Kinematics(*(column.take(row, axis=0) for column in (position, velocity, dcm, turning)))
 
     def _by_navigation(self, derivative: Array, own: Array, jacobian: Array) -> None:
         """Write the (n, d, 9) derivative by the navigation state into that by the error state."""
-        jacobian[:, :, :9] = derivative
+        jacobian[:, :, PART.navigation] = derivative
 
     def more_noise(self, sides: Sequence[Array]) -> Array | None:
         """`MeasurementFunction.noise_without_state` of n readings.

@@ -28,6 +28,8 @@ from simnav.geometry.rotation import dcm_from_rotation_vector
 from simnav.kinds import WATER_SPEED, NavigationPoint, Observation
 from simnav.types import KINDS, Array, Datasheet
 
+from .inertial_errors import PART
+
 __all__ = ["DELAY", "acceleration", "is_delayed", "observation_at_delay", "with_delay"]
 
 #: Name of the block.
@@ -103,7 +105,7 @@ def observation_at_delay(inner: Observation) -> Observation:
         blocks[DELAY] = np.zeros((len(reading), size))
         blocks[DELAY][:, 0] = -(navigation @ motion)
         moved = np.array(navigation, dtype=np.float64)
-        moved[:, 3:6] -= tau * moved[:, :3]
+        moved[:, PART.velocity] -= tau * moved[:, PART.position]
         blocks[NAVIGATION] = moved
         return reading, blocks
 

@@ -123,8 +123,7 @@ class AttitudeDoubt:
 
     def begin(self, model: DoubtingModel, covariance: Array) -> None:
         """Doubt the attitude; the (n, n) covariance is updated."""
-        attitude = model.moving[1]
-        at = np.arange(attitude.start, attitude.stop)
+        at = np.arange(model.moving.attitude, model.moving.attitude_end)
         covariance[at, at] += np.square((self.level, self.level, self.heading))[: len(at)]
 
 

@@ -33,7 +33,7 @@ Source: Zhan et al. 2026, PLoS One 21(2) e0342016, eqs. 1-2 and 13-21. Where it 
 from __future__ import annotations
 
 from math import cos, sin
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -50,12 +50,11 @@ from .declared_errors import errors_of
 from .error_states import merged
 from .filtering import Aid
 from .inertial import InertialModel
+from .inertial_errors import ERROR
 from .measurements import DVL, observe
 
-__all__ = ["DELAY", "LEVER_ARM", "MISALIGNMENT", "SCALE", "DvlCalibrationModel"]
+__all__ = ["DvlCalibrationModel", "DvlErrors"]
 
-#: Places of the DVL's errors in the state.
-MISALIGNMENT, LEVER_ARM, SCALE, DELAY = slice(15, 18), slice(18, 21), 21, 22
 #: Of each component, after the paper's simulation: "diag(0.1, 0.1, 0.1, 5, 5, 5)^2" [m/s], [m].
 _PRINTED = {POSITION: 5.0, VELOCITY: 0.1, BODY_VELOCITY: 0.1}
 _IDENTITY = np.eye(3)
@@ -65,6 +64,23 @@ def _across(vector: Array) -> Array:
     """``[vector x]``, without the overhead of stacks."""
     x, y, z = vector.tolist()
     return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+
+
+class DvlErrors(NamedTuple):
+    """Places of the DVL's errors in the error state.
+
+    Attributes
+    ----------
+    misalignment, lever_arm : slice
+        Three components each [rad], [m].
+    scale, delay : slice
+        One component each [-], [s].
+    """
+
+    misalignment: slice
+    lever_arm: slice
+    scale: slice
+    delay: slice
 
 
 class DvlCalibrationModel(InertialModel):
@@ -82,6 +98,11 @@ class DvlCalibrationModel(InertialModel):
         Sigma of the DVL's time error [s], if the datasheet has no sigma of the offset of its stamps.
     preset : "default" or "paper"
         "paper": the noise of GNSS and DVL as printed, 5 m and 0.1 m/s, instead of the datasheets'.
+
+    Attributes
+    ----------
+    places : DvlErrors
+        Of the run's DVL.
     """
 
     fused = False
@@ -121,6 +142,11 @@ class DvlCalibrationModel(InertialModel):
         timing = self._dvl.timing
         sigma = self.delay if timing is None or not timing.offset else timing.offset
         self.blocks.add(name, "delay", StateBlock("delay", 1, "s", sigma).rates())
+        at = self.blocks.at
+        self.places = DvlErrors(
+            misalignment=at[f"{name}.misalignment"], lever_arm=at[f"{name}.{arm.name}"], scale=at[f"{name}.scale"],
+            delay=at[f"{name}.delay"],
+        )  # fmt: skip
 
     def measure(self, measurement: Measurement) -> Linearised | None:
         """Linearise one measurement: the DVL as in the module, others as in `simnav.estimators.models.measurements`."""
@@ -128,10 +154,15 @@ class DvlCalibrationModel(InertialModel):
             return self._measure_dvl(self._dvl, measurement.value)
         return super().measure(measurement)
 
+    def _values(self, at: slice) -> Array:
+        """The values of calibration states, from their places in the error state."""
+        return self.calibration[at.start - ERROR.calibration : at.stop - ERROR.calibration]
+
     def _measure_dvl(self, sheet: Datasheet, value: Array) -> Linearised:
-        eta, dl = self.calibration[0:3], self.calibration[3:6]
-        k, tau = float(self.calibration[6]), float(self.calibration[7])
-        u, raw, to_body = np.empty(3), np.empty((3, 12)), self.dcm.T
+        at = self.places
+        eta, dl = self._values(at.misalignment), self._values(at.lever_arm)
+        k, tau = float(self._values(at.scale)[0]), float(self._values(at.delay)[0])
+        u, raw, to_body = np.empty(3), np.empty((3, ERROR.accelerometer_bias)), self.dcm.T
         observe.unchecked(Aid(DVL, sheet.lever_arm + dl, -1, -1), np.zeros(3), self._state(), u, raw)
         u *= -1.0  # measured minus predicted
         latitude = float(self.position[0])
@@ -143,9 +174,10 @@ class DvlCalibrationModel(InertialModel):
         turned = _IDENTITY - s + 0.5 * (s @ s)
         matrix = (1.0 + k) * turned
         jacobian = np.zeros((3, self.size))
-        jacobian[:, 3:12] = matrix @ raw[:, 3:]
-        jacobian[:, MISALIGNMENT] = (1.0 + k) * (across - 0.5 * (_across(s @ u) + s @ across))
-        jacobian[:, LEVER_ARM] = matrix @ turn
-        jacobian[:, SCALE] = turned @ u
-        jacobian[:, DELAY] = -(matrix @ acceleration)
+        behind_position = slice(ERROR.velocity, ERROR.accelerometer_bias)
+        jacobian[:, behind_position] = matrix @ raw[:, behind_position]
+        jacobian[:, at.misalignment] = (1.0 + k) * (across - 0.5 * (_across(s @ u) + s @ across))
+        jacobian[:, at.lever_arm] = matrix @ turn
+        jacobian[:, at.scale] = (turned @ u)[:, None]
+        jacobian[:, at.delay] = -(matrix @ acceleration)[:, None]
         return Linearised(value - matrix @ u, jacobian, self.noise[sheet.name])

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from simnav.compiled import helper
+from simnav.estimators.algebra.inflation import MotionStates
 from simnav.kernel_types import FlagVector, IntegerVector, Matrix, Vector
 from simnav.records import Record
 from simnav.types import Array, Measurement
@@ -139,6 +140,8 @@ class Dynamics(Record):
         Index of the first IMU sample of the step that is not completely used.
     aids : AidTable
         The instruments.
+    moving : MotionStates
+        The states of the motion.
     points : SigmaPoints
         None of them where the filter linearises.
     """
@@ -154,6 +157,7 @@ class Dynamics(Record):
     correction: Vector
     next_sample: IntegerVector
     aids: AidTable
+    moving: MotionStates
     points: SigmaPoints = SigmaPoints(0.0, 0.0, 0.0, np.empty((0, 0)))
 
 
@@ -226,14 +230,15 @@ class ModelFunctions(NamedTuple):
         Predicts a reading: ``predict(dynamics, readings, k, prediction)``; False where there is no such reading.
     retract : Kernel
         Adds the correction to the state: ``retract(dynamics)``.
-    inflate_motion : Kernel
-        Inflates the covariance of the motion and predicts again: ``inflate_motion(dynamics, readings, k, prediction)``.
+    difference : callable, optional
+        The error that leads from another flat state to one: ``difference(numbers, other, error)`` overwrites the (n,)
+        ``error``. Only the window of a `simnav.estimators.models.function_model.FunctionModel` asks for it.
     """
 
     propagate: Callable[..., None]
     predict: Callable[..., bool]
     retract: Callable[..., None]
-    inflate_motion: Callable[..., None]
+    difference: Callable[..., None] | None = None
 
 
 def room_for(count: int) -> Readings:

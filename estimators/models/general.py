@@ -30,6 +30,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from simnav.estimators.algebra.inflation import NO_STATES
 from simnav.kinds import NavigationPoint
 from simnav.types import KINDS, NO_SIDE, Array, Datasheet, Estimate, InitialState, Instruments, Measurement
 
@@ -72,7 +73,7 @@ class GeneralModel(PointModel, MovingModel):
     """
 
     state = ("x", "extra")
-    moving = (slice(0, 0), slice(0, 0))
+    moving = NO_STATES
     equations: ClassVar[tuple[str, ...]] = tuple(EQUATIONS)
     errors: ClassVar[tuple[str, ...]] = ("bias", "current", "scale", "misalignment")
 

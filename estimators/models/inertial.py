@@ -43,7 +43,7 @@ from simnav.compiled import ready
 from simnav.estimates import Estimates
 from simnav.estimator import UnsuitableScenario
 from simnav.estimator.needs import AID, IMU, Needs
-from simnav.estimators.algebra.joseph import joseph_sequence
+from simnav.estimators.algebra.inflation import MotionStates
 from simnav.geometry.rotation import dcm_from_rpy
 from simnav.structures import filled
 from simnav.types import (
@@ -67,6 +67,7 @@ from .delayed import is_delayed
 from .equations import EQUATIONS, equation_of
 from .error_states import merged, merged_states
 from .filtering import Aid, AidTable, Dynamics, ModelFunctions, aid_table
+from .flat_state import FlatStateModel
 from .inertial_errors import ERROR
 from .inertial_functions import INERTIAL_FUNCTIONS
 from .lever_arms import has_measurement_function, with_lever_arms
@@ -75,7 +76,6 @@ from .measurements import (
     HEADING,
     State,
     has_heading,
-    observe,
 )
 from .propagation import (
     CLOCK,
@@ -84,9 +84,7 @@ from .propagation import (
     MOTION_NUMBERS,
     TURN_TIME,
     Samples,
-    correct_inertial,
     motion_of,
-    propagate_inertial,
 )
 from .state_blocks import StateBlocks
 
@@ -97,7 +95,7 @@ _NAV, _MOTION = ERROR.calibration, ERROR.gyroscope_bias
 _GRAVITY = 9.81
 
 
-class InertialModel(ErrorModel):
+class InertialModel(FlatStateModel):
     """The model of the module.
 
     Parameters
@@ -138,14 +136,15 @@ class InertialModel(ErrorModel):
     state = ("position", "velocity", "dcm", "bias", "calibration")
     memory = ("numbers",)
     attitude_at = ERROR.attitude
-    moving = (slice(ERROR.position, ERROR.attitude), slice(ERROR.attitude, ERROR.gyroscope_bias))
-    #: True if the kernels of `simnav.estimators.models.inertial_functions` may replace `measure`, `correct` and
-    #: `loosen`. A model with another form of one of these methods, or of those of points, sets it to False.
+    equations = INERTIAL_FUNCTIONS
+    moving = MotionStates(ERROR.position, ERROR.attitude, ERROR.attitude, ERROR.gyroscope_bias)
+    #: True if the kernels of `simnav.estimators.models.inertial_functions` may replace `measure` and
+    #: `correct`. A model with another form of one of these methods, or of those of points, sets it to False.
     fused: ClassVar[bool] = True
 
     def __init_subclass__(cls) -> None:
         super().__init_subclass__()
-        own = {"measure", "correct", "loosen", "propagate_points", "observe_points"} & vars(cls).keys()
+        own = {"measure", "correct", "propagate_points", "observe_points"} & vars(cls).keys()
         if own and cls.fused and "fused" not in vars(cls):
             raise TypeError(f"{cls.__name__} has {', '.join(sorted(own))} of its own; it has to say: fused = False")
 
@@ -211,7 +210,7 @@ class InertialModel(ErrorModel):
         self._bind()
         self.position[:], self.velocity[:], self.dcm[:] = start.position, start.velocity, dcm_from_rpy(start.attitude)
         self._time[0], self.motion.clock.view(CLOCK)["used"] = start.time, -1e9
-        self._jacobians = {name: np.empty((len(noise), n)) for name, noise in self.noise.items()}
+        self.names = list(self.noise)
         covariance = np.zeros((n, n))
         covariance[:_MOTION, :_MOTION] = start.covariance
         covariance[range(_MOTION, n), range(_MOTION, n)] = variance
@@ -326,7 +325,7 @@ class InertialModel(ErrorModel):
 
     def functions(self) -> ModelFunctions | None:
         """As `ErrorModel.functions`; None if an instrument has an equation or a clock of its own."""
-        return INERTIAL_FUNCTIONS if self._fused == set(self.noise) and not self.blocks.clocks else None
+        return self.equations if self._fused == set(self.noise) and not self.blocks.clocks else None
 
     def dynamics(self, covariance: Array, names: Sequence[str]) -> Dynamics:
         """As `ErrorModel.dynamics`."""
@@ -334,7 +333,7 @@ class InertialModel(ErrorModel):
             numbers=self.numbers, covariance=covariance, transition=self.transition, process_noise=self.process_noise,
             constants=self._noise, decay=self._decay, density=self._density,
             first_variances=covariance.diagonal().copy(), correction=np.empty(self.size), next_sample=self.next_sample,
-            aids=self.table(names),
+            aids=self.table(names), moving=self.moving,
         )  # fmt: skip
 
     def table(self, names: Sequence[str]) -> AidTable:
@@ -355,13 +354,8 @@ class InertialModel(ErrorModel):
     def propagate(self, covariance: Array, until: float) -> None:
         """Advance the state and its covariance through the samples loaded."""
         elapsed = until - self.time
-        if elapsed <= 0.0:
-            return
-        self.next_sample[0] = propagate_inertial.unchecked(
-            self.motion, self.samples, int(self.next_sample[0]), until, self._noise,
-            (self.transition, self.process_noise, covariance), (self.calibration, self._decay, self._density), elapsed,
-        )  # fmt: skip
-        if self.blocks.clocks:
+        super().propagate(covariance, until)
+        if elapsed > 0.0 and self.blocks.clocks:
             self.blocks.carry_values(self.calibration, _NAV, elapsed)
             self.blocks.carry_covariance(covariance, elapsed)
 
@@ -392,14 +386,11 @@ class InertialModel(ErrorModel):
                 return None
             noise = self.noise[name] if found[2] is None else self.noise[name] + found[2]
             return Linearised(*found[:2], noise)
-        jacobian, noise = self._jacobians[name], self.noise[name]
-        innovation, value = np.empty(len(noise)), measurement.value.astype(np.float64)
-        if not observe.unchecked(self.aid_parameters[name], value, self._state(), innovation, jacobian):
-            return None
-        if name in self.uncalibrated:
-            sheet = self.instruments[name]
-            noise = noise + equation_of(sheet).uncalibrated_noise(sheet, value - innovation)
-        return Linearised(innovation, jacobian, noise)
+        linearised = super().measure(measurement)
+        if linearised is None or name not in self.uncalibrated:
+            return linearised
+        sheet, predicted = self.instruments[name], measurement.value - linearised.innovation
+        return linearised._replace(noise=linearised.noise + equation_of(sheet).uncalibrated_noise(sheet, predicted))
 
     def _state(self) -> State:
         return self._viewed
@@ -414,17 +405,15 @@ class InertialModel(ErrorModel):
     def observe_own(
         self, name: str, time: float, value: Array, state: tuple[Array, ...], side: Array = NO_SIDE
     ) -> tuple[Array, Array] | None:
-        """As `ErrorModel.observe_own`; the state is position, velocity, DCM, angular rate, bias and calibration."""
-        found = self._linearise_own(name, time, value, state, side)
+        """As `ErrorModel.observe_own`; the state is that of `State`."""
+        found = self._linearise_own(name, time, value, State(*state), side)
         return None if found is None else found[:2]
 
     def _linearise_own(
-        self, name: str, time: float, value: Array, state: tuple[Array, ...], side: Array
+        self, name: str, time: float, value: Array, state: State, side: Array
     ) -> tuple[Array, Array, Array | None] | None:
-        position, velocity, dcm, rate, bias, calibration = state
-        own, size = self.own[name], _NAV + len(calibration)
-        point = own.point(time, position, velocity, dcm, rate, bias, calibration, side)
-        return own.linearise(point, value, calibration, size, self.bias_at.get(name, -1))
+        own, size = self.own[name], _NAV + len(state.calibration)
+        return own.linearise(own.point(time, state, side), value, state.calibration, size, self.bias_at.get(name, -1))
 
     def nominal_noise(self, measurement: Measurement) -> Array | None:
         """The noise of the datasheet; None if the noise depends on the state."""
@@ -442,28 +431,19 @@ class InertialModel(ErrorModel):
         more = None if many is None else many.more_noise([m.side for m in measurements])
         return None if more is None else self.noise[name] + more
 
-    def assimilate_together(
-        self, measurements: Sequence[Measurement], covariance: Array, correction: Array
-    ) -> tuple[Array, Array] | None:
-        """As `ErrorModel.assimilate_together`, where a kind predicts many readings at one time."""
+    def measure_together(self, measurements: Sequence[Measurement]) -> Linearised | None:
+        """As `ErrorModel.measure_together`, where a kind predicts many readings at one time."""
         times, names, _, values, _, sides = zip(*measurements)
         many = self._many_of.get(names[0])
         if many is None or many.biased or many.has_noise or not self.fused:
             return None
         k, side, (beyond, unit) = len(names), np.array(sides), self._beyond[names[0]]
         noise = beyond + many.noise(side)[:, :, None] * unit
-        residual, jacobian = many.linearise(
+        innovation, jacobian = many.linearise(
             np.array(times), np.array(values), many.channels(names), [array[None] for array in self._state()],
             np.zeros(k, dtype=np.intp), side, _NAV,
         )  # fmt: skip
-        nis, size = np.empty(k), np.empty(k)
-        joseph_sequence(covariance, residual, jacobian, noise, correction, nis, size)
-        self.correct(correction)
-        return nis, size
-
-    def correct(self, dx: Array) -> None:
-        """Add a correction to the state."""
-        correct_inertial(self.position, self.velocity, self.dcm, self.bias, self.calibration, dx)
+        return Linearised(innovation, jacobian, noise)
 
     def estimate(self, covariance: Array) -> Estimate:
         """The state as an estimate, all nine components."""

@@ -14,14 +14,15 @@ from numpy.typing import NDArray
 from simnav.compiled import helper, kernel
 from simnav.estimators.algebra.block_tridiagonal import after_step, error_after_step, whiten_one
 from simnav.estimators.algebra.factors import Rows, Window
-from simnav.kernel_types import IntegerVector, Matrix, Stack
+from simnav.kernel_types import Matrix, Stack
 from simnav.records import Record
 from simnav.types import Array, InitialState, Instruments
 
 from .chain import Chain, chain_of
 from .columns import Columns
-from .filtering import Aid
+from .filtering import AidTable, aid_of
 from .inertial import InertialModel
+from .inertial_errors import ERROR
 from .inertial_functions import INERTIAL_FUNCTIONS
 from .intermediate_states import IntermediateStates, add_noise, through_one
 from .marginalisation import Reference
@@ -43,25 +44,6 @@ class MovedStates(Record):
     calibration: Matrix
 
 
-class Equations(Record):
-    """The measurement equations of the instruments, see `simnav.estimators.models.measurements.Aid`.
-
-    Attributes
-    ----------
-    code : (i,) array of int
-        Measurement equation; `simnav.estimators.models.measurements.OWN` where it is a function of the kind.
-    lever_arm : (i, 3) array
-        In body axes [m].
-    bias_at, scale_at : (i,) array of int
-        Places of bias and scale factor in the error; -1 for none.
-    """
-
-    code: IntegerVector
-    lever_arm: Matrix
-    bias_at: IntegerVector
-    scale_at: IntegerVector
-
-
 class InertialWindow(Record):
     """The window of an inertial model: nodes and factors, the inertial states of its nodes, and what lies between."""
 
@@ -70,7 +52,7 @@ class InertialWindow(Record):
     between: IntermediateStates
     predicted: InertialStates
     moved: MovedStates
-    equations: Equations
+    instruments: AidTable
 
 
 @kernel
@@ -112,7 +94,7 @@ def _move_between(first: int, end: int, w: InertialWindow) -> None:
         w.between.transition, w.between.shift, w.between.jacobian, w.predicted, w.moved,
     )  # fmt: skip
     n, c = shift.shape[1], now.calibration.shape[1]
-    moved, dx = np.empty(n), np.zeros(15 + c)
+    moved, dx = np.empty(n), np.zeros(ERROR.calibration + c)
     for k in range(first, end):
         for i in range(3):
             now.position[k, i], now.velocity[k, i] = predicted.position[k, i], predicted.velocity[k, i]
@@ -150,10 +132,10 @@ def _linearise_motion(w: InertialWindow, rows: Rows, first: int) -> None:
 @kernel
 def _linearise_readings(w: InertialWindow, rows: Rows, first: int) -> None:
     """Predict the readings of a node or of later ones whose equation is compiled, at nodes or intermediate states."""
-    aids, equations, states, now, rate = w.window.aids, w.equations, w.states, w.moved, w.predicted.raw_rate
+    aids, instruments, states, now, rate = w.window.aids, w.instruments, w.states, w.moved, w.predicted.raw_rate
     node, between, residual, jacobian = aids.node, aids.between, aids.residual, aids.jacobian
     n, begin, end = jacobian.shape[2], _first_aid(w, rows, first), rows.first_aid + rows.aids
-    innovation, wide, b0 = np.empty(3), np.zeros((3, 15)), rows.first_between
+    innovation, wide, b0 = np.empty(3), np.zeros((3, ERROR.calibration)), rows.first_between
     if rows.between and begin < end:
         at = b0 + rows.between
         while at > b0 and w.between.node[at - 1] >= node[begin]:
@@ -161,7 +143,7 @@ def _linearise_readings(w: InertialWindow, rows: Rows, first: int) -> None:
         _move_between(at, b0 + rows.between, w)
     for i in range(begin, end):
         s = aids.instrument[i]
-        if equations.code[s] == OWN:
+        if instruments.code[s] == OWN:
             continue
         if between[i] >= 0:
             k = b0 + between[i] - rows.base_between
@@ -173,13 +155,13 @@ def _linearise_readings(w: InertialWindow, rows: Rows, first: int) -> None:
                 states.calibration[k],
             )  # fmt: skip
         d = observe_inertial(
-            Aid(equations.code[s], equations.lever_arm[s], equations.bias_at[s], equations.scale_at[s]),
-            aids.value[i], state, innovation, jacobian[i] if n >= 15 else wide,
+            aid_of(instruments, s),
+            aids.value[i], state, innovation, jacobian[i] if n >= ERROR.calibration else wide,
         )  # fmt: skip
         aids.components[i] = d
         for r in range(3):
             residual[i, r] = innovation[r] if r < d else 0.0
-        if n < 15:
+        if n < ERROR.calibration:
             for r in range(3):
                 for c in range(n):
                     jacobian[i, r, c] = wide[r, c]
@@ -200,7 +182,7 @@ def _refer_to_nodes(w: InertialWindow, rows: Rows, first: int) -> None:
                 add_noise(
                     aids.jacobian[i], aids.components[i], between.noise[k], aids.noise[i], aids.whitener[i], work
                 )  # fmt: skip
-            through_one(between.jacobian[k], min(15, n), aids.jacobian[i], work)
+            through_one(between.jacobian[k], min(ERROR.calibration, n), aids.jacobian[i], work)
         aids.norm[i] = whiten_one(aids.residual[i], aids.whitener[i], aids.whitened[i])
 
 
@@ -223,12 +205,12 @@ def _retract(w: InertialWindow, rows: Rows, step: Matrix) -> None:
     rows : Rows
         Where it is.
     step : (K, n) array
-        Corrections, with a rotation vector at 6:9 that turns the attitude from the left; its first row is that of the
-        first node.
+        Corrections, of which the rotation vector at `ERROR.attitude` turns the attitude from the left; its first row
+        is that of the first node.
     """
     states, motions, between, shift = w.states, w.window.motions, w.between, w.window.prior.shift
     n, k0, m0, count = step.shape[1], rows.first_node, rows.first_motion, rows.nodes
-    dx, before = np.zeros(max(n, 15)), np.empty(n)
+    dx, before = np.zeros(max(n, ERROR.calibration)), np.empty(n)
     for k in range(count):
         row, m = k0 + k, m0 + k
         for j in range(n):
@@ -263,7 +245,7 @@ class InertialChain(Chain):
         Of 15 states, with or without calibration states, or the 9-state model.
     """
 
-    coupled = 15
+    coupled = ERROR.calibration
     front: InertialModel
 
     @property
@@ -275,14 +257,8 @@ class InertialChain(Chain):
         """One node, at the start; its covariance. UnsuitableScenario without an IMU."""
         covariance = super().begin(start, instruments)
         front = self.front
-        nothing = Aid(0, np.zeros(3), -1, -1)
-        known = [Aid(*front.aid_parameters.get(name, nothing)) for name in self.names]
-        self._equations = Equations(
-            code=np.array([OWN if name in front.own else aid.code for name, aid in zip(self.names, known)], np.int64),
-            lever_arm=np.array([aid.lever_arm for aid in known], dtype=np.float64).reshape(-1, 3),
-            bias_at=np.array([aid.bias_at for aid in known], dtype=np.int64),
-            scale_at=np.array([aid.scale_at for aid in known], dtype=np.int64),
-        )
+        self._instruments = front.table(self.names)
+        self._instruments.code[[name in front.own for name in self.names]] = OWN
         self.functions = INERTIAL_FACTORS if front.functions() is INERTIAL_FUNCTIONS else None
         if self.functions is not None:
             self.dynamics = front.dynamics(covariance, self.names)
@@ -302,7 +278,7 @@ class InertialChain(Chain):
         return InertialWindow(
             window=self.window, states=self.nodes.record(InertialStates), between=self._states_between,
             predicted=self.between.record(InertialStates), moved=self.between.record(MovedStates, "now_"),
-            equations=self._equations,
+            instruments=self._instruments,
         )  # fmt: skip
 
     def growing(self, count: int) -> Growing:
@@ -345,13 +321,13 @@ class InertialChain(Chain):
 
     def observe(self, first: int, row: NDArray[np.int64], states: Columns, prefix: str, jacobian: Array) -> None:
         """As `Chain.observe`, for readings whose kind has a measurement equation of its own."""
-        wide = jacobian if self.size >= 15 else np.zeros((len(jacobian), 3, 15))
+        wide = jacobian if self.size >= ERROR.calibration else np.zeros((len(jacobian), 3, ERROR.calibration))
         position, velocity, dcm, bias, calibration = (states[prefix + name] for name in self.front.state)
         arrays = [states[name] for name in self.node_arrays]
         inertial = arrays[0] if len(arrays) == 1 else np.hstack(arrays)
         self.observe_own(first, row, wide, position, velocity, dcm, inertial, bias, calibration)
         if wide is not jacobian:
-            own = self._equations.code[self.aids["instrument"][first:]] == OWN
+            own = self._instruments.code[self.aids["instrument"][first:]] == OWN
             here = np.flatnonzero((row[first:] >= 0) & own) + first
             jacobian[here] = wide[here, :, : self.size]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-__all__ = ["ERROR", "InertialErrors"]
+__all__ = ["ERROR", "PART", "InertialErrors", "InertialParts"]
 
 
 class InertialErrors(NamedTuple):
@@ -29,5 +29,41 @@ class InertialErrors(NamedTuple):
     accelerometer_bias: int = 12
     calibration: int = 15
 
+    @property
+    def heading(self) -> int:
+        """The component of the attitude about the vertical; for Python, not in kernels."""
+        return self.attitude + 2
+
 
 ERROR = InertialErrors()
+
+
+class InertialParts(NamedTuple):
+    """The components of each part, for Python. Those of `simnav.types.Estimate.covariance` are the same.
+
+    Attributes
+    ----------
+    position, velocity, attitude, gyroscope_bias : slice
+        As of `InertialErrors`.
+    motion : slice
+        Position and velocity.
+    navigation : slice
+        Position, velocity and attitude.
+    """
+
+    position: slice
+    velocity: slice
+    attitude: slice
+    gyroscope_bias: slice
+    motion: slice
+    navigation: slice
+
+
+PART = InertialParts(
+    position=slice(ERROR.position, ERROR.velocity),
+    velocity=slice(ERROR.velocity, ERROR.attitude),
+    attitude=slice(ERROR.attitude, ERROR.gyroscope_bias),
+    gyroscope_bias=slice(ERROR.gyroscope_bias, ERROR.accelerometer_bias),
+    motion=slice(ERROR.position, ERROR.attitude),
+    navigation=slice(ERROR.position, ERROR.gyroscope_bias),
+)

@@ -5,21 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from simnav.compiled import helper, kernel
-from simnav.estimators.algebra.inflation import MotionStates, inflate_motion
 from simnav.estimators.algebra.joseph import joseph_update, project
 from simnav.types import Array
 
 from .filtering import Aid, Dynamics, ModelFunctions, Prediction, Readings, aid_of
-from .inertial_errors import ERROR
 from .measurements import State, observe_inertial
 from .propagation import CLOCK, MOTION_NUMBERS, Samples, correct_inertial, motion_of, propagate_inertial, time_of
 
 __all__ = ["INERTIAL_FUNCTIONS", "state_of", "use_reading"]
-
-#: Position and velocity, and attitude, in the error.
-_MOVING = MotionStates(
-    linear=ERROR.position, linear_end=ERROR.attitude, attitude=ERROR.attitude, attitude_end=ERROR.gyroscope_bias
-)
 
 
 @helper
@@ -92,11 +85,4 @@ def retract(dynamics: Dynamics) -> None:
     )
 
 
-@kernel(passed=True)
-def inflate_and_predict(dynamics: Dynamics, readings: Readings, k: int, prediction: Prediction) -> None:
-    """Inflate the covariance of position, velocity and attitude, and predict the reading again."""
-    inflate_motion(dynamics.covariance, readings.inflation[k], dynamics.first_variances, _MOVING)
-    predict(dynamics, readings, k, prediction)
-
-
-INERTIAL_FUNCTIONS = ModelFunctions(propagate, predict, retract, inflate_and_predict)
+INERTIAL_FUNCTIONS = ModelFunctions(propagate, predict, retract)

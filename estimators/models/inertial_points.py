@@ -35,7 +35,6 @@ from simnav.types import Array, Measurement
 from .filtering import Aid, Dynamics, ModelFunctions, Prediction, Readings, aid_of
 from .inertial import InertialModel
 from .inertial_errors import ERROR
-from .inertial_functions import inflate_and_predict as inflate_linearised
 from .inertial_functions import predict as linearise
 from .inertial_functions import propagate as propagate_linearised
 from .inertial_functions import retract, state_of
@@ -68,13 +67,14 @@ def propagate_points(before: Vector, after: Vector, constants: Vector, decay: Ve
 
     Parameters
     ----------
-    before, after : (45 + n - 15,) arrays
-        The flat state (`simnav.estimators.models.propagation.motion_of`) at the start and at the end of the piece.
+    before, after : (MOTION_NUMBERS + c,) arrays
+        The flat state (`simnav.estimators.models.propagation.motion_of`) with c calibration states, at the start and at
+        the end of the piece.
     constants : (9,) array
         An `IMU_NOISE`.
-    decay : (n - 15,) array
+    decay : (c,) array
         Inverse correlation times of the calibration states [1/s].
-    errors : (k, n) array
+    errors : (k, ERROR.calibration + c) array
         Differences of the points from the state at the start; overwritten with those at the end.
     """
     start, end = motion_of(before), motion_of(after)
@@ -107,7 +107,7 @@ def propagate_points(before: Vector, after: Vector, constants: Vector, decay: Ve
     p, v, m = np.empty(3), np.empty(3), np.empty((3, 3))
     for k in range(errors.shape[0]):
         still = True
-        for j in range(15):
+        for j in range(ERROR.calibration):
             still = still and errors[k, j] == 0.0
         if still:
             continue
@@ -203,11 +203,11 @@ def observe_points(
                 x = atan2(sin(x), cos(x))
             if known == 0:  # a point near the vertical
                 x = 0.0
-                for j in range(3, 15):
+                for j in range(ERROR.velocity, ERROR.calibration):
                     x += linear[i, j] * errors[k, j]
-            for j in range(3):
+            for j in range(ERROR.position, ERROR.velocity):
                 x += linear[i, j] * errors[k, j]
-            for j in range(15, n):
+            for j in range(ERROR.calibration, n):
                 x += linear[i, j] * errors[k, j]
             differences[k, i] = x
 
@@ -235,7 +235,7 @@ def move_in_pieces(
         The IMU samples of the step.
     until : float
         The time, later than that of the state [s].
-    numbers : (45 + n - 15,) array
+    numbers : (MOTION_NUMBERS + c,) array
         The flat state.
     constants, decay, errors
         As of `propagate_points`.
@@ -279,14 +279,7 @@ def predict(dynamics: Dynamics, readings: Readings, k: int, prediction: Predicti
     return predict_through(linearise, read, dynamics, readings, k, prediction)
 
 
-@kernel(passed=True)
-def inflate_and_predict(dynamics: Dynamics, readings: Readings, k: int, prediction: Prediction) -> None:
-    """Inflate the covariance of position, velocity and attitude, and predict the reading again."""
-    inflate_linearised(dynamics, readings, k, prediction)
-    predict(dynamics, readings, k, prediction)
-
-
-POINT_FUNCTIONS = ModelFunctions(propagate, predict, retract, inflate_and_predict)
+POINT_FUNCTIONS = ModelFunctions(propagate, predict, retract)
 
 
 class InertialPoints(InertialModel, PointModel):
@@ -320,7 +313,7 @@ class InertialPoints(InertialModel, PointModel):
         name = measurement.instrument
         if name in self.own:
             own = self.own[name]
-            point = own.point(measurement.time, *self.state_of_own(), measurement.side)
+            point = own.point(measurement.time, self.state_of_own(), measurement.side)
             found = own.differences(point, errors, self.bias_at.get(name, -1), NAVIGATION_STATES)
             assert found is not None  # `measure` says something of it
             return found

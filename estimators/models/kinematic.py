@@ -16,7 +16,6 @@ import numpy as np
 from simnav.compiled import helper, kernel
 from simnav.estimator import UnsuitableScenario
 from simnav.estimator.needs import Needs
-from simnav.estimators.algebra.inflation import MotionStates, inflate_motion
 from simnav.estimators.algebra.joseph import project
 from simnav.geometry.earth import radii_scalar
 from simnav.kinds import POSITION, VELOCITY, kinds_with
@@ -28,7 +27,7 @@ from .equations import equation_of
 from .error_states import with_variance
 from .filtering import Aid, AidTable, Dynamics, ModelFunctions, Prediction, Readings, aid_table
 from .function_model import FunctionModel
-from .inertial_errors import ERROR
+from .inertial_errors import ERROR, PART
 from .propagation import Samples
 
 __all__ = ["KinematicModel"]
@@ -46,7 +45,6 @@ STATE = structure(time=float, position=3, velocity=3, heading=float)
 MOTION = structure(acceleration=float)
 #: What an instrument measures.
 A_POSITION, A_VELOCITY = range(2)
-_ALL = MotionStates(linear=0, linear_end=6, attitude=6, attitude_end=6)
 
 
 @helper
@@ -119,13 +117,6 @@ def retract(dynamics: Dynamics) -> None:
         state.velocity[i] += dx[ERROR.velocity + i]
 
 
-@kernel(passed=True)
-def inflate_and_predict(dynamics: Dynamics, readings: Readings, k: int, prediction: Prediction) -> None:
-    """Inflate the whole covariance, and predict the reading again."""
-    inflate_motion(dynamics.covariance, readings.inflation[k], dynamics.first_variances, _ALL)
-    predict(dynamics, readings, k, prediction)
-
-
 class KinematicModel(FunctionModel):
     """The model of the module; six states.
 
@@ -138,7 +129,7 @@ class KinematicModel(FunctionModel):
     """
 
     size = 6
-    equations = ModelFunctions(propagate, predict, retract, inflate_and_predict)
+    equations = ModelFunctions(propagate, predict, retract)
 
     def __init__(self, acceleration: float = 0.2):
         self.acceleration = acceleration
@@ -167,7 +158,7 @@ class KinematicModel(FunctionModel):
         self.constants = filled(MOTION, acceleration=self.acceleration**2)
         slow = [with_variance(np.zeros(3), bias_of(r).processes) for r in receivers]
         self._slow = np.diag(np.max(slow, axis=0))
-        return np.array(start.covariance[:6, :6])
+        return np.array(start.covariance[PART.motion, PART.motion])
 
     def table(self, names: Sequence[str]) -> AidTable:
         """The receivers, with the variances of their noise; what a lever arm does beside the heading is noise."""
@@ -182,8 +173,9 @@ class KinematicModel(FunctionModel):
     def estimate(self, covariance: Array) -> Estimate:
         """Position and velocity."""
         state = self.numbers.view(STATE)[0]
-        full = np.zeros((9, 9))
-        full[:6, :6] = covariance
-        full[:3, :3] += self._slow
-        full[range(3, 6), range(3, 6)] += SEAWAY**2
+        full = np.zeros((ERROR.gyroscope_bias, ERROR.gyroscope_bias))
+        full[PART.motion, PART.motion] = covariance
+        full[PART.position, PART.position] += self._slow
+        velocity = range(ERROR.velocity, ERROR.attitude)
+        full[velocity, velocity] += SEAWAY**2
         return Estimate(self.time, state.position.copy(), state.velocity.copy(), None, full)

@@ -25,6 +25,7 @@ from simnav.types import KINDS, Array, Datasheet, Instruments
 from .declared_errors import errors_of
 from .delayed import is_delayed, observation_at_delay, with_delay
 from .equations import equation_of
+from .inertial_errors import PART
 
 __all__ = ["has_measurement_function", "observation_of", "with_lever_arms"]
 
@@ -89,10 +90,15 @@ def _observe(point: NavigationPoint, sheet: Datasheet) -> tuple[Array, Mapping[s
     return reading, blocks
 
 
+def _no_derivative() -> Array:
+    """A Jacobian of three components by position, velocity and attitude, of zeros."""
+    return np.zeros((3, PART.navigation.stop))
+
+
 def _position(point: NavigationPoint, arm: Array) -> tuple[Array, Array]:
-    jacobian = np.zeros((3, 9))
-    jacobian[:, :3] = np.eye(3)
-    jacobian[:, 6:] = -skew(point.dcm @ arm)
+    jacobian = _no_derivative()
+    jacobian[:, PART.position] = np.eye(3)
+    jacobian[:, PART.attitude] = -skew(point.dcm @ arm)
     return jacobian, point.dcm
 
 
@@ -107,16 +113,16 @@ def _depth(point: NavigationPoint, arm: Array) -> tuple[Array, Array]:
 
 
 def _velocity(point: NavigationPoint, arm: Array) -> tuple[Array, Array]:
-    jacobian, turning = np.zeros((3, 9)), skew(point.angular_rate)
-    jacobian[:, 3:6] = np.eye(3)
-    jacobian[:, 6:] = -skew(point.dcm @ (turning @ arm))
+    jacobian, turning = _no_derivative(), skew(point.angular_rate)
+    jacobian[:, PART.velocity] = np.eye(3)
+    jacobian[:, PART.attitude] = -skew(point.dcm @ (turning @ arm))
     return jacobian, point.dcm @ turning
 
 
 def _body_velocity(point: NavigationPoint, arm: Array) -> tuple[Array, Array]:
-    jacobian, to_body = np.zeros((3, 9)), point.dcm.T
-    jacobian[:, 3:6] = to_body
-    jacobian[:, 6:] = to_body @ skew(point.velocity)
+    jacobian, to_body = _no_derivative(), point.dcm.T
+    jacobian[:, PART.velocity] = to_body
+    jacobian[:, PART.attitude] = to_body @ skew(point.velocity)
     return jacobian, skew(point.angular_rate)
 
 

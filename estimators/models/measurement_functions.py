@@ -18,7 +18,7 @@ from collections.abc import Mapping
 from math import isfinite
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -32,12 +32,14 @@ from simnav.types import KINDS, NO_SIDE, Array, Datasheet
 from .ambiguity import innovation_of
 from .channels import ChannelDatasheet, whole
 from .delayed import acceleration, is_delayed
+from .inertial_errors import PART
 from .lever_arms import observation_of
+from .measurements import State
 
-__all__ = ["MeasurementFunction"]
+__all__ = ["Kinematics", "MeasurementFunction"]
 
 #: Number of columns of an observation's Jacobian: position, velocity, attitude.
-_COMPONENTS = 9
+_COMPONENTS = PART.navigation.stop
 #: Steps of the differences: position [m], velocity [m/s], attitude [rad]; of a block, as a part of its sigma, and where
 #: that is zero.
 _STEPS = np.repeat([0.1, 1e-3, 1e-5], 3)
@@ -45,6 +47,31 @@ _PART_OF_SIGMA, _SMALLEST_STEP = 1e-3, 1e-6
 #: Step of an angular rate, of which a swing is linear [rad/s].
 _RATE_STEP = 1e-2
 _NONE: Mapping[str, Array] = MappingProxyType({})
+
+
+class Kinematics(NamedTuple):
+    """The motion of k states of a vessel.
+
+    Attributes
+    ----------
+    position : (k, 3) array
+        Geodetic latitude and longitude [rad], height [m].
+    velocity : (k, 3) array
+        North, east, down [m/s].
+    dcm : (k, 3, 3) array
+        Direction cosine matrix from body axes to north-east-down.
+    angular_rate : (k, 3) array
+        Rate of the body relative to the Earth, in body axes [rad/s].
+    """
+
+    position: Array
+    velocity: Array
+    dcm: Array
+    angular_rate: Array
+
+    def at(self, k: int) -> Kinematics:
+        """One of the states."""
+        return Kinematics(self.position[k], self.velocity[k], self.dcm[k], self.angular_rate[k])
 
 
 class MeasurementFunction:
@@ -105,37 +132,23 @@ class MeasurementFunction:
         """Itself: it never changes, and an estimator that takes late readings is copied in each step."""
         return self
 
-    def point(
-        self,
-        time: float,
-        position: Array,
-        velocity: Array,
-        dcm: Array,
-        rate: Array,
-        bias: Array,
-        values: Array,
-        side: Array = NO_SIDE,
-    ) -> NavigationPoint:
+    def point(self, time: float, state: State, side: Array = NO_SIDE) -> NavigationPoint:
         """The state for the function.
 
         Parameters
         ----------
         time : float
             Time of validity [s].
-        position, velocity, dcm
-            As of `simnav.kinds.NavigationPoint`.
-        rate : (3,) or (6,) array
-            Output of the gyroscopes [rad/s], and where a delay needs it that of the accelerometers [m/s^2].
-        bias : (3 or more,) array
-            Their biases [rad/s], [m/s^2].
-        values : (m,) array
-            The states among which those of the blocks are.
+        state : State
+            Where a delay needs it, the specific force as measured [m/s^2] is behind the angular rate.
         side : (s,) array
             Side information of the reading.
         """
+        position, velocity, dcm, rate, bias = state.position, state.velocity, state.dcm, state.rate, state.bias
         turning = rate[:3] - bias[:3] - dcm.T @ earth_rate(position[0])
         moved = acceleration(position, velocity, dcm, rate[3:] - bias[3:6]) if len(rate) == 6 else None
-        return NavigationPoint(time, position, velocity, dcm, turning, self.blocks(values), self.channel, side, moved)
+        blocks = self.blocks(state.calibration)
+        return NavigationPoint(time, position, velocity, dcm, turning, blocks, self.channel, side, moved)
 
     def blocks(self, values: Array) -> Mapping[str, Array]:
         """The values of the blocks, by name."""
@@ -227,12 +240,13 @@ class MeasurementFunction:
 
     def _moved(self, point: NavigationPoint, error: Array) -> NavigationPoint:
         """A state with an error: navigation, then the blocks of the datasheet."""
-        position = point.position + error[:3] / _metres(point.position)
-        dcm = dcm_from_rotation_vector(error[6:9]) @ point.dcm
+        position = point.position + error[PART.position] / _metres(point.position)
+        velocity = point.velocity + error[PART.velocity]
+        dcm = dcm_from_rotation_vector(error[PART.attitude]) @ point.dcm
         blocks = point.blocks
         if self.sheet.blocks:
             blocks = {b.name: point.blocks[b.name] + error[self._columns[b.name]] for b in self.sheet.blocks}
-        return point._replace(position=position, velocity=point.velocity + error[3:6], dcm=dcm, blocks=blocks)
+        return point._replace(position=position, velocity=velocity, dcm=dcm, blocks=blocks)
 
     def _label(self) -> str:
         """The function, for messages: of which kind it is, for which instrument, and where it stands."""
@@ -391,34 +405,33 @@ class MeasurementFunction:
         differences = errors[:, :_COMPONENTS] @ jacobian[:, :_COMPONENTS].T
         if len(self._places):
             differences += errors[:, self._places + offset] @ jacobian[:, self._stated].T
-        metres = _metres(point.position)
-        positions = point.position + errors[:, :3] / metres
-        velocities = point.velocity + errors[:, 3:6]
-        attitudes = dcm_from_rotation_vector(errors[:, 6:9]) @ point.dcm
-        states = positions, velocities, attitudes, point.angular_rate - errors[:, 9:12]
+        states = Kinematics(
+            position=point.position + errors[:, PART.position] / _metres(point.position),
+            velocity=point.velocity + errors[:, PART.velocity],
+            dcm=dcm_from_rotation_vector(errors[:, PART.attitude]) @ point.dcm,
+            angular_rate=point.angular_rate - errors[:, PART.gyroscope_bias],
+        )
         if self.observations is not None:
             differences = np.asarray(self.kind.difference(self.read_many(point, states, errors, offset), reading))
         else:
-            for k, state in enumerate(zip(*states, strict=True)):
-                blocks = self._blocks_at(point, errors[k], offset)
-                there = self.read(NavigationPoint(point.time, *state, blocks, *point[6:]))
+            for k, error in enumerate(errors):
+                blocks = self._blocks_at(point, error, offset)
+                there = self.read(point._replace(**states.at(k)._asdict(), blocks=blocks))
                 if there is not None:
                     differences[k] = self.kind.difference(there, reading)
         if bias_at >= 0:
             differences += errors[:, bias_at : bias_at + len(reading)]
         return differences
 
-    def read_many(
-        self, point: NavigationPoint, states: tuple[Array, Array, Array, Array], errors: Array, offset: int
-    ) -> Array:
+    def read_many(self, point: NavigationPoint, states: Kinematics, errors: Array, offset: int) -> Array:
         """The (k, d) readings at k states by one call, for a kind that predicts many (`simnav.kinds.Observations`).
 
         Parameters
         ----------
         point : NavigationPoint
             The state with which the k states are compared: time, channel and side information are its own.
-        states : tuple of array
-            Position, velocity, DCM and angular rate of the k states.
+        states : Kinematics
+            Of the k states.
         errors, offset
             As of `differences`: the values of blocks follow from them.
         """
@@ -429,7 +442,9 @@ class MeasurementFunction:
             blocks[name] = point.blocks[name] + errors[:, offset + at.start : offset + at.stop]
         channel = self._given.channels.index(self.channel) if self.channel else 0
         side = np.broadcast_to(point.side, (k, *point.side.shape))
-        points = NavigationPoints(np.full(k, point.time), *states, blocks, np.full(k, channel), side)
+        points = NavigationPoints(
+            time=np.full(k, point.time), **states._asdict(), blocks=blocks, channel=np.full(k, channel), side=side
+        )
         reading, _ = self.observations(points, self._given)
         return np.asarray(reading)
 

@@ -16,7 +16,6 @@ from __future__ import annotations
 import numpy as np
 
 from simnav.compiled import kernel
-from simnav.estimators.algebra.inflation import MotionStates, inflate_motion
 from simnav.estimators.algebra.joseph import project
 from simnav.kernel_types import Matrix, Vector
 from simnav.structures import filled
@@ -26,19 +25,12 @@ from .base import Linearised
 from .equations import equation_of
 from .filtering import Dynamics, ModelFunctions, Prediction, Readings, aid_of
 from .inertial import InertialModel
-from .inertial_errors import ERROR
 from .inertial_functions import state_of
 from .measurements import NAVIGATION_STATES, observe_inertial
 from .propagation import IMU_NOISE, Samples, correct_inertial, motion_of, propagate_inertial, time_of
 from .state_blocks import StateBlocks
 
 __all__ = ["NineStateModel"]
-
-
-#: Position and velocity, and attitude, in the error.
-_MOVING = MotionStates(
-    linear=ERROR.position, linear_end=ERROR.attitude, attitude=ERROR.attitude, attitude_end=ERROR.gyroscope_bias
-)
 
 
 @kernel
@@ -112,13 +104,6 @@ def retract(dynamics: Dynamics) -> None:
     correct_inertial(state.position, state.velocity, state.dcm, state.bias, np.empty(0), full)
 
 
-@kernel(passed=True)
-def inflate_and_predict(dynamics: Dynamics, readings: Readings, k: int, prediction: Prediction) -> None:
-    """Inflate the whole covariance of the motion, and predict the reading again."""
-    inflate_motion(dynamics.covariance, readings.inflation[k], dynamics.first_variances, _MOVING)
-    predict(dynamics, readings, k, prediction)
-
-
 class NineStateModel(InertialModel):
     """Nine states with fixed sigmas (see the module).
 
@@ -133,6 +118,7 @@ class NineStateModel(InertialModel):
     """
 
     fused = False  # those kernels are of fifteen states
+    equations = ModelFunctions(propagate, predict, retract)
 
     def __init__(
         self,
@@ -151,9 +137,8 @@ class NineStateModel(InertialModel):
 
     def begin(self, start: InitialState, instruments: Instruments) -> Array:
         """Set the state; UnsuitableScenario without an IMU."""
-        self._unused = super().begin(start, instruments)
+        super().begin(start, instruments)
         self.size, self.blocks, self._density = 9, StateBlocks(9), self._motion
-        self._full = np.zeros(15)
         self._noise = filled(IMU_NOISE, interval=self._noise.view(IMU_NOISE)[0].interval)
         for sheet in instruments.values():
             equation = equation_of(sheet)
@@ -165,18 +150,7 @@ class NineStateModel(InertialModel):
 
     def functions(self) -> ModelFunctions | None:
         """As `ErrorModel.functions`; None if an instrument has an equation of its own, or a scale factor."""
-        if self.own or self.uncalibrated:
-            return None
-        return ModelFunctions(propagate, predict, retract, inflate_and_predict)
-
-    def propagate(self, covariance: Array, until: float) -> None:
-        """Advance the state and its covariance through the samples loaded."""
-        elapsed = until - self.time
-        if elapsed <= 0.0:
-            return
-        self._unused[:] = 0.0
-        super().propagate(self._unused, until)
-        propagate_nine.unchecked(covariance, self.transition, self.process_noise, self._motion, elapsed)
+        return None if self.own or self.uncalibrated else self.equations
 
     def carry(self, error: Array, elapsed: float) -> None:
         """Take an error through the last propagation, in place."""
@@ -188,8 +162,3 @@ class NineStateModel(InertialModel):
         if linearised is None:
             return None
         return linearised._replace(jacobian=np.ascontiguousarray(linearised.jacobian[:, :9]))
-
-    def correct(self, dx: Array) -> None:
-        """Add a correction to the state."""
-        self._full[:9] = dx
-        super().correct(self._full)

@@ -24,6 +24,8 @@ from simnav.geometry.rotation import cross, rotated, rotation_coefficients
 from simnav.kernel_types import Matrix, Vector
 from simnav.types import Array
 
+from .inertial_errors import ERROR
+
 __all__ = ["add_shift", "move_shift", "relative_shift", "turn_covariance"]
 
 #: Rotations below this are composed by a series [rad].
@@ -58,6 +60,20 @@ def _compose(a0: float, a1: float, a2: float, b0: float, b1: float, b2: float) -
     return ratio * v0, ratio * v1, ratio * v2
 
 
+@helper
+def _attitude(shift: Array) -> tuple[float, float, float]:
+    """The rotation vector of a shift [rad]."""
+    p = ERROR.attitude
+    return shift[p], shift[p + 1], shift[p + 2]
+
+
+@helper
+def _set_attitude(shift: Array, rotation: tuple[float, float, float]) -> None:
+    """Overwrite the rotation vector of a shift [rad]."""
+    p = ERROR.attitude
+    shift[p], shift[p + 1], shift[p + 2] = rotation
+
+
 @kernel
 def move_shift(F: Matrix, s: Vector, moved: Vector, J: Matrix) -> None:
     """Propagate a shift s of a node through a motion: the shift ``moved`` at its end, and its derivative J.
@@ -67,34 +83,36 @@ def move_shift(F: Matrix, s: Vector, moved: Vector, J: Matrix) -> None:
     independent and only decay; a clock's bias also moves by the drift that follows it.
     """
     n = s.size
-    m = min(n, 15)
-    for i in range(9):
+    m = min(n, ERROR.calibration)
+    p = ERROR.attitude
+    first_bias, biased = ERROR.gyroscope_bias, n >= ERROR.calibration
+    for i in range(first_bias):
         x = 0.0
         for j in range(m):
             x += F[i, j] * s[j]
         moved[i] = x
-        for j in range(6, m):
+        for j in range(p, m):
             J[i, j] = F[i, j]
-    for i in range(9, n):
+    for i in range(first_bias, n):
         moved[i] = F[i, i] * s[i]
-        if i >= 15 and i + 1 < n and F[i, i + 1] != 0.0:
+        if i >= ERROR.calibration and i + 1 < n and F[i, i + 1] != 0.0:
             moved[i] += F[i, i + 1] * s[i + 1]
-    p0, p1, p2 = s[6], s[7], s[8]
+    p0, p1, p2 = _attitude(s)
     size = p0 * p0 + p1 * p1 + p2 * p2
-    if n >= 15:
-        for j in range(9, 15):
+    if biased:
+        for j in range(first_bias, m):
             size += s[j] * s[j]
     if size <= 1e-24:
         return
     a, b = rotation_coefficients(p0 * p0 + p1 * p1 + p2 * p2)
-    if n >= 15:  # the bias columns turn with the attitude
-        for j in range(9, 15):
-            for i in range(0, 9, 3):
+    if biased:  # their columns turn with the attitude
+        for j in range(first_bias, m):
+            for i in range(0, first_bias, 3):
                 J[i, j], J[i + 1, j], J[i + 2, j] = rotated(p0, p1, p2, a, b, F[i, j], F[i + 1, j], F[i + 2, j])
-    for i in range(0, 6, 3):
-        u0 = 0.5 * (F[i + 1, 8] - F[i + 2, 7])
-        u1 = 0.5 * (F[i + 2, 6] - F[i, 8])
-        u2 = 0.5 * (F[i, 7] - F[i + 1, 6])
+    for i in range(0, p, 3):  # position and velocity
+        u0 = 0.5 * (F[i + 1, p + 2] - F[i + 2, p + 1])
+        u1 = 0.5 * (F[i + 2, p] - F[i, p + 2])
+        u2 = 0.5 * (F[i, p + 1] - F[i + 1, p])
         # E (u + F_b b) - u: what the bias shift adds turns with the node, so the attitude has a share in it.
         w0, w1, w2 = rotated(p0, p1, p2, a, b, u0, u1, u2)
         w0, w1, w2 = w0 - u0, w1 - u1, w2 - u2
@@ -102,69 +120,73 @@ def move_shift(F: Matrix, s: Vector, moved: Vector, J: Matrix) -> None:
         moved[i] += w0 - x0
         moved[i + 1] += w1 - x1
         moved[i + 2] += w2 - x2
-        if n >= 15:
-            for j in range(9, 15):
+        if biased:
+            for j in range(first_bias, m):
                 for r in range(3):
                     moved[i + r] += (J[i + r, j] - F[i + r, j]) * s[j]
                 w0 += J[i, j] * s[j]
                 w1 += J[i + 1, j] * s[j]
                 w2 += J[i + 2, j] * s[j]
-        J[i, 7] += w2
-        J[i, 8] -= w1
-        J[i + 1, 6] -= w2
-        J[i + 1, 8] += w0
-        J[i + 2, 6] += w1
-        J[i + 2, 7] -= w0
-    a0, a1, a2 = moved[6], moved[7], moved[8]
+        J[i, p + 1] += w2
+        J[i, p + 2] -= w1
+        J[i + 1, p] -= w2
+        J[i + 1, p + 2] += w0
+        J[i + 2, p] += w1
+        J[i + 2, p + 1] -= w0
+    a0, a1, a2 = _attitude(moved)
     b0, b1, b2 = 0.0, 0.0, 0.0
-    if n >= 15:
-        for j in range(9, 15):
-            b0 += F[6, j] * s[j]
-            b1 += F[7, j] * s[j]
-            b2 += F[8, j] * s[j]
+    if biased:
+        for j in range(first_bias, m):
+            b0 += F[p, j] * s[j]
+            b1 += F[p + 1, j] * s[j]
+            b2 += F[p + 2, j] * s[j]
         a0, a1, a2 = a0 - b0, a1 - b1, a2 - b2
         h0, h1, h2 = rotated(p0, p1, p2, a, b, 0.5 * b0, 0.5 * b1, 0.5 * b2)
-        for j in range(9, 12):  # the left Jacobian of exp(b x), to first order
-            x0, x1, x2 = cross(h0, h1, h2, J[6, j], J[7, j], J[8, j])
-            J[6, j] += x0
-            J[7, j] += x1
-            J[8, j] += x2
-    moved[6], moved[7], moved[8] = _compose(a0, a1, a2, b0, b1, b2)
+        for j in range(first_bias, ERROR.accelerometer_bias):  # the left Jacobian of exp(b x), to first order
+            x0, x1, x2 = cross(h0, h1, h2, J[p, j], J[p + 1, j], J[p + 2, j])
+            J[p, j] += x0
+            J[p + 1, j] += x1
+            J[p + 2, j] += x2
+    _set_attitude(moved, _compose(a0, a1, a2, b0, b1, b2))
 
 
 @kernel(passed=True)
 def relative_shift(shift: Vector, step: Vector, out: Vector) -> None:
     """A shift as seen from where a step leads: rotations compose."""
+    (a0, a1, a2), (b0, b1, b2) = _attitude(shift), _attitude(step)
     for j in range(shift.size):
         out[j] = shift[j] - step[j]
-    out[6], out[7], out[8] = _compose(shift[6], shift[7], shift[8], -step[6], -step[7], -step[8])
+    _set_attitude(out, _compose(a0, a1, a2, -b0, -b1, -b2))
 
 
 @helper
 def add_shift(step: Array, shift: Array, out: Array) -> None:
     """A shift and a step after it; ``out`` may be the shift."""
-    r0, r1, r2 = _compose(step[6], step[7], step[8], shift[6], shift[7], shift[8])
+    (a0, a1, a2), (b0, b1, b2) = _attitude(step), _attitude(shift)
     for j in range(shift.size):
         out[j] = shift[j] + step[j]
-    out[6], out[7], out[8] = r0, r1, r2
+    _set_attitude(out, _compose(a0, a1, a2, b0, b1, b2))
+
+
+@helper
+def _turn_columns(M: Array, p0: float, p1: float, p2: float, a: float, b: float) -> None:
+    """Turn the attitude's part of each column of a matrix."""
+    p = ERROR.attitude
+    for i in range(M.shape[1]):
+        M[p, i], M[p + 1, i], M[p + 2, i] = rotated(p0, p1, p2, a, b, M[p, i], M[p + 1, i], M[p + 2, i])
 
 
 @kernel(passed=True)
 def turn_covariance(P: Matrix, shift: Vector, out: Matrix) -> None:
     """``J P J'`` with the left Jacobian J of the rotation of a shift (`simnav.geometry.rotation.left_jacobian`)."""
-    p0, p1, p2 = shift[6], shift[7], shift[8]
+    p0, p1, p2 = _attitude(shift)
     angle2 = p0 * p0 + p1 * p1 + p2 * p2
+    # `rotated` with the coefficients of the left Jacobian
     sine, a = rotation_coefficients(angle2)
     b = 1.0 / 6.0 - angle2 * (1.0 / 120.0 - angle2 / 5040.0) if angle2 < 1e-3 else (1.0 - sine) / angle2
     n = P.shape[0]
     for i in range(n):
         for j in range(n):
             out[i, j] = P[i, j]
-    for side in range(2):
-        for i in range(n):
-            v0, v1, v2 = (out[6, i], out[7, i], out[8, i]) if side == 0 else (out[i, 6], out[i, 7], out[i, 8])
-            v0, v1, v2 = rotated(p0, p1, p2, a, b, v0, v1, v2)  # with the coefficients of the left Jacobian
-            if side == 0:
-                out[6, i], out[7, i], out[8, i] = v0, v1, v2
-            else:
-                out[i, 6], out[i, 7], out[i, 8] = v0, v1, v2
+    _turn_columns(out, p0, p1, p2, a, b)
+    _turn_columns(out.T, p0, p1, p2, a, b)

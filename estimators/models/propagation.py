@@ -69,7 +69,7 @@ GRAVITY_FLATTENING = 0.0053024
 #: A block over which the error is propagated at once: its length and the part of it without data [s]; latitude, height,
 #: velocity, elements of the mean DCM, mean specific force in north-east-down, and averaged body rate.
 ERROR_BLOCK = structure(
-    length=float, held=float, latitude=float, height=float, velocity=3, dcm=9, specific_force=3, rate=3
+    length=float, held=float, latitude=float, height=float, velocity=3, dcm=(3, 3), specific_force=3, rate=3
 )
 #: Time of the state, end of the last sample used, and seconds held so far [s]; that sample's mean rate and force; the
 #: mean rate of the one before; and the rate at the time of the state, extrapolated from both: a mean is half a sample
@@ -160,7 +160,11 @@ def _usable(w0: float, w1: float, w2: float, f0: float, f1: float, f2: float) ->
 
 @helper
 def _dynamics(F: Array, block: Any, gyro_decay: float, accelerometer_decay: float) -> None:
-    """Compute the system matrix F of the error dynamics for one block."""
+    """Compute the system matrix F of the error dynamics for one block.
+
+    Of each part of the error (r, v, p: position, velocity, attitude) the components are north, east and down.
+    """
+    r, v, p = ERROR.position, ERROR.velocity, ERROR.attitude
     height = block.height
     s, cl = sin(block.latitude), cos(block.latitude)
     meridian, prime = radii_scalar(s)
@@ -170,41 +174,41 @@ def _dynamics(F: Array, block: Any, gyro_decay: float, accelerometer_decay: floa
     f0, f1, f2 = block.specific_force[0], block.specific_force[1], block.specific_force[2]
     e0, e2 = ROTATION_RATE * cl, -ROTATION_RATE * s
     k0, k1, k2 = v1 * b, -v0 * a, -v1 * b * t
-    F[0, 0], F[0, 2], F[0, 3] = -v2 * a, v0 * a, 1.0
-    F[1, 0], F[1, 1], F[1, 2], F[1, 4] = v1 * t * a, -v2 * b - v0 * t * a, v1 * b, 1.0
-    F[2, 5] = 1.0
+    F[r, r], F[r, r + 2], F[r, v] = -v2 * a, v0 * a, 1.0
+    F[r + 1, r], F[r + 1, r + 1], F[r + 1, r + 2], F[r + 1, v + 1] = v1 * t * a, -v2 * b - v0 * t * a, v1 * b, 1.0
+    F[r + 2, v + 2] = 1.0
     # -(2 w_ie + w_en) x dv
     x0, x1, x2 = 2.0 * e0 + k0, k1, 2.0 * e2 + k2
-    F[3, 3], F[3, 4], F[3, 5] = 0.0, x2, -x1
-    F[4, 3], F[4, 4], F[4, 5] = -x2, 0.0, x0
-    F[5, 3], F[5, 4], F[5, 5] = x1, -x0, 0.0
+    F[v, v], F[v, v + 1], F[v, v + 2] = 0.0, x2, -x1
+    F[v + 1, v], F[v + 1, v + 1], F[v + 1, v + 2] = -x2, 0.0, x0
+    F[v + 2, v], F[v + 2, v + 1], F[v + 2, v + 2] = x1, -x0, 0.0
     # -dw_en x v, with dw_en = (dv_E b, -dv_N a, -dv_E b t): w x v = (w1 v2 - w2 v1, w2 v0 - w0 v2, w0 v1 - w1 v0)
-    F[3, 3] += a * v2
-    F[3, 4] += -b * t * v1
-    F[4, 4] += b * t * v0 + b * v2
-    F[5, 3] += -a * v0
-    F[5, 4] += -b * v1
+    F[v, v] += a * v2
+    F[v, v + 1] += -b * t * v1
+    F[v + 1, v + 1] += b * t * v0 + b * v2
+    F[v + 2, v] += -a * v0
+    F[v + 2, v + 1] += -b * v1
     # -2 dw_ie x v, with dw_ie = (e2, 0, -e0) a dr_N
-    F[3, 0] = -2.0 * e0 * a * v1
-    F[4, 0] = 2.0 * (e0 * v0 + e2 * v2) * a
-    F[5, 0] = -2.0 * e2 * a * v1 + 2.0 * GRAVITY_FLATTENING * EQUATORIAL_GRAVITY * s * cl * a
-    F[5, 2] = 2.0 * gravity_scalar(s, height) / SEMI_MAJOR_AXIS
+    F[v, r] = -2.0 * e0 * a * v1
+    F[v + 1, r] = 2.0 * (e0 * v0 + e2 * v2) * a
+    F[v + 2, r] = -2.0 * e2 * a * v1 + 2.0 * GRAVITY_FLATTENING * EQUATORIAL_GRAVITY * s * cl * a
+    F[v + 2, r + 2] = 2.0 * gravity_scalar(s, height) / SEMI_MAJOR_AXIS
     # -[f x] phi
-    F[3, 7], F[3, 8] = f2, -f1
-    F[4, 6], F[4, 8] = -f2, f0
-    F[5, 6], F[5, 7] = f1, -f0
+    F[v, p + 1], F[v, p + 2] = f2, -f1
+    F[v + 1, p], F[v + 1, p + 2] = -f2, f0
+    F[v + 2, p], F[v + 2, p + 1] = f1, -f0
     # -w_in x phi - dw_ie - dw_en
     w0, w1, w2 = e0 + k0, k1, e2 + k2
-    F[6, 7], F[6, 8] = w2, -w1
-    F[7, 6], F[7, 8] = -w2, w0
-    F[8, 6], F[8, 7] = w1, -w0
-    F[6, 0], F[8, 0] = -e2 * a, e0 * a
-    F[6, 4], F[7, 3], F[8, 4] = -b, a, b * t
+    F[p, p + 1], F[p, p + 2] = w2, -w1
+    F[p + 1, p], F[p + 1, p + 2] = -w2, w0
+    F[p + 2, p], F[p + 2, p + 1] = w1, -w0
+    F[p, r], F[p + 2, r] = -e2 * a, e0 * a
+    F[p, v + 1], F[p + 1, v], F[p + 2, v + 1] = -b, a, b * t
     dcm = block.dcm
     for i in range(3):
         for j in range(3):
-            F[ERROR.velocity + i, ERROR.accelerometer_bias + j] = -dcm[3 * i + j]
-            F[ERROR.attitude + i, ERROR.gyroscope_bias + j] = -dcm[3 * i + j]
+            F[v + i, ERROR.accelerometer_bias + j] = -dcm[i, j]
+            F[p + i, ERROR.gyroscope_bias + j] = -dcm[i, j]
         F[ERROR.gyroscope_bias + i, ERROR.gyroscope_bias + i] = -gyro_decay
         F[ERROR.accelerometer_bias + i, ERROR.accelerometer_bias + i] = -accelerometer_decay
 
@@ -213,7 +217,7 @@ def _dynamics(F: Array, block: Any, gyro_decay: float, accelerometer_decay: floa
 def _list_elements(F: Array, dt: float, value: Array, half: Array, column: Places, count: Places) -> None:
     """List the elements of ``F dt`` and of ``F dt / 2`` that are not zero, row by row."""
     list_elements(F, half, column, count)
-    for i in range(np.uint64(15)):
+    for i in range(np.uint64(ERROR.calibration)):
         for q in range(count[i]):
             value[i, q], half[i, q] = half[i, q] * dt, 0.5 * half[i, q] * dt
 
@@ -222,7 +226,7 @@ def _list_elements(F: Array, dt: float, value: Array, half: Array, column: Place
 def _advance_rows(value: Array, half: Array, column: Places, count: Places, M: Array, A: Array) -> None:
     """Compute ``M = (I + F dt + F F dt^2 / 2) M`` with the lists of `_list_elements`; A is work space."""
     sparse_product(value, column, count, M, A)
-    for i in range(np.uint64(15)):
+    for i in range(np.uint64(ERROR.calibration)):
         for j in range(np.uint64(0), np.uint64(WIDTH), np.uint64(8)):
             add_eight(M[i], j, eight_sums(half, column, i, count[i], A, j, eight_of(A[i], j)))
 
@@ -237,9 +241,9 @@ def _add_noise(Q: Array, block: Any, noise: Any) -> None:
     g1 = (white + scale * t1 + misalignment * (t0 + t2)) * dt
     g2 = (white + scale * t2 + misalignment * (t0 + t1)) * dt
     for i in range(3):
-        c0, c1, c2 = dcm[3 * i] * g0, dcm[1 + 3 * i] * g1, dcm[2 + 3 * i] * g2
+        c0, c1, c2 = dcm[i, 0] * g0, dcm[i, 1] * g1, dcm[i, 2] * g2
         for j in range(3):
-            turn = c0 * dcm[3 * j] + c1 * dcm[1 + 3 * j] + c2 * dcm[2 + 3 * j]
+            turn = c0 * dcm[j, 0] + c1 * dcm[j, 1] + c2 * dcm[j, 2]
             Q[ERROR.attitude + i, ERROR.attitude + j] += turn
         Q[ERROR.velocity + i, ERROR.velocity + i] += noise.accelerometer * dt + HELD_VELOCITY * HELD_VELOCITY * held
         Q[ERROR.attitude + i, ERROR.attitude + i] += HELD_ATTITUDE * HELD_ATTITUDE * held
@@ -262,15 +266,12 @@ def accumulate_error(blocks: Matrix, count: int, noise: Vector, transition: Matr
     transition, process_noise : (15, 15) arrays
         Overwritten: the error at the end is ``transition`` times the error at the start, plus noise.
     """
-    F, Phi, Q, A = np.zeros((15, 15)), np.zeros((15, WIDTH)), np.zeros((15, WIDTH)), np.empty((15, WIDTH))
-    value, half, column, elements = (
-        np.empty((15, 15)),
-        np.empty((15, 15)),
-        np.empty((15, 15), np.uint64),
-        np.empty(15, np.uint64),
-    )
+    n = ERROR.calibration
+    F, Phi, Q, A = np.zeros((n, n)), np.zeros((n, WIDTH)), np.zeros((n, WIDTH)), np.empty((n, WIDTH))
+    value, half = np.empty((n, n)), np.empty((n, n))
+    column, elements = np.empty((n, n), np.uint64), np.empty(n, np.uint64)
     imu = noise.view(IMU_NOISE)[0]
-    for i in range(15):
+    for i in range(n):
         Phi[i, i] = 1.0
     for k in range(count):
         block = blocks[k].view(ERROR_BLOCK)[0]
@@ -280,16 +281,16 @@ def accumulate_error(blocks: Matrix, count: int, noise: Vector, transition: Matr
         # Half of the noise is added before the block and half after it: accurate to second order in its length.
         _add_noise(Q, block, imu)
         _advance_rows(value, half, column, elements, Q, A)
-        for i in range(15):  # (Phi Q)' to the left of which Phi makes Phi Q Phi'
+        for i in range(n):  # (Phi Q)' to the left of which Phi makes Phi Q Phi'
             for j in range(i):
                 Q[i, j], Q[j, i] = Q[j, i], Q[i, j]
         _advance_rows(value, half, column, elements, Q, A)
-        for i in range(15):
+        for i in range(n):
             for j in range(i):
                 Q[j, i] = Q[i, j]
         _add_noise(Q, block, imu)
-    for i in range(15):
-        for j in range(15):
+    for i in range(n):
+        for j in range(n):
             transition[i, j] = Phi[i, j]
             process_noise[i, j] = Q[i, j]
 
@@ -400,10 +401,12 @@ def advance_inertial(
     int, int
         Index of the first sample that is not completely used, and number of blocks.
     """
-    position, velocity, dcm, bias, memory, turn, _ = state
+    position, velocity, dcm, turn = state.position, state.velocity, state.dcm, state.turn
+    gyroscope_bias, accelerometer_bias = state.bias[:3], state.bias[3:]
+    angle, change = state.increments[:3], state.increments[3:]
     clock, imu = state.clock.view(CLOCK)[0], noise.view(IMU_NOISE)[0]
     eps = 1e-7
-    before = np.empty(9)
+    before = np.empty((3, 3))
     keep = np.empty(6)
     rate, force = clock.mean_rate, clock.mean_force
     t, i, count = clock.time, first, 0
@@ -414,9 +417,10 @@ def advance_inertial(
         count += 1
         begin, end = t, min(until, t + BLOCK)
         v0, v1, v2 = velocity[0], velocity[1], velocity[2]
-        for r in range(9):
-            before[r] = dcm[r // 3, r % 3]
-            mean[r] = 0.0
+        for r in range(3):
+            for c in range(3):
+                before[r, c] = dcm[r, c]
+                mean[r, c] = 0.0
         held, s0, s1, s2 = 0.0, 0.0, 0.0, 0.0
         while t < end - eps:
             covered = next_interval(clock, samples, i, t, end, nominal)
@@ -428,29 +432,33 @@ def advance_inertial(
                 position[1] += dt * velocity[1] / ((prime + position[2]) * cos(position[0]))
                 position[2] -= dt * velocity[2]
                 for r in range(6):
-                    memory[r] = 0.0
+                    state.increments[r] = 0.0
                 held += dt
             else:
-                w0, w1, w2 = rate[0] - bias[0], rate[1] - bias[1], rate[2] - bias[2]
-                f0, f1, f2 = force[0] - bias[3], force[1] - bias[4], force[2] - bias[5]
+                w0, w1, w2 = rate[0] - gyroscope_bias[0], rate[1] - gyroscope_bias[1], rate[2] - gyroscope_bias[2]
+                f0, f1, f2 = (
+                    force[0] - accelerometer_bias[0], force[1] - accelerometer_bias[1], force[2] - accelerometer_bias[2]
+                )  # fmt: skip
                 for r in range(6):
-                    keep[r] = memory[r]
-                mechanize_step(position, velocity, dcm, memory, (w0, w1, w2), (f0, f1, f2), dt)
+                    keep[r] = state.increments[r]
+                mechanize_step(position, velocity, dcm, state.increments, (w0, w1, w2), (f0, f1, f2), dt)
                 if whole > 0.0:
-                    memory[0], memory[1], memory[2] = w0 * whole, w1 * whole, w2 * whole
-                    memory[3], memory[4], memory[5] = f0 * whole, f1 * whole, f2 * whole
+                    angle[0], angle[1], angle[2] = w0 * whole, w1 * whole, w2 * whole
+                    change[0], change[1], change[2] = f0 * whole, f1 * whole, f2 * whole
                 else:
                     for r in range(6):
-                        memory[r] = keep[r]
+                        state.increments[r] = keep[r]
                 s0, s1, s2 = s0 + w0 * dt, s1 + w1 * dt, s2 + w2 * dt
-            for r in range(9):
-                mean[r] += dcm[r // 3, r % 3] * dt
+            for r in range(3):
+                for c in range(3):
+                    mean[r, c] += dcm[r, c] * dt
             t = stop
         length = end - begin
         # The sum has the attitude at the ends of the samples; their middles are half a sample earlier.
         shift = 0.5 * min(nominal, length)
-        for r in range(9):
-            mean[r] = (mean[r] - shift * (dcm[r // 3, r % 3] - before[r])) / length
+        for r in range(3):
+            for c in range(3):
+                mean[r, c] = (mean[r, c] - shift * (dcm[r, c] - before[r, c])) / length
         # Mean specific force from the change of velocity: f = v' + (2 w_ie + w_en) x v - g
         sl, cl = sin(position[0]), cos(position[0])
         meridian, prime = radii_scalar(sl)
@@ -472,8 +480,8 @@ def advance_inertial(
         clock.held += held
         decay_g, decay_a = exp(-imu.gyroscope_decay * length), exp(-imu.accelerometer_decay * length)
         for r in range(3):
-            bias[r] *= decay_g
-            bias[3 + r] *= decay_a
+            gyroscope_bias[r] *= decay_g
+            accelerometer_bias[r] *= decay_a
     clock.time = until
     return i, count
 

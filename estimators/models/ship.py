@@ -22,7 +22,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import cos, radians, sin
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
@@ -30,6 +30,7 @@ from simnav import kinds
 from simnav.blocks import StateBlock
 from simnav.estimator import UnsuitableScenario
 from simnav.estimator.needs import Needs
+from simnav.estimators.algebra.inflation import NO_STATES
 from simnav.structures import filled
 from simnav.types import KINDS, NO_SIDE, Array, Datasheet, Estimate, InitialState, Instruments, Measurement
 
@@ -39,6 +40,8 @@ from .declared_errors import bias_of
 from .equations import equation_of
 from .error_states import merged_states, with_variance
 from .filtering import Aid, AidTable, Dynamics, ModelFunctions, aid_table
+from .flat_state import FlatStateModel
+from .inertial_errors import ERROR
 from .lever_arms import has_measurement_function, with_lever_arms
 from .measurements import wrap
 from .moving_chain import MovingModel
@@ -51,8 +54,6 @@ from .ship_kernels import (
     SHIP,
     SHIP_NOISE,
     VELOCITY,
-    advance_ship,
-    correct_ship,
     correct_ships,
     describe_ship,
     differ_ships,
@@ -70,7 +71,7 @@ VELOCITIES = (kinds.VELOCITY, kinds.BODY_VELOCITY, kinds.WATER_SPEED)
 OBSERVED = (*POSITIONS, *VELOCITIES, kinds.HEADING)
 
 
-class ShipModel(MovingModel):
+class ShipModel(FlatStateModel, MovingModel):
     """The model of the module.
 
     Parameters
@@ -105,8 +106,8 @@ class ShipModel(MovingModel):
     """
 
     state = ("position", "x")
-    equations: ClassVar[ModelFunctions] = SHIP_FUNCTIONS
-    moving = (slice(0, 0), slice(0, 0))  # there is no IMU: the process noise covers manoeuvres
+    equations = SHIP_FUNCTIONS
+    moving = NO_STATES  # there is no IMU: the process noise covers manoeuvres
 
     def __init__(
         self,
@@ -152,6 +153,7 @@ class ShipModel(MovingModel):
             constants=self.constants, decay=self.decay, density=self.density,
             first_variances=covariance.diagonal().copy(), correction=np.empty(self.size),
             next_sample=np.zeros(1, np.int64), aids=self.table(names),
+            moving=self.moving,
         )  # fmt: skip
 
     def table(self, names: Sequence[str]) -> AidTable:
@@ -211,7 +213,7 @@ class ShipModel(MovingModel):
         P = np.zeros((n, n))
         P[:2, :2] = start.covariance[:2, :2]
         P[range(SHIP.speed, n), range(SHIP.speed, n)] = variance
-        P[SHIP.heading, SHIP.heading] = start.covariance[8, 8]
+        P[SHIP.heading, SHIP.heading] = start.covariance[ERROR.heading, ERROR.heading]
         # The initial velocity over ground is a measurement of u and c; the prior of u has no information.
         P[SHIP.speed, SHIP.speed] = 1e4
         north, east = start.velocity[:2].tolist()
@@ -220,7 +222,8 @@ class ShipModel(MovingModel):
         ground = Aid(VELOCITY, np.zeros(3), -1, -1)
         observe_ship(ground, filled(SHIP_NOISE), self.position, self.x, north, east, residual, H, noise)
         cross = P @ H.T
-        noise = start.covariance[3:5, 3:5] + self.sway**2 * np.eye(2)
+        horizontal = slice(ERROR.velocity, ERROR.velocity + 2)
+        noise = start.covariance[horizontal, horizontal] + self.sway**2 * np.eye(2)
         gain = np.linalg.solve(H @ cross + noise, cross.T).T
         self.x += gain @ residual
         joseph = np.eye(n) - gain @ H
@@ -265,21 +268,13 @@ class ShipModel(MovingModel):
                 code, self._noise[name] = _noise(sheet, self.sway)
                 arm = np.array(sheet.lever_arm, dtype=np.float64)
                 self.aids[name] = Aid(code, arm, self.bias_at.get(name, -1), self.scale_at.get(name, -1))
+        self.names = list(self.aids)
         self.many = channel_readings_of(self.own, self.bias_at, ShipReadings)
 
     def components(self, instrument: Datasheet) -> int:
         """Without the height and the velocity down."""
         known = self.aids.get(instrument.name)
         return super().components(instrument) if known is None else components_of(known)
-
-    def propagate(self, covariance: Array, until: float) -> None:
-        """Advance the state and its covariance."""
-        elapsed = until - self.time
-        if elapsed > 0.0:
-            advance_ship(
-                self.position, self.x, covariance, self.transition, self.decay, self.density, self.turn_time, elapsed
-            )
-            self.time = until
 
     def carry(self, error: Array, elapsed: float) -> None:
         """Take an error, or several in columns, through the last propagation, in place."""
@@ -290,12 +285,7 @@ class ShipModel(MovingModel):
         if measurement.instrument in self.own:
             own = self.own[measurement.instrument]
             return own.measure(measurement.time, measurement.value, self.position, self.x, measurement.side)
-        aid, figures = self.aids[measurement.instrument], self._noise[measurement.instrument]
-        m = components_of(aid)
-        residual, jacobian, noise = np.empty(m), np.zeros((m, self.size)), np.empty((m, m))
-        first, second = float(measurement.value[0]), float(measurement.value[m - 1])
-        observe_ship(aid, figures, self.position, self.x, first, second, residual, jacobian, noise)
-        return Linearised(residual, jacobian, noise)
+        return super().measure(measurement)
 
     def observe_own(
         self, name: str, time: float, value: Array, state: tuple[Array, ...], side: Array = NO_SIDE
@@ -303,11 +293,7 @@ class ShipModel(MovingModel):
         """As `ErrorModel.observe_own`; the state is ``position, x``."""
         position, x = state
         found = self.own[name].observe(time, value, position, x, side)
-        return None if found is None else found[:2]
-
-    def correct(self, dx: Array) -> None:
-        """Add a correction to the state."""
-        correct_ship(self.position, self.x, dx)
+        return None if found is None else (found.innovation, found.jacobian)
 
     def move_all(self, states: tuple[Array, ...], elapsed: Array, jacobian: Array | None = None) -> None:
         """As `MovingModel.move_all`."""

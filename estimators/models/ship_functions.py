@@ -86,10 +86,4 @@ def retract(dynamics: Dynamics) -> None:
     correct_ship(state.position, state.x, dynamics.correction)
 
 
-@kernel(passed=True)
-def predict_again(dynamics: Dynamics, readings: Readings, k: int, prediction: Prediction) -> None:
-    """There is no IMU: the process noise covers manoeuvres, and nothing is inflated."""
-    predict(dynamics, readings, k, prediction)
-
-
-SHIP_FUNCTIONS = ModelFunctions(propagate, predict, retract, predict_again)
+SHIP_FUNCTIONS = ModelFunctions(propagate, predict, retract)

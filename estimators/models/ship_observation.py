@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from math import cos, sin
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,16 +21,37 @@ from simnav.types import NO_SIDE, Array, Datasheet
 from .ambiguity import innovation_of
 from .base import Linearised
 from .channel_readings import ChannelReadings
-from .inertial_errors import ERROR
-from .measurement_functions import MeasurementFunction
+from .inertial_errors import ERROR, PART
+from .measurement_functions import Kinematics, MeasurementFunction
 from .ship_kernels import SHIP
 
-__all__ = ["HEEL", "VERTICAL_SPEED", "ShipObservation", "ShipReadings"]
+__all__ = ["HEEL", "VERTICAL_SPEED", "PredictedReading", "ShipObservation", "ShipReadings"]
 
 #: Roll and pitch, which the model takes for zero, one sigma [rad].
 HEEL = 0.03
 #: Vertical speed, which the model takes for zero, one sigma [m/s].
 VERTICAL_SPEED = 1.0
+
+
+class PredictedReading(NamedTuple):
+    """A reading of d components, compared with what the state of a ship predicts.
+
+    Attributes
+    ----------
+    innovation : (d,) array
+        Measured minus predicted, in the units of the kind's errors.
+    jacobian : (d, n) array
+        Derivative of the prediction by the state of the ship.
+    own : (d, 9 + b) array
+        That by the navigation state and the b components of blocks, as `MeasurementFunction.predict` gives it.
+    point : NavigationPoint
+        Where the reading is predicted.
+    """
+
+    innovation: Array
+    jacobian: Array
+    own: Array
+    point: NavigationPoint
 
 
 class ShipObservation(MeasurementFunction):
@@ -78,39 +100,28 @@ class ShipObservation(MeasurementFunction):
         found = self.observe(time, value, position, x, side)
         if found is None:
             return None
-        innovation, jacobian, whole, point = found
-        own = whole[:, :9]
+        own = found.own[:, PART.navigation]
         by_north, by_east = own[:, ERROR.velocity], own[:, ERROR.velocity + 1]
         aside = self._sway**0.5 * (by_east * cos(x[SHIP.heading]) - by_north * sin(x[SHIP.heading]))
         noise = self._white + own @ self._unknown @ own.T + np.outer(aside, aside)
-        more = self.spread(whole, point)
-        return Linearised(innovation, jacobian, noise if more is None else noise + more)
+        more = self.spread(found.own, found.point)
+        return Linearised(found.innovation, found.jacobian, noise if more is None else noise + more)
 
     def observe(
         self, time: float, value: Array, position: Array, x: Array, side: Array = NO_SIDE
-    ) -> tuple[Array, Array, Array, NavigationPoint] | None:
-        """As `measure`, without the noise.
-
-        Returns
-        -------
-        innovation, jacobian : (d,) array, (d, n) array
-            Measured minus predicted, and the derivative of the prediction by the state of the ship.
-        own : (d, 9 + b) array
-            That of `predict`.
-        point : NavigationPoint
-            Where the reading is predicted.
-        """
+    ) -> PredictedReading | None:
+        """As `measure`, without the noise."""
         point = self._point(time, position, x, side)
         predicted = self.predict(point)
         if predicted is None:
             return None
         reading, own = predicted
-        jacobian, at, d = own[:, :9] @ _navigation(x), self._bias_at, len(reading)
+        jacobian, at, d = own[:, PART.navigation] @ _navigation(x), self._bias_at, len(reading)
         self.place(own, jacobian, 0)
         if at >= 0:
             jacobian[:, at : at + d] = np.eye(d)
             reading = self.kind.add_error(reading, x[at : at + d])
-        return innovation_of(self.kind, self.sheet, value, reading), jacobian, own, point
+        return PredictedReading(innovation_of(self.kind, self.sheet, value, reading), jacobian, own, point)
 
     def differences_at(self, time: float, position: Array, x: Array, errors: Array, side: Array = NO_SIDE) -> Array:
         """What the instrument should read at k states, minus what it should read at one.
@@ -138,10 +149,10 @@ class ShipObservation(MeasurementFunction):
         north, east = errors[:, SHIP.north], errors[:, SHIP.east]
         places = displace(position, np.column_stack([north, east, np.zeros(len(errors))]))
         if self.observations is not None:
-            states = places, *_kinematics(x + errors)
+            states = Kinematics(places, *_kinematics(x + errors))
             differences = np.asarray(self.kind.difference(self.read_many(point, states, errors, 0), reading))
         else:
-            jacobian = own[:, :9] @ _navigation(x)
+            jacobian = own[:, PART.navigation] @ _navigation(x)
             self.place(own, jacobian, 0)
             differences = errors @ jacobian.T
             for k, error in enumerate(errors):
@@ -161,8 +172,8 @@ class ShipObservation(MeasurementFunction):
 class ShipReadings(ChannelReadings):
     """The readings of all channels of an instrument, at the states ``position, x`` of a ship."""
 
-    def _navigation(self, states: Sequence[Array], row: NDArray[np.intp], own: Array) -> tuple[Array, ...]:
-        return states[0].take(row, axis=0), *_kinematics(own)
+    def _navigation(self, states: Sequence[Array], row: NDArray[np.intp], own: Array) -> Kinematics:
+        return Kinematics(states[0].take(row, axis=0), *_kinematics(own))
 
     def _by_navigation(self, derivative: Array, own: Array, jacobian: Array) -> None:
         c, s, u = np.cos(own[:, SHIP.heading, None]), np.sin(own[:, SHIP.heading, None]), own[:, SHIP.speed, None]
@@ -189,7 +200,7 @@ def _kinematics(x: Array) -> tuple[Array, Array, Array]:
 def _navigation(x: Array) -> Array:
     """(9, n) derivative of the navigation state's error with respect to that of the ship's state."""
     c, s = cos(x[SHIP.heading]), sin(x[SHIP.heading])
-    G = np.zeros((9, len(x)))
+    G = np.zeros((PART.navigation.stop, len(x)))
     north, east = ERROR.velocity, ERROR.velocity + 1
     G[ERROR.position, SHIP.north] = G[ERROR.position + 1, SHIP.east] = G[ERROR.attitude + 2, SHIP.heading] = 1.0
     G[north, SHIP.current_north] = G[east, SHIP.current_east] = 1.0

@@ -90,13 +90,7 @@ def predict(dynamics: Dynamics, readings: Readings, k: int, prediction: Predicti
     return predict_through(linearise, read, dynamics, readings, k, prediction)
 
 
-@kernel(passed=True)
-def predict_again(dynamics: Dynamics, readings: Readings, k: int, prediction: Prediction) -> None:
-    """There is no IMU: the process noise covers manoeuvres, and nothing is inflated."""
-    predict(dynamics, readings, k, prediction)
-
-
-POINT_FUNCTIONS = ModelFunctions(propagate, predict, retract, predict_again)
+POINT_FUNCTIONS = ModelFunctions(propagate, predict, retract)
 
 
 class ShipPoints(ShipModel, PointModel):

@@ -8,18 +8,14 @@ say they did.
 
 from __future__ import annotations
 
-from typing import ClassVar
-
 from simnav.compiled import kernel
 from simnav.kernel_types import Matrix, Vector
 from simnav.structures import filled
-from simnav.types import Array, InitialState, Instruments, Measurement
+from simnav.types import Array, InitialState, Instruments
 
-from .base import Linearised
-from .equations import equation_of
-from .filtering import Dynamics, ModelFunctions, Prediction, Readings
+from .filtering import Dynamics, Prediction, Readings
 from .propagation import Samples
-from .ship import POSITIONS, ShipModel
+from .ship import ShipModel
 from .ship_functions import SHIP_FUNCTIONS, SHIP_MOTION, ship_state
 from .ship_functions import predict as predict_ship
 from .ship_functions import propagate as propagate_ship
@@ -88,7 +84,7 @@ class StandingShip(ShipModel):
     """
 
     memory = ("constants",)
-    equations: ClassVar[ModelFunctions] = SHIP_FUNCTIONS._replace(propagate=propagate, predict=predict)
+    equations = SHIP_FUNCTIONS._replace(propagate=propagate, predict=predict)
 
     def __init__(self, patience: float = 1.5):
         if not patience > 0.0:
@@ -101,16 +97,3 @@ class StandingShip(ShipModel):
         covariance = super().begin(start, instruments)
         self.constants = filled(SHIP_MOTION, turn_time=self.turn_time, patience=self.patience, last_fix=start.time)
         return covariance
-
-    def propagate(self, covariance: Array, until: float) -> None:
-        """Advance the state and its covariance."""
-        begin, place = self.time, self.position.copy()
-        if until > begin:
-            super().propagate(covariance, until)
-            stand(self.position, place, covariance, float(self.x[SHIP.speed]), self.constants, begin, until)
-
-    def measure(self, measurement: Measurement) -> Linearised | None:
-        """Linearise one measurement; a fix ends the standing."""
-        if equation_of(self.instruments[measurement.instrument]).name in POSITIONS:
-            self.constants.view(SHIP_MOTION)[0].last_fix = measurement.time
-        return super().measure(measurement)

@@ -60,12 +60,8 @@ class _Stated(ErrorModel):
     def functions(self) -> ModelFunctions | None:
         return None if self.stated_variances else super().functions()
 
-    def assimilate_together(
-        self, measurements: Sequence[Measurement], covariance: Array, correction: Array
-    ) -> tuple[Array, Array] | None:
-        if any(map(self._states, measurements)):
-            return None
-        return super().assimilate_together(measurements, covariance, correction)
+    def measure_together(self, measurements: Sequence[Measurement]) -> Linearised | None:
+        return None if any(map(self._states, measurements)) else super().measure_together(measurements)
 
 
 @lru_cache(maxsize=64)

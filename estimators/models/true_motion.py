@@ -23,6 +23,8 @@ from simnav.recording import Recording
 from simnav.streams import stream
 from simnav.types import ImuDatasheet, ImuSamples, InitialState, Instruments, TriadDatasheet
 
+from .inertial_errors import ERROR
+
 __all__ = ["levelled", "true_motion", "with_imu"]
 
 #: White noise of the unit: 0.002 deg/sqrt(h) [rad/sqrt(s)] and 30 ug/sqrt(Hz) [m/s/sqrt(s)].
@@ -76,6 +78,7 @@ def levelled(start: InitialState, recording: Recording) -> InitialState:
     """The start with the true roll and pitch."""
     attitude, covariance = start.attitude.copy(), start.covariance.copy()
     attitude[:2] = recording.initial_truth.attitude[0, :2]
-    covariance[6:8, :] = covariance[:, 6:8] = 0.0
-    covariance[6, 6] = covariance[7, 7] = LEVEL**2
+    level = slice(ERROR.attitude, ERROR.heading)
+    covariance[level, :] = covariance[:, level] = 0.0
+    covariance[level, level] = LEVEL**2 * np.eye(2)
     return replace(start, attitude=attitude, covariance=covariance)

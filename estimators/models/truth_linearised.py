@@ -56,7 +56,7 @@ from .declared_errors import errors_of, errors_of_triad
 from .equations import equation_of
 from .error_states import merged, separate_states
 from .inertial import InertialModel, roll_pitch_yaw
-from .inertial_errors import ERROR
+from .inertial_errors import ERROR, PART
 from .propagation import correct_inertial
 from .state_blocks import StateBlocks
 from .truth_linearised_factors import TruthLinearisedFactors
@@ -221,13 +221,14 @@ class TruthLinearisedModel(ErrorModel):
             position, velocity, dcm = self.truth.position[k], self.truth.velocity[k], self._dcm[k]
             off = nominal.position - position
             off[1] = remainder(off[1], tau)
-            y[:3] += off * self._metres[k]
-            y[3:6] += nominal.velocity - velocity
+            y[PART.position] += off * self._metres[k]
+            y[PART.velocity] += nominal.velocity - velocity
             turn = nominal.dcm @ dcm.T
             if turn[0, 0] + turn[1, 1] + turn[2, 2] < 3.0 - _SMALL:
-                y[6:9] += rotation_vector_from_dcm(turn)
+                y[PART.attitude] += rotation_vector_from_dcm(turn)
             else:
-                y[6:9] += 0.5 * np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]])
+                about = turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]
+                y[PART.attitude] += 0.5 * np.array(about)
         nominal.position[:], nominal.velocity[:], nominal.dcm[:] = position, velocity, dcm
 
     def _navigation(self) -> tuple[Array, Array, Array]:
@@ -302,7 +303,7 @@ class TruthLinearisedModel(ErrorModel):
         innovation, jacobian = own.innovation.copy(), np.zeros((d, self.size))
         jacobian[:, :m] = own.jacobian[:, :m]
         if measurement.instrument in self.nominal.own:
-            jacobian[:, _NAV : _NAV + 3] = self._by_bias(measurement)
+            jacobian[:, PART.gyroscope_bias] = self._by_bias(measurement)
         for k, error in enumerate(self._imu_errors):
             if error.times < 0:
                 jacobian[:, m + k] = jacobian[:, _NAV + error.axis]
@@ -322,7 +323,7 @@ class TruthLinearisedModel(ErrorModel):
                 water = np.array([np.interp(measurement.time, self.truth.time, w) for w in self.water.T])
                 along = forward @ water
                 u, innovation = u - along, innovation + along
-                jacobian[0, 6:9] -= np.cross(forward, water)
+                jacobian[0, PART.attitude] -= np.cross(forward, water)
             if errors.scale >= 0:
                 jacobian[:, errors.scale] = u
             if errors.misalignment >= 0:
@@ -339,7 +340,7 @@ class TruthLinearisedModel(ErrorModel):
         The nominal rate is as measured, so the swing of a lever arm has the whole bias of the gyroscopes in it.
         """
         own = self.nominal.own[measurement.instrument]
-        point = own.point(measurement.time, *self.nominal.state_of_own(), side=measurement.side)
+        point = own.point(measurement.time, self.nominal.state_of_own(), measurement.side)
         return -own.by_angular_rate(point)
 
     def correct(self, dx: Array) -> None:

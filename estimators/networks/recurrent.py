@@ -1,9 +1,9 @@
-"""A recurrent network in compiled form: one layer of gated units, and one output.
+"""A recurrent network in compiled form: one layer of gated units, and linear outputs.
 
 With the input x, the memory h and the logistic function s,
 
     ``r = s(W_r x + U_r h + b_r)``,  ``z = s(W_z x + U_z h + b_z)``,
-    ``n = tanh(W_n x + b_n + r (U_n h + c_n))``,  ``h <- (1 - z) n + z h``,  ``y = v' h + c``.
+    ``n = tanh(W_n x + b_n + r (U_n h + c_n))``,  ``h <- (1 - z) n + z h``,  ``y = V h + c``.
 
 Source: K. Cho, B. van Merrienboer, C. Gulcehre et al., *Learning phrase representations using RNN encoder-decoder for
 statistical machine translation*, EMNLP 2014, in the form of PyTorch, which multiplies ``U_n h + c_n`` by r.
@@ -27,7 +27,7 @@ ARRAYS = ("input_weight", "input_bias", "memory_weight", "memory_bias", "output_
 
 
 def shapes(inputs: int, units: int) -> dict[str, tuple[int, ...]]:
-    """The shape of each array of a network with so many inputs and units; gates r, z, n one after the other."""
+    """The shape of each array of a network with one output; gates r, z, n one after the other."""
     rows = 3 * units
     return {
         "input_weight": (rows, inputs), "input_bias": (rows,), "memory_weight": (rows, units), "memory_bias": (rows,),
@@ -56,8 +56,8 @@ def flat(arrays: Mapping[str, Array]) -> Array:
 
 
 @kernel
-def advance(weights: Vector, inputs: Vector, memory: Vector) -> float:
-    """Take one input; return the output.
+def advance(weights: Vector, inputs: Vector, memory: Vector, outputs: Vector) -> None:
+    """Take one input, and compute the outputs.
 
     Parameters
     ----------
@@ -67,13 +67,10 @@ def advance(weights: Vector, inputs: Vector, memory: Vector) -> float:
         x.
     memory : (m,) array
         h; updated.
-
-    Returns
-    -------
-    float
-        y.
+    outputs : (k,) array
+        y; overwritten.
     """
-    n, m = inputs.size, memory.size
+    n, m, k = inputs.size, memory.size, outputs.size
     rows = 3 * m
     bias = rows * n
     inner = bias + rows
@@ -87,11 +84,12 @@ def advance(weights: Vector, inputs: Vector, memory: Vector) -> float:
         for j in range(m):
             b += weights[inner + i * m + j] * memory[j]
         given[i], kept[i] = a, b
-    y: float = weights[output + m]
     for i in range(m):
         reset = 1.0 / (1.0 + exp(-given[i] - kept[i]))
         keep = 1.0 / (1.0 + exp(-given[m + i] - kept[m + i]))
         new = tanh(given[2 * m + i] + reset * kept[2 * m + i])
         memory[i] = (1.0 - keep) * new + keep * memory[i]
-        y += weights[output + i] * memory[i]
-    return y
+    for j in range(k):
+        outputs[j] = weights[output + k * m + j]
+        for i in range(m):
+            outputs[j] += weights[output + j * m + i] * memory[i]

@@ -20,18 +20,27 @@ from pathlib import Path
 import numpy as np
 
 from simnav.geometry.rotation import dcm_from_rpy
+from simnav.structures import length, structure
 from simnav.types import Array, Datasheet, InitialState, Instruments, Measurements
 
 from .file import Network
+from .recurrent import advance, flat, shapes
 
-__all__ = ["INPUTS", "PERIOD", "RECIPE", "VELOCITIES", "VERSION", "VelocityNetwork", "VelocitySeconds", "shapes_of"]
+__all__ = [
+    "INPUT", "INPUTS", "PERIOD", "RECIPE", "VELOCITIES", "VERSION", "VelocityNetwork", "VelocitySeconds", "shapes_of",
+]  # fmt: skip
 
 RECIPE, VERSION = "velocity-network", 1
 #: Kinds of instruments that give a whole velocity over ground.
 VELOCITIES = ("dvl", "dvl_solution")
 #: Time between two inputs [s]; a longer step of the run counts as one.
 PERIOD = 1.0
-#: The inputs of the network, in order; x, y, z are forward, starboard, down.
+#: The inputs of the network; vectors are forward, starboard, down.
+INPUT = structure(
+    reading=3, is_heard=float, elapsed=float, rate=3, force=3, vibration=float, sine_turned=float,
+    cosine_turned=float, gained=2, speed=float, held=3, spread=float,
+)  # fmt: skip
+#: Names of the inputs, in order.
 INPUTS = (
     "reading_x", "reading_y", "reading_z", "is_heard", "elapsed", "rate_x", "rate_y", "rate_z", "force_x", "force_y",
     "force_z", "vibration", "sine_turned", "cosine_turned", "gained_x", "gained_y", "speed", "held_x", "held_y",
@@ -48,11 +57,7 @@ def shapes_of(arrays: Mapping[str, Array]) -> dict[str, tuple[int, ...]]:
     """The shapes that the arrays of a network should have, by the width of its output weight."""
     weight = arrays.get("output_weight")
     units = weight.shape[-1] if weight is not None and weight.ndim == 2 else 0
-    rows, inputs = 3 * units, len(INPUTS)
-    return {
-        "input_weight": (rows, inputs), "input_bias": (rows,), "memory_weight": (rows, units), "memory_bias": (rows,),
-        "output_weight": (_OUTPUTS, units), "output_bias": (_OUTPUTS,),
-    }  # fmt: skip
+    return shapes(length(INPUT), units) | {"output_weight": (_OUTPUTS, units), "output_bias": (_OUTPUTS,)}
 
 
 class VelocitySeconds:
@@ -125,17 +130,18 @@ class VelocitySeconds:
             self._elapsed += seconds
             self._turned += float(rate[2]) * seconds
             self._gained += (force - self._level)[:2] * seconds
-        inputs = np.empty(len(INPUTS))
-        inputs[:3] = np.arcsinh(reading / self.speed)
-        inputs[3], inputs[4] = float(heard), 0.5 * np.log1p(self._elapsed)
-        inputs[5:8] = np.arcsinh(20.0 * rate)
-        inputs[8:11] = np.arcsinh((force - self._level) / self.speed)
-        inputs[11] = np.log1p(vibration)
-        inputs[12], inputs[13] = np.sin(self._turned), np.cos(self._turned)
-        inputs[14:16] = np.arcsinh(self._gained / self.speed)
-        inputs[16] = np.log(self.speed)
-        inputs[17:20] = np.arcsinh(self.held / self.speed)
-        inputs[20] = np.log1p(self._spread / self.speed)
+        inputs = np.empty(length(INPUT))
+        own = inputs.view(INPUT)[0]
+        own.reading[:] = np.arcsinh(reading / self.speed)
+        own.is_heard, own.elapsed = float(heard), 0.5 * np.log1p(self._elapsed)
+        own.rate[:] = np.arcsinh(20.0 * rate)
+        own.force[:] = np.arcsinh((force - self._level) / self.speed)
+        own.vibration = np.log1p(vibration)
+        own.sine_turned, own.cosine_turned = np.sin(self._turned), np.cos(self._turned)
+        own.gained[:] = np.arcsinh(self._gained / self.speed)
+        own.speed = np.log(self.speed)
+        own.held[:] = np.arcsinh(self.held / self.speed)
+        own.spread = np.log1p(self._spread / self.speed)
         return inputs
 
 
@@ -149,7 +155,7 @@ class VelocityNetwork:
     """
 
     def __init__(self, network: Network):
-        self._arrays = network.arrays
+        self._weights = flat(network.arrays)
         self._memory = np.zeros(network.arrays["output_weight"].shape[1])
 
     @staticmethod
@@ -164,7 +170,7 @@ class VelocityNetwork:
         Parameters
         ----------
         inputs : (21,) array
-            `INPUTS`.
+            `INPUT`.
 
         Returns
         -------
@@ -173,13 +179,8 @@ class VelocityNetwork:
         (3,) array
             Standard deviation of its error, in speeds.
         """
-        own, m = self._arrays, len(self._memory)
-        given = own["input_weight"] @ inputs + own["input_bias"]
-        kept = own["memory_weight"] @ self._memory + own["memory_bias"]
-        reset, keep = np.split(1.0 / (1.0 + np.exp(-(given + kept)[: 2 * m])), 2)
-        new = np.tanh(given[2 * m :] + reset * kept[2 * m :])
-        self._memory = (1.0 - keep) * new + keep * self._memory
-        output = own["output_weight"] @ self._memory + own["output_bias"]
+        output = np.empty(_OUTPUTS)
+        advance(self._weights, inputs, self._memory, output)
         return output[:3], np.exp(np.clip(output[3:], LOWEST, HIGHEST))
 
     @staticmethod

@@ -479,6 +479,9 @@ class Imm(Row, solver=ImmEstimator, model=Suitable):
         failure in one direction on, and a compass while another instrument finds the prediction wrong.
     4
         It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
+    5
+        Readings of one time of several channels (satellites, beams, points of a terrain) are mixed, too. Before, they
+        had the noise of the datasheet.
     """
 
-    version = 4
+    version = 5

@@ -121,4 +121,11 @@ class MultipleHypothesisEkf(Row, solver=MultipleHypothesis, model=DoubtedInstrum
     Source: D. T. Magill, *Optimal adaptive estimation of sampled stochastic processes*, IEEE TAC 10(4), 1965; A. S.
     Willsky and H. L. Jones, *A generalized likelihood ratio approach to the detection and estimation of jumps in linear
     systems*, IEEE TAC 21(1), 1976.
+
+    Versions
+    --------
+    2
+        The evidence counts readings of one time of several channels (satellites, beams, points of a terrain), too.
     """
+
+    version = 2

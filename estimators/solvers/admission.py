@@ -4,18 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from operator import attrgetter
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from simnav.compiled import kernel
+from simnav.compiled import helper, kernel
 from simnav.estimators.models.channels import reading_of
 from simnav.estimators.models.filtering import Readings
 from simnav.kernel_types import IntegerVector, Matrix, Vector
 from simnav.records import Record
 from simnav.types import KINDS, Instruments, Measurement, Measurements
 
-__all__ = ["LATE", "Admission", "Admitted", "Arrivals", "admit", "together"]
+__all__ = ["LATE", "Admission", "Admitted", "Arrivals", "admit", "is_usable", "together"]
 
 #: A measurement that is older than the state by at most this counts as simultaneous [s].
 LATE = 1e-4
@@ -64,6 +64,29 @@ class Admitted(Record):
     skipped: Vector
 
 
+@helper
+def is_usable(time: float, value: Any, latest: float, limits: Any, begin: float, end: float) -> bool:
+    """Whether a reading is in time, later than the last one of its instrument, and plausible.
+
+    Parameters
+    ----------
+    time : float
+        Time of validity [s].
+    value : array or list
+        What was measured, its d components first.
+    latest : float
+        Time of the last reading of the instrument that was used [s].
+    limits : array or list
+        Each of the d components is plausible between its limit and the negative of it (`simnav.kinds.Kind.limits`).
+    begin, end : float
+        The first and the last time that are usable [s].
+    """
+    usable = begin <= time <= end and time > latest
+    for a in range(len(limits)):
+        usable = usable and -limits[a] < value[a] < limits[a]
+    return usable
+
+
 @kernel
 def admit(
     admitted: Admitted, components: IntegerVector, arrivals: Arrivals, step: int, since: float, readings: Readings
@@ -90,10 +113,7 @@ def admit(
         row, time = arrivals.instrument[k], arrivals.time[k]
         if row < 0:
             continue
-        good = begin <= time <= end and time > admitted.latest[row]
-        for a in range(3):
-            good = good and -admitted.limits[row, a] < arrivals.value[k, a] < admitted.limits[row, a]
-        if not good:
+        if not is_usable(time, arrivals.value[k], admitted.latest[row], admitted.limits[row], begin, end):
             admitted.skipped[0] += 1.0
             continue
         admitted.latest[row] = time
@@ -125,7 +145,7 @@ class Admission:
     def __init__(self, instruments: Instruments, observed: Iterable[str]):
         self._rows = {name: row for row, name in enumerate(observed)}
         kinds = [KINDS[instruments[name].kind] for name in self._rows]
-        self._plausible = [kind.plausible for kind in kinds]
+        self._limits = [kind.limits for kind in kinds]
         limits = np.full((len(kinds), 3), np.inf)
         for row, kind in enumerate(kinds):
             limits[row, : len(kind.limits)] = kind.limits[:3]
@@ -144,6 +164,7 @@ class Admission:
         """The measurements of a step to be used by a state of time ``since`` [s], in order of their times."""
         admitted = []
         begin, end, rows, latest = since - LATE, measurements.time + LATE, self._rows, self.record.latest
+        usable = is_usable.function
         for m in sorted(measurements.aids, key=_time):
             time, name, _, value, channel, _ = m
             if channel:
@@ -152,7 +173,7 @@ class Admission:
             row = rows.get(name)
             if row is None:
                 continue
-            if not begin <= time <= end or time <= latest[row] or not self._plausible[row](value):
+            if not usable(time, value.tolist(), latest[row], self._limits[row], begin, end):
                 self.skipped += 1
                 continue
             latest[row] = time

@@ -31,6 +31,7 @@ from simnav.estimators.composition import Solver
 from simnav.estimators.models.declared_errors import bias_of, bias_of_triad
 from simnav.estimators.models.equations import equation_of
 from simnav.estimators.models.error_states import merged, with_variance
+from simnav.estimators.models.inertial_errors import ERROR
 from simnav.estimators.models.measurements import radii, wrap
 from simnav.geometry.earth import gravity
 from simnav.geometry.rotation import dcm_from_rotation_vector, dcm_from_rpy, rpy_from_dcm
@@ -113,7 +114,7 @@ class DeadReckoningEstimator(Solver):
 
         P = np.zeros((6, 6))
         P[:2, :2] = start.covariance[:2, :2]
-        P[_ERROR.heading, _ERROR.heading] = start.covariance[8, 8]
+        P[_ERROR.heading, _ERROR.heading] = start.covariance[ERROR.heading, ERROR.heading]
         self._gyro_walk = 0.0
         if self._imu is not None:
             drift = bias_of_triad(self._imu.gyroscope, "deg_s")
@@ -286,8 +287,8 @@ class DeadReckoningEstimator(Solver):
                 merged(bias_of_triad(triad, unit))[0].variance
                 for triad, unit in ((self._imu.gyroscope, "deg_s"), (self._imu.accelerometer, "m_s2"))
             )
-            tilt = np.diag(start)[6:8] + acceleration / 9.81**2 + turning * LEVEL_TIME**2
-        full[range(6, 8), range(6, 8)] = tilt
+            tilt = np.diag(start)[ERROR.attitude : ERROR.heading] + acceleration / 9.81**2 + turning * LEVEL_TIME**2
+        full[range(ERROR.attitude, ERROR.heading), range(ERROR.attitude, ERROR.heading)] = tilt
         age = self._time - self._started
         drift_down = float(tilt.mean()) * float(v[:2] @ v[:2]) * age**2 + sigma**2 * age
         full[2, 2] = start[2, 2] + drift_down

@@ -14,6 +14,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from math import hypot, radians, sqrt
 
+from simnav.estimators.models.inertial_errors import ERROR
 from simnav.types import Estimate
 
 from .separation import KNOWN_HEADING
@@ -65,7 +66,7 @@ class ExclusionRules:
         """
         assert without.covariance is not None
         assert estimate.covariance is not None
-        if float(without.covariance[8, 8]) > (KNOWN_HEADING if carried else ALONE) ** 2:
+        if float(without.covariance[ERROR.heading, ERROR.heading]) > (KNOWN_HEADING if carried else ALONE) ** 2:
             return False
         sigma, main = (sqrt(float(p[0, 0] + p[1, 1])) for p in (without.covariance, estimate.covariance))
         apart = difference(without, estimate)

@@ -50,6 +50,7 @@ from numpy.typing import NDArray
 from simnav.estimator import UnsuitableScenario
 from simnav.estimators.adaptations.base import Adaptation
 from simnav.estimators.adaptations.choice import Choice
+from simnav.estimators.algebra.inflation import inflate_motion
 from simnav.estimators.algebra.joseph import joseph_update
 from simnav.estimators.models.channels import instrument_of
 from simnav.estimators.models.coupling import by_source
@@ -222,15 +223,15 @@ class FederatedEstimator(KalmanEstimator):
         """Ask the adaptation about a reading of a local filter."""
         super().choose(choice, self._correcting.covariance, readings, k, prediction)
 
-    def inflate(self, dynamics: Dynamics, readings: Readings, k: int, prediction: Prediction) -> None:
+    def inflate(self, dynamics: Dynamics, readings: Readings, k: int, prediction: Prediction) -> bool:
         """Inflate the covariance of the local filter."""
         own, factor = self._correcting.covariance, float(readings.inflation[k])
         if self.adaptation is not None and self.adaptation.inflates:
             for matrix in (own, prediction.cross, prediction.predicted):
                 matrix *= factor
-        else:
-            self.model.loosen(own, factor, dynamics.first_variances)
-            self.predict(dynamics, readings, k, prediction)
+            return False
+        inflate_motion(own, factor, dynamics.first_variances, self.model.moving)
+        return True
 
     def correct(self, dynamics: Dynamics, choice: Choice, readings: Readings, k: int, prediction: Prediction) -> float:
         """Correct the covariance of the local filter."""

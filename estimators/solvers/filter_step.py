@@ -21,7 +21,7 @@ from simnav.estimators.models.propagation import Samples
 from simnav.kernel_types import Matrix
 from simnav.records import Record
 
-__all__ = ["Filter", "correct", "filter_step", "inflate_all", "use_nominal"]
+__all__ = ["Filter", "correct", "filter_step", "use_nominal"]
 
 
 class Filter(Record):
@@ -40,7 +40,7 @@ class Filter(Record):
     choose : callable
         Sets the noise of a reading, or rejects it, or asks for an inflation of the covariance.
     inflate : callable
-        Inflates the covariance by the factor of a reading, and brings its prediction up to date.
+        Inflates the covariance by the factor of a reading; True if the reading has to be predicted again.
     correct : callable
         Corrects covariance and state; the normalised innovation squared, -1 if nothing was changed.
     retract : callable
@@ -52,7 +52,7 @@ class Filter(Record):
     propagate: Callable[[Dynamics, Samples, float], None]
     predict: Callable[[Dynamics, Readings, int, Prediction], bool]
     choose: Callable[[Choice, Matrix, Readings, int, Prediction], None]
-    inflate: Callable[[Dynamics, Readings, int, Prediction], None]
+    inflate: Callable[[Dynamics, Readings, int, Prediction], bool]
     correct: Callable[[Dynamics, Choice, Readings, int, Prediction], float]
     retract: Callable[[Dynamics], None]
 
@@ -91,8 +91,8 @@ def filter_step(f: Filter, readings: Readings, samples: Samples, count: int, unt
         f.choose(f.choice, f.dynamics.covariance, readings, k, prediction)
         if readings.rejected[k]:
             continue
-        if readings.inflation[k] != 1.0:
-            f.inflate(f.dynamics, readings, k, prediction)
+        if readings.inflation[k] != 1.0 and f.inflate(f.dynamics, readings, k, prediction):
+            f.predict(f.dynamics, readings, k, prediction)
         readings.nis[k] = nis = f.correct(f.dynamics, f.choice, readings, k, prediction)
         if nis >= 0.0:
             f.retract(f.dynamics)
@@ -106,20 +106,6 @@ def use_nominal(choice: Choice, covariance: Matrix, readings: Readings, k: int, 
     for a in range(d):
         for b in range(d):
             prediction.noise[a, b] = prediction.nominal[a, b]
-
-
-@kernel(passed=True)
-def inflate_all(dynamics: Dynamics, readings: Readings, k: int, prediction: Prediction) -> None:
-    """Inflate the whole covariance."""
-    n, d, factor = dynamics.covariance.shape[0], prediction.innovation.size, readings.inflation[k]
-    for a in range(n):
-        for b in range(n):
-            dynamics.covariance[a, b] *= factor
-        for b in range(d):
-            prediction.cross[a, b] *= factor
-    for a in range(d):
-        for b in range(d):
-            prediction.predicted[a, b] *= factor
 
 
 @kernel(passed=True)

@@ -8,12 +8,16 @@ from simnav.compiled import kernel
 from simnav.estimators.models.filtering import Readings
 from simnav.estimators.models.propagation import Samples
 from simnav.kernel_types import IntegerVector, Matrix, Stack
+from simnav.structures import structure
 
 from .admission import Admitted, Arrivals, admit
 from .filter_step import Filter, filter_step
 from .step_report import StepReport, end_report, note_readings
 
-__all__ = ["StepStates", "filter_steps"]
+__all__ = ["FLAG", "StepStates", "filter_steps"]
+
+#: A reading that was rejected: number of the step, row of its instrument, and time [s].
+FLAG = structure(step=int, instrument=int, time=float)
 
 
 class StepStates(NamedTuple):
@@ -28,7 +32,7 @@ class StepStates(NamedTuple):
     reports : (t, ...) array
         What is reported (`end_report`).
     flags : (k, 3) array
-        Step, row of its instrument, and time of each reading that was rejected; k is at least the number of readings.
+        `FLAG` of each reading that was rejected; k is at least the number of readings.
     """
 
     numbers: Matrix
@@ -82,8 +86,8 @@ def filter_steps(
         end_report(report, states.reports[step])
         for k in range(count):
             if readings.rejected[k]:
-                flag = states.flags[flags]
-                flag[0], flag[1], flag[2] = step, readings.instrument[k], readings.time[k]
+                flag = states.flags[flags].view(FLAG)[0]
+                flag.step, flag.instrument, flag.time = step, readings.instrument[k], readings.time[k]
                 flags += 1
         for i in range(dynamics.numbers.size):
             states.numbers[step, i] = dynamics.numbers[i]

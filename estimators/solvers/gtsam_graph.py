@@ -25,6 +25,7 @@ from simnav.compiled import kernel
 from simnav.estimators.models.base import Linearised
 from simnav.estimators.models.filtering import Aid
 from simnav.estimators.models.inertial import InertialModel
+from simnav.estimators.models.inertial_errors import ERROR
 from simnav.estimators.models.measurements import (
     DVL,
     GNSS_POSITION,
@@ -39,7 +40,7 @@ from simnav.kernel_types import Matrix, Vector
 from simnav.types import Array, Estimate, InitialState, Instruments, Measurement
 
 from .gtsam_preintegration import Preintegration
-from .tangent_frame import TangentFrame, tangent_state
+from .tangent_frame import TANGENT, GeodeticState, LocalState, TangentFrame, tangent_state
 
 __all__ = ["InertialGraph", "Observation", "TangentState", "observe_tangent"]
 
@@ -47,8 +48,6 @@ __all__ = ["InertialGraph", "Observation", "TangentState", "observe_tangent"]
 LEAST_CORRELATION = 1e-2
 #: Least initial sigmas of gyroscope [rad/s] and accelerometer [m/s^2] biases: a prior must be invertible.
 LEAST_BIAS = 1e-10, 1e-8
-#: In the order of a node's variables, the place of each component in `InertialModel`'s bias.
-_BIAS_ORDER = [3, 4, 5, 0, 1, 2]
 
 
 class TangentState(NamedTuple):
@@ -105,25 +104,21 @@ def observe_tangent(
         Number of components; 0 if there is no such measurement at this state.
     """
     code, arm = aid
-    position, velocity, dcm, error_map = np.empty(3), np.empty(3), np.empty((3, 3)), np.empty((9, 9))
-    tangent_state(
-        origin, axes, (state.rotation, state.place, state.speed), (position, velocity, dcm), error_map, np.empty(3)
-    )
-    gyroscope, nothing, ours = np.empty(3), np.empty(0), np.empty((3, 15))
-    for r in range(3):
-        gyroscope[r] = state.bias[3 + r]
-    at = State(position, velocity, dcm, state.rate, gyroscope, nothing)
+    there = GeodeticState(np.empty(3), np.empty(3), np.empty((3, 3)), np.empty((9, 9)))
+    tangent_state(origin, axes, LocalState(state.rotation, state.place, state.speed), there, np.empty(3))
+    nothing, ours = np.empty(0), np.empty((3, ERROR.calibration))
+    at = State(there.position, there.velocity, there.dcm, state.rate, state.bias[3:], nothing)
     d = observe_inertial(Aid(code, arm, -1, -1), value, at, error, ours)
     for i in range(d):
         error[i] = -error[i]
-        for j in range(9):
+        for j in range(TANGENT.accelerometer_bias):
             x = 0.0
-            for k in range(9):
-                x += ours[i, k] * error_map[k, j]
+            for k in range(ERROR.gyroscope_bias):
+                x += ours[i, k] * there.error_map[k, j]
             jacobian[i, j] = x
         for j in range(3):
-            jacobian[i, 9 + j] = ours[i, 12 + j]
-            jacobian[i, 12 + j] = ours[i, 9 + j]
+            jacobian[i, TANGENT.accelerometer_bias + j] = ours[i, ERROR.accelerometer_bias + j]
+            jacobian[i, TANGENT.gyroscope_bias + j] = ours[i, ERROR.gyroscope_bias + j]
     return d
 
 
@@ -241,9 +236,8 @@ class InertialGraph:
     def linearise(self, measurement: Measurement) -> Linearised | None:
         """A measurement at the state that the motion has led to; None where it says nothing usable."""
         model, state = self.model, self.motion.predict()
-        model.position[:], model.velocity[:], model.dcm[:], _ = self.frame.state(
-            state.pose().rotation().matrix(), state.position(), state.velocity()
-        )
+        there = self._geodetic(state)
+        model.position[:], model.velocity[:], model.dcm[:] = there.position, there.velocity, there.dcm
         model.bias[:3], model.bias[3:] = self.motion.bias.gyroscope(), self.motion.bias.accelerometer()
         model.raw_rate[:] = self.motion.rate
         return model.measure(measurement)
@@ -297,9 +291,8 @@ class InertialGraph:
 
     def navigation(self, state: Any) -> tuple[Array, Array, Array]:
         """Geodetic position, velocity and roll-pitch-yaw of a gtsam.NavState."""
-        rotation, place, speed = state.pose().rotation().matrix(), state.position(), state.velocity()
-        position, velocity, dcm, _ = self.frame.state(rotation, place, speed)
-        return position, velocity, rpy_from_dcm(dcm)
+        there = self._geodetic(state)
+        return there.position, there.velocity, rpy_from_dcm(there.dcm)
 
     def estimate(self, covariance: Array) -> Estimate:
         """Where the motion has led, from the (15, 15) covariance of the newest node."""
@@ -310,11 +303,15 @@ class InertialGraph:
 
     def _error_map(self, state: Any) -> Array:
         """(15, 15) matrix from a change of a node's variables to the error of `InertialModel`."""
-        _, _, _, nine = self.frame.state(state.pose().rotation().matrix(), state.position(), state.velocity())
-        full = np.zeros((15, 15))
-        full[:9, :9] = nine
-        full[9 + np.arange(6), 9 + np.array(_BIAS_ORDER)] = 1.0
+        full, axis = np.zeros((15, 15)), np.arange(3)
+        full[: ERROR.gyroscope_bias, : TANGENT.accelerometer_bias] = self._geodetic(state).error_map
+        full[ERROR.gyroscope_bias + axis, TANGENT.gyroscope_bias + axis] = 1.0
+        full[ERROR.accelerometer_bias + axis, TANGENT.accelerometer_bias + axis] = 1.0
         return full
+
+    def _geodetic(self, state: Any) -> GeodeticState:
+        """A gtsam.NavState as `InertialModel` has it."""
+        return self.frame.state(state.pose().rotation().matrix(), state.position(), state.velocity())
 
 
 _X, _V, _B = (ord(letter) << 56 for letter in "xvb")

@@ -22,7 +22,7 @@ odometry", IEEE Trans. Robotics 33(1), 2017.
 from __future__ import annotations
 
 from math import ceil
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -100,6 +100,8 @@ def imu_pieces(
     eps = 1e-7
     sampled = clock.view(CLOCK)[0]
     rate, force = sampled.mean_rate, sampled.mean_force
+    gyroscope, accelerometer = bias[:3], bias[3:]
+    angle, change = memory[:3], memory[3:]
     t, i, count = sampled.time, first, 0
     while t < until - eps:
         covered = next_interval(sampled, samples, i, t, until, nominal)
@@ -112,24 +114,27 @@ def imu_pieces(
             piece.held = 1.0
             memory[:] = 0.0
         else:
-            a0, a1, a2 = (rate[0] - bias[0]) * dt, (rate[1] - bias[1]) * dt, (rate[2] - bias[2]) * dt
-            n0, n1, n2 = (force[0] - bias[3]) * dt, (force[1] - bias[4]) * dt, (force[2] - bias[5]) * dt
-            m0, m1, m2 = memory[0], memory[1], memory[2]
+            a0, a1, a2 = (rate[0] - gyroscope[0]) * dt, (rate[1] - gyroscope[1]) * dt, (rate[2] - gyroscope[2]) * dt
+            n0 = (force[0] - accelerometer[0]) * dt
+            n1 = (force[1] - accelerometer[1]) * dt
+            n2 = (force[2] - accelerometer[2]) * dt
+            m0, m1, m2 = angle[0], angle[1], angle[2]
             q0, q1, q2 = cross(m0, m1, m2, a0, a1, a2)
             r0, r1, r2 = a0 + q0 / 12.0, a1 + q1 / 12.0, a2 + q2 / 12.0
             x0, x1, x2 = cross(m0, m1, m2, n0, n1, n2)
-            y0, y1, y2 = cross(memory[3], memory[4], memory[5], a0, a1, a2)
+            y0, y1, y2 = cross(change[0], change[1], change[2], a0, a1, a2)
             s0, s1, s2 = (x0 + y0) / 12.0, (x1 + y1) / 12.0, (x2 + y2) / 12.0
             # GTSAM will turn all of it by half the sample; the sculling is in the axes at the start.
             x0, x1, x2 = cross(r0, r1, r2, s0, s1, s2)
-            piece.rate[0], piece.rate[1], piece.rate[2] = r0 / dt + bias[0], r1 / dt + bias[1], r2 / dt + bias[2]
-            piece.force[0] = (n0 + s0 - 0.5 * x0) / dt + bias[3]
-            piece.force[1] = (n1 + s1 - 0.5 * x1) / dt + bias[4]
-            piece.force[2] = (n2 + s2 - 0.5 * x2) / dt + bias[5]
+            piece.rate[0], piece.rate[1] = r0 / dt + gyroscope[0], r1 / dt + gyroscope[1]
+            piece.rate[2] = r2 / dt + gyroscope[2]
+            piece.force[0] = (n0 + s0 - 0.5 * x0) / dt + accelerometer[0]
+            piece.force[1] = (n1 + s1 - 0.5 * x1) / dt + accelerometer[1]
+            piece.force[2] = (n2 + s2 - 0.5 * x2) / dt + accelerometer[2]
             if whole > 0.0:
                 scale = whole / dt
-                memory[0], memory[1], memory[2] = a0 * scale, a1 * scale, a2 * scale
-                memory[3], memory[4], memory[5] = n0 * scale, n1 * scale, n2 * scale
+                angle[0], angle[1], angle[2] = a0 * scale, a1 * scale, a2 * scale
+                change[0], change[1], change[2] = n0 * scale, n1 * scale, n2 * scale
         t = stop
     sampled.time = max(sampled.time, until)
     return i, count
@@ -138,6 +143,13 @@ def imu_pieces(
 def _own(values: Array) -> Array:
     """A contiguous copy."""
     return np.array(values, dtype=np.float64, order="C")
+
+
+class ImuNoise(NamedTuple):
+    """(3, 3) covariance densities of the gyroscopes and of the accelerometers."""
+
+    gyroscope: Array
+    accelerometer: Array
 
 
 class Preintegration:
@@ -170,9 +182,10 @@ class Preintegration:
         self._noise: Any = densities.view(IMU_NOISE)[0]
         self._frame = frame
         gyroscope, accelerometer = float(self._noise.gyroscope_walk), float(self._noise.accelerometer_walk)
-        self._walk = (
-            max(gyroscope, LEAST_WALK * float(variance[0]), LEAST_WALK * LEAST_GYROSCOPE) * _EYE,
-            max(accelerometer, LEAST_WALK * float(variance[3]), LEAST_WALK * LEAST_ACCELEROMETER) * _EYE,
+        of_gyroscopes, of_accelerometers = (LEAST_WALK * float(part[0]) for part in (variance[:3], variance[3:]))
+        self._walk = ImuNoise(
+            max(gyroscope, of_gyroscopes, LEAST_WALK * LEAST_GYROSCOPE) * _EYE,
+            max(accelerometer, of_accelerometers, LEAST_WALK * LEAST_ACCELEROMETER) * _EYE,
         )
         self._clock, self._memory, self._turn = filled(CLOCK, time=time, used=-1e9), np.zeros(6), np.zeros(3)
         self.held = 0.0
@@ -207,17 +220,17 @@ class Preintegration:
         self.state, self.bias, self.elapsed = state, bias, 0.0
         self._hat = np.array([*bias.gyroscope(), *bias.accelerometer()])
         turning = noise.scale * turn + noise.misalignment * (turn.sum() - turn)
-        self._white = (
+        self._white = ImuNoise(
             np.diag(np.maximum(noise.gyroscope + turning, LEAST_GYROSCOPE)),
             max(float(noise.accelerometer), LEAST_ACCELEROMETER) * _EYE,
         )
         self._params = p = gtsam.PreintegrationCombinedParams(self._frame.gravity(state.position()))
         p.setOmegaCoriolis(self._frame.rotation)
-        p.setGyroscopeCovariance(self._white[0])
-        p.setAccelerometerCovariance(self._white[1])
+        p.setGyroscopeCovariance(self._white.gyroscope)
+        p.setAccelerometerCovariance(self._white.accelerometer)
         p.setIntegrationCovariance(INTEGRATION * _EYE)
-        p.setBiasOmegaCovariance(self._walk[0])
-        p.setBiasAccCovariance(self._walk[1])
+        p.setBiasOmegaCovariance(self._walk.gyroscope)
+        p.setBiasAccCovariance(self._walk.accelerometer)
         self._measurements = gtsam.PreintegratedCombinedMeasurementsG(p, bias)
         self._end: Any = state
 
@@ -231,22 +244,22 @@ class Preintegration:
         elapsed = until - self.time
         if elapsed <= 0.0:
             return
-        pieces = np.empty((2 * len(self._samples[0]) + 4, length(PIECE)))
+        pieces = np.empty((2 * len(self._samples.time) + 4, length(PIECE)))
         self._first, count = imu_pieces(
             self._clock, self._memory, self._hat, self._samples, self._first, until, float(self._noise.interval), pieces
         )
-        pieces = pieces[:count]
-        rates, forces = pieces[:, 1:4], pieces[:, 4:7]
+        own = pieces[:count].view(PIECE)[:, 0]
+        duration, held, force, rate = own["duration"], own["held"], own["force"], own["rate"]
         integrate = self._measurements.integrateMeasurement
-        for k, (dt, held) in enumerate(pieces[:, ::7].tolist()):
-            if held:
+        for k, dt in enumerate(duration.tolist()):
+            if held[k]:
                 self._hold(dt)
             else:
-                integrate(forces[k], rates[k], dt)
+                integrate(force[k], rate[k], dt)
             self._end = None
         self.elapsed += elapsed
-        used = pieces[:, 7] == 0.0
-        mean = (rates[used] - self._hat[:3]).T @ pieces[used, 0] / elapsed
+        used = held == 0.0
+        mean = (rate[used] - self._hat[:3]).T @ duration[used] / elapsed
         self._turn += min(1.0, elapsed / TURN_TIME) * (mean - self._turn)
 
     def _hold(self, dt: float) -> None:
@@ -255,14 +268,14 @@ class Preintegration:
         back = state.pose().rotation().matrix().T
         place, speed = state.position(), state.velocity()
         force = 2.0 * np.cross(w, speed) + np.cross(w, np.cross(w, place)) - self._frame.gravity(place)
-        p.setGyroscopeCovariance(self._white[0] + HELD_ATTITUDE**2 * _EYE)
-        p.setAccelerometerCovariance(self._white[1] + HELD_VELOCITY**2 * _EYE)
+        p.setGyroscopeCovariance(self._white.gyroscope + HELD_ATTITUDE**2 * _EYE)
+        p.setAccelerometerCovariance(self._white.accelerometer + HELD_VELOCITY**2 * _EYE)
         force, rate = back @ force + self._hat[3:], back @ w + self._hat[:3]
         parts = max(HELD_PARTS, ceil(dt / HELD_PART))
         for _ in range(parts):
             self._measurements.integrateMeasurement(force, rate, dt / parts)
-        p.setGyroscopeCovariance(self._white[0])
-        p.setAccelerometerCovariance(self._white[1])
+        p.setGyroscopeCovariance(self._white.gyroscope)
+        p.setAccelerometerCovariance(self._white.accelerometer)
         self.held += dt
 
     def predict(self) -> Any:

@@ -32,6 +32,7 @@ from simnav.estimators.adaptations.choice import Choice
 from simnav.estimators.algebra.chi_square import chi_square_limits
 from simnav.estimators.composition import Solver
 from simnav.estimators.models.filtering import Dynamics, Prediction, Readings
+from simnav.estimators.models.inertial_errors import ERROR
 from simnav.estimators.models.suitable import ModelChoice
 from simnav.geometry.rotation import wrap_angle
 from simnav.types import Array, Estimate, InitialState, Instruments, Measurements
@@ -115,7 +116,8 @@ class _Hypothesis:
         assert self.estimate is not None
         assert self.estimate.attitude is not None
         assert self.estimate.covariance is not None
-        return float(self.estimate.attitude[2]), sqrt(max(float(self.estimate.covariance[8, 8]), 0.0))
+        variance = float(self.estimate.covariance[ERROR.heading, ERROR.heading])
+        return float(self.estimate.attitude[2]), sqrt(max(variance, 0.0))
 
 
 class HeadingBank(Solver):
@@ -152,7 +154,7 @@ class HeadingBank(Solver):
 
     def reset(self, start: InitialState, instruments: Instruments) -> None:
         """Begin a run; UnsuitableScenario if the model lacks an instrument."""
-        sigma = sqrt(float(start.covariance[8, 8]))
+        sigma = sqrt(float(start.covariance[ERROR.heading, ERROR.heading]))
         offsets, weights = np.zeros(1), np.ones(1)
         if degrees(sigma) > self.above_deg:
             offsets, weights = initial_headings(sigma, radians(self.spacing_deg))
@@ -165,8 +167,8 @@ class HeadingBank(Solver):
             if len(offsets) > 1:
                 narrow = min(1.0, _OVERLAP * _step(offsets) / sigma)
                 covariance = start.covariance.copy()
-                covariance[8] *= narrow
-                covariance[:, 8] *= narrow
+                covariance[ERROR.heading] *= narrow
+                covariance[:, ERROR.heading] *= narrow
                 attitude = start.attitude + np.array([0.0, 0.0, offset])
                 own = replace(start, attitude=np.asarray(wrap_angle(attitude)), covariance=covariance)
             one.reset(own, instruments)

@@ -16,7 +16,8 @@ import numpy as np
 from simnav.estimators.adaptations.base import Adaptation, Innovation
 from simnav.estimators.algebra.chi_square import chi_square_limits, normal_quantile
 from simnav.estimators.algebra.direct_update import normalised_square
-from simnav.estimators.models.inertial_errors import ERROR
+from simnav.estimators.algebra.inflation import inflate_motion
+from simnav.estimators.models.inertial_errors import ERROR, PART
 from simnav.types import Array, Estimate, InitialState, Instruments
 
 from .kalman import KalmanEstimator
@@ -144,9 +145,10 @@ class WatchedFilter(KalmanEstimator):
     def inflate_motion(self) -> None:
         """Inflate the covariance of position, velocity and attitude; the attitude within the linear range."""
         first = self.dynamics.first_variances.copy()
-        attitude = self.model.moving[1]
+        moving = self.model.moving
+        attitude = slice(moving.attitude, moving.attitude_end)
         first[attitude] = np.maximum(first[attitude], _TILT**2)
-        self.model.loosen(self.covariance, _LOOSENED, first)
+        inflate_motion(self.covariance, _LOOSENED, first, moving)
 
 
 @dataclass
@@ -210,7 +212,8 @@ class Hypothesis:
         assert one.covariance is not None
         assert origin.covariance is not None
         age = one.time - origin.time
-        missing = origin.covariance[8, 8] + self.drift * age**2 + noise * age - one.covariance[8, 8]
+        variance, known = origin.covariance.diagonal()[ERROR.heading], one.covariance.diagonal()[ERROR.heading]
+        missing = variance + self.drift * age**2 + noise * age - known
         if missing > 0.0:
             since = difference(one, origin)
             assert one.velocity is not None
@@ -229,9 +232,12 @@ def uncertain_start(start: InitialState, attitude: bool = True) -> InitialState:
     """The same start with larger sigmas; of the position alone, if not of the ``attitude``, too."""
     stated = np.sqrt(np.diag(start.covariance))
     larger = stated * np.repeat((_WRONG_START, _WRONG_VELOCITY, _WRONG_START), 3)
-    larger[6:] = np.minimum(larger[6:], np.maximum((_TILT, _TILT, _HEADING), stated[6:]))
+    larger[PART.attitude] = np.minimum(
+        larger[PART.attitude], np.maximum((_TILT, _TILT, _HEADING), stated[PART.attitude])
+    )
     if not attitude:
-        larger[3:] = stated[3:]
+        for part in (PART.velocity, PART.attitude):
+            larger[part] = stated[part]
     factor = np.divide(larger, stated, out=np.ones(9), where=stated > 0.0)
     return replace(start, covariance=start.covariance * np.outer(factor, factor))
 

@@ -105,7 +105,7 @@ class HypothesisFilter(ImmEstimator):
 
     def functions(self) -> FilterFunctions:
         """The correction is a mixture that reports its evidence."""
-        return super().functions()._replace(correct=correct_with_evidence)
+        return super().functions().replaced(correct=correct_with_evidence)
 
     def choice(self, instruments: Instruments) -> Choice:
         """As of `ImmEstimator`, but without tests of the prediction: that the IMU is wrong is another hypothesis.

@@ -95,7 +95,7 @@ class ImmEstimator(KalmanEstimator):
         """The prediction is tested, and the correction is a mixture."""
         functions = super().functions()
         correct = self.correct if self.smoother is not None else correct_by_mixture
-        return functions._replace(choose=choose_noise, correct=correct)
+        return functions.replaced(choose=choose_noise, correct=correct)
 
     def choice(self, instruments: Instruments) -> Choice:
         """The levels as settings, and the probabilities of the levels as memories; at first the stationary ones."""
@@ -122,7 +122,7 @@ class ImmEstimator(KalmanEstimator):
     def _reported_noise(self, instruments: Instruments) -> NoiseReport:
         """The roots of the expected variances, and the probabilities of the lowest level."""
         report = NoiseReport(instruments, self._names, "quiet", with_zero=True)
-        report.values[:, 3] = self._filter.choice.memories.reshape(len(instruments), -1)[:, 0]
+        report.rows["number"] = self._filter.choice.memories.reshape(len(instruments), -1)[:, 0]
         return report
 
 

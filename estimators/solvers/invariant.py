@@ -45,6 +45,7 @@ import numpy as np
 from simnav.estimators.adaptations.base import Adaptation
 from simnav.estimators.models.filtering import Dynamics
 from simnav.estimators.models.inertial import InertialModel
+from simnav.estimators.models.inertial_errors import PART
 from simnav.geometry.rotation import left_jacobian, skew
 
 from .kalman import FilterFunctions, KalmanEstimator
@@ -98,16 +99,17 @@ class InvariantKalmanEstimator(KalmanEstimator):
     def retract(self, dynamics: Dynamics) -> None:
         """Correct the state on the group, and transform the covariance of the invariant error."""
         dx = dynamics.correction
-        turn, P = dx[6:9], self.covariance
+        turn, P, navigation = dx[PART.attitude], self.covariance, PART.navigation
         J, across = left_jacobian(turn), skew(turn)
-        dx[0:3], dx[3:6] = J @ dx[0:3], J @ dx[3:6]
+        dx[PART.position], dx[PART.velocity] = J @ dx[PART.position], J @ dx[PART.velocity]
         self.model.correct(dx)
         if self.error == "left":
-            N = np.zeros((9, 9))
-            N[0:3, 0:3] = N[3:6, 3:6] = N[6:9, 6:9] = _IDENTITY + across @ J  # exp(turn x)
-            P[:9] = N @ P[:9]
-            P[:, :9] = P[:, :9] @ N.T
+            N, rotation = np.zeros((navigation.stop, navigation.stop)), _IDENTITY + across @ J  # exp(turn x)
+            for part in (PART.position, PART.velocity, PART.attitude):
+                N[part, part] = rotation
+            P[navigation] = N @ P[navigation]
+            P[:, navigation] = P[:, navigation] @ N.T
         else:
-            shift = np.concatenate([skew(dx[0:3]), skew(dx[3:6])])
-            P[0:6] -= shift @ P[6:9]
-            P[:, 0:6] -= P[:, 6:9] @ shift.T
+            shift = np.concatenate([skew(dx[PART.position]), skew(dx[PART.velocity])])
+            P[PART.motion] -= shift @ P[PART.attitude]
+            P[:, PART.motion] -= P[:, PART.attitude] @ shift.T

@@ -24,7 +24,8 @@ from typing import NamedTuple
 import numpy as np
 
 from simnav.estimators.algebra.joseph import joseph_update
-from simnav.estimators.models.base import ErrorModel, Observation
+from simnav.estimators.models.base import ErrorModel
+from simnav.estimators.models.filtering import Prediction
 from simnav.types import Array, Measurement
 
 __all__ = ["Iteration", "absorb_iterated", "poor_heading"]
@@ -82,7 +83,7 @@ def poor_heading(iterate_above_deg: float | None = None) -> Iteration | None:
 def absorb_iterated(
     model: ErrorModel,
     measurement: Measurement,
-    observation: Observation,
+    prediction: Prediction,
     covariance: Array,
     correction: Array,
     iteration: Iteration,
@@ -95,7 +96,7 @@ def absorb_iterated(
         The model whose state is corrected.
     measurement : Measurement
         The measurement to be used.
-    observation : tuple
+    prediction : Prediction
         The measurement linearised at the state, with the noise that is used.
     covariance : (n, n) array
         Covariance of the model's error, updated.
@@ -112,13 +113,13 @@ def absorb_iterated(
     count : int
         Number of linearisations.
     """
-    residual, cross, predicted, noise = observation
+    residual, cross, predicted = prediction.innovation, prediction.cross, prediction.predicted
     before, first_nis = model.snapshot(), -1.0
     sigma = np.sqrt(np.diag(covariance)) + 1e-300
     previous = np.zeros(model.size)
     for count in range(1, iteration.limit + 1):
         posterior = covariance.copy()
-        nis = joseph_update(posterior, cross, predicted + noise, residual, correction)
+        nis = joseph_update(posterior, cross, predicted + prediction.noise, residual, correction)
         if nis < 0.0 or not np.isfinite(correction).all():
             model.restore(before)
             return -1.0, count

@@ -17,7 +17,7 @@ Source: P. D. Groves 2013, sections 3.2 and 3.4.3.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -26,9 +26,9 @@ from simnav.compiled import Kernel, ready
 from simnav.estimates import Estimates
 from simnav.estimators.adaptations.base import Adaptation, Innovation
 from simnav.estimators.adaptations.choice import Choice, choose_noise, no_choice
-from simnav.estimators.adaptations.intersection import weaken_position
+from simnav.estimators.adaptations.inflation import inflate_moving
 from simnav.estimators.adaptations.noise import NoiseAdaptation
-from simnav.estimators.adaptations.noise_report import NoiseReport
+from simnav.estimators.adaptations.noise_report import CHOSEN, NoiseReport
 from simnav.estimators.algebra.joseph import joseph_update, project
 from simnav.estimators.composition import Solver
 from simnav.estimators.models.base import ErrorModel, Linearised
@@ -39,40 +39,42 @@ from simnav.estimators.models.propagation import Samples
 from simnav.estimators.models.stated_sigmas import with_stated_sigmas
 from simnav.estimators.models.suitable import ModelChoice
 from simnav.steps import Steps
+from simnav.structures import length
 from simnav.types import KINDS, Array, Estimate, InitialState, Instruments, Measurement, Measurements, NavigationStates
 
 from .admission import Admission, Arrivals, together
-from .filter_step import Filter, correct, filter_step, inflate_all, use_nominal
-from .filter_steps import StepStates, filter_steps
+from .filter_step import Filter, correct, filter_step, use_nominal
+from .filter_steps import FLAG, StepStates, filter_steps
 from .innovation_consistency import begun_test
 from .iterated import Iteration, absorb_iterated
 from .smoother import Smoother
-from .step_report import TESTS, StepReport, end_report, note_readings
+from .step_report import INNOVATION, TESTS, StepReport, end_report, note_readings
+from .step_together import step_together
 
 __all__ = ["FilterFunctions", "KalmanEstimator"]
 
-#: Methods of a step; a subclass that has one of its own takes the steps of a run one by one.
-_STEPWISE = ("update", "_use", "_note", "_estimate")
+#: Methods of a step, which compiled steps do not call.
+_OF_A_STEP = ("update", "_use", "_note", "_estimate")
 
 
 class FilterFunctions(NamedTuple):
     """The functions of a filter, see `simnav.estimators.solvers.filter_step.Filter`.
 
-    ``together`` uses readings of one time of the channels of an instrument by one call
-    (`ErrorModel.assimilate_together`); None: they are used one by one.
+    ``predict_together`` predicts readings of one time of the channels of an instrument, so that they are used by one
+    call (`simnav.estimators.solvers.step_together`); None: they are used one by one.
     """
 
     propagate: Callable[[Dynamics, Samples, float], None]
     predict: Callable[[Dynamics, Readings, int, Prediction], bool]
     choose: Callable[[Choice, Array, Readings, int, Prediction], None]
-    inflate: Callable[[Dynamics, Readings, int, Prediction], None]
+    inflate: Callable[[Dynamics, Readings, int, Prediction], bool]
     correct: Callable[[Dynamics, Choice, Readings, int, Prediction], float]
     retract: Callable[[Dynamics], None]
-    together: Callable[..., tuple[Array, Array] | None] | None = None
+    predict_together: Callable[[Sequence[Measurement]], Linearised | None] | None = None
 
     def replaced(self, **functions: Callable[..., Any]) -> FilterFunctions:
         """Some functions in place of others; readings are then used one by one."""
-        return self._replace(**functions, together=None)
+        return self._replace(**functions, predict_together=None)
 
 
 class KalmanEstimator(Solver):
@@ -142,9 +144,6 @@ class KalmanEstimator(Solver):
         self._noise_report = self._reported_noise(instruments)
         self._report = self._begun_report(instruments)
         self._row = np.empty(len(self._labels) + self._report.chosen.size)
-        told = self.adaptation is None or type(self.adaptation).diagnostics is NoiseAdaptation.diagnostics
-        own = any(getattr(type(self), name) is not getattr(KalmanEstimator, name) for name in _STEPWISE)
-        self._takes_steps = self._compiled and told and not own and not self._owners
         if self.smoother is not None:
             self.smoother.begin(self.model, [instruments[name] for name in self._names])
 
@@ -177,19 +176,19 @@ class KalmanEstimator(Solver):
 
     def update_all(self, steps: Steps) -> Estimates | None:
         """Take several steps in compiled code, where the whole filter is."""
-        if not self._takes_steps:
+        if not self._steps_are_compiled:
             return None
         model, n, t = self.model, len(self._labels), len(steps)
         model.load(steps.imu)
         rows = {name: row for row, name in enumerate(self._names)}
         arrivals = Arrivals(
             np.array(steps.ends), np.array(steps.readings), steps.rows_of(rows), ready(steps.time),
-            ready(steps.rows[:, 2:5]),
+            ready(steps.value[:, :3]),
         )  # fmt: skip
         size = model.size
         found = StepStates(
             np.empty((t, len(self.dynamics.numbers))), np.empty((t, size, size)), np.empty((t, len(self._row))),
-            np.empty((len(steps.time), 3)),
+            np.empty((len(steps.time), length(FLAG))),
         )  # fmt: skip
         readings = self._arrays.room(int(np.diff(steps.readings).max(initial=0)))
         imu = model.samples, np.array(steps.samples)
@@ -198,8 +197,20 @@ class KalmanEstimator(Solver):
         estimates = model.estimates(found.numbers, found.covariances)
         noise = {} if self._noise_report is None else self._noise_report.table(found.reports[:, n:])
         estimates.diagnostics = {**dict(zip(self._labels, found.reports.T)), **noise, **estimates.diagnostics}
-        estimates.flagged = [(int(k), self._names[int(row)], time) for k, row, time in found.flags[:flags].tolist()]
+        rejected = found.flags.view(FLAG)[:flags, 0].tolist()
+        estimates.flagged = [(step, self._names[row], time) for step, row, time in rejected]
         return estimates
+
+    @property
+    def _steps_are_compiled(self) -> bool:
+        """Whether compiled code does all that `update` does. Means over channels are made in Python."""
+        own = self.adaptation
+        return (
+            self._compiled
+            and not self._owners
+            and (own is None or type(own).diagnostics is NoiseAdaptation.diagnostics)
+            and all(getattr(type(self), name) is getattr(KalmanEstimator, name) for name in _OF_A_STEP)
+        )
 
     def smooth(self) -> NavigationStates | None:
         """The smoother's trajectory at the ends of all steps; None before the first, and without a smoother."""
@@ -225,20 +236,18 @@ class KalmanEstimator(Solver):
         They are kernels where the model has its equations as kernels and nothing has to be known of a measurement in
         Python: a smoother and an iteration have to know.
         """
-        kernels, own, inflate = self._kernels(), self.adaptation, self.inflate
+        own, kernels, model = self.adaptation, self._kernels(), self.model
+        inflate: Callable[..., bool] = inflate_moving if own is None else own.inflate
         choose: Callable[..., None] = self.choose
         if own is None:
             choose = use_nominal
         elif isinstance(own, NoiseAdaptation) and own.ruled:
             choose = choose_noise
-        if own is None or (own.inflates and not own.inflates_position):
-            inflate = inflate_all
-        single = self.smoother is not None or self.iteration is not None
-        together = self.model.assimilate_together if self.model.many and own is None and not single else None
-        if kernels is None or single:
+        if self.smoother is not None or self.iteration is not None:
+            return FilterFunctions(self.propagate, self.predict, choose, inflate, self.correct, self.retract)
+        if kernels is None:
+            together = model.measure_together if model.many and own is None else None
             return FilterFunctions(self.propagate, self.predict, choose, inflate, self.correct, self.retract, together)
-        if own is not None and not own.inflates:
-            inflate = kernels.inflate_motion
         return FilterFunctions(kernels.propagate, kernels.predict, choose, inflate, correct, kernels.retract)
 
     def _kernels(self) -> ModelFunctions | None:
@@ -247,7 +256,8 @@ class KalmanEstimator(Solver):
 
     def _reported_noise(self, instruments: Instruments) -> NoiseReport | None:
         """Where the noise is reported that `choose_noise` chooses; None if it does not choose."""
-        return self.adaptation.report if self._reports and isinstance(self.adaptation, NoiseAdaptation) else None
+        own = self.adaptation
+        return own.report if isinstance(own, NoiseAdaptation) and self._filter.choose is choose_noise else None
 
     def _begun_report(self, instruments: Instruments) -> StepReport:
         """What is reported of the steps of a run, before the first."""
@@ -255,9 +265,10 @@ class KalmanEstimator(Solver):
         return StepReport(
             freedom=np.array([len(KINDS[instruments[name].kind].limits) for name in self._names], np.int64),
             skipped=self._admission.record.skipped, test=begun_test(),
-            chosen=np.empty((0, 4)) if noise is None else noise.values,
+            chosen=np.empty((0, length(CHOSEN))) if noise is None else noise.values,
             index=np.array([-1 if noise is None else names.index(name) for name in self._names], np.int64),
-            with_zero=noise is not None and noise.with_zero, innovations=np.full(2 * len(self._names), np.nan),
+            with_zero=noise is not None and noise.with_zero,
+            innovations=np.full(length(INNOVATION) * len(self._names), np.nan),
         )  # fmt: skip
 
     def _dynamics(self) -> Dynamics:
@@ -268,12 +279,10 @@ class KalmanEstimator(Solver):
         """The filter of a run, with all that its functions work on."""
         self.dynamics = self._dynamics()
         functions = self.functions()._asdict()
-        self._together = functions.pop("together")
-        self._reports = functions["choose"] is choose_noise
-        choice = self.choice(instruments)
-        if self.adaptation is None and not self._reports and not all(isinstance(f, Kernel) for f in functions.values()):
-            functions["choose"] = self.choose
-        return Filter(dynamics=self.dynamics, choice=choice, **functions)
+        self._predict_together = functions.pop("predict_together")
+        if functions["choose"] is use_nominal and not all(isinstance(f, Kernel) for f in functions.values()):
+            functions["choose"] = self.choose  # a loop in Python copies an array sooner than it calls a kernel
+        return Filter(dynamics=self.dynamics, choice=self.choice(instruments), **functions)
 
     def choice(self, instruments: Instruments) -> Choice:
         """How the noise of each reading is chosen in a run."""
@@ -285,13 +294,15 @@ class KalmanEstimator(Solver):
     def _advance(self, admitted: Sequence[Measurement], until: float, flagged: list[tuple[str, float]]) -> None:
         """Use the admitted measurements of a step, and propagate to its end."""
         model = self.model
-        samples = model.samples
-        for group in self._groups(admitted):
-            end = until if group is admitted else min(group[0].time, until)
-            if group is admitted or len(group) == 1 or not self._use_together(group, end):
-                self._use(group, samples, end, flagged)
+        if self._predict_together is None:
+            self._use(admitted, model.samples, until, flagged)
+            return
+        for group in together(admitted, self._owners):
+            end = min(group[0].time, until)
+            if len(group) == 1 or not self._use_together(group, end):
+                self._use(group, model.samples, end, flagged)
         if model.time < until:
-            self._use((), samples, until, flagged)
+            self._use((), model.samples, until, flagged)
 
     def _use(
         self,
@@ -345,30 +356,19 @@ class KalmanEstimator(Solver):
             noise[...] = chosen
             readings.inflation[k] = own.inflation
 
-    def inflate(self, dynamics: Dynamics, readings: Readings, k: int, prediction: Prediction) -> None:
-        """Inflate the covariance of the motion, or that of the position, and predict again."""
-        assert self.adaptation is not None
-        if self.adaptation.inflates_position:
-            weaken_position(dynamics.covariance, readings.inflation[k])
-        else:
-            self.model.loosen(dynamics.covariance, readings.inflation[k], dynamics.first_variances)
-        self._filter.in_python.predict(dynamics, readings, k, prediction)
-
     def correct(self, dynamics: Dynamics, choice: Choice, readings: Readings, k: int, prediction: Prediction) -> float:
         """Correct the covariance, and compute the correction of the state."""
-        innovation, cross, predicted, _, noise = prediction
         covariance, correction, iteration = self.covariance, dynamics.correction, self.iteration
         if iteration is not None and iteration.applies(self.model, covariance):
-            observation = innovation, cross, predicted, noise
-            nis, count = absorb_iterated(
-                self.model, self._measurements[k], observation, covariance, correction, iteration
-            )
+            measurement = self._measurements[k]
+            nis, count = absorb_iterated(self.model, measurement, prediction, covariance, correction, iteration)
             self._iterations, self._iterated = max(self._iterations, count), True
         else:
             self._iterated = False
-            nis = joseph_update.unchecked(covariance, cross, predicted + noise, innovation, correction)
+            spread = prediction.predicted + prediction.noise
+            nis = joseph_update.unchecked(covariance, prediction.cross, spread, prediction.innovation, correction)
         if nis >= 0.0 and self.smoother is not None:
-            self.smoother.use(correction, self._linearised, noise)
+            self.smoother.use(correction, self._linearised, prediction.noise)
         return nis
 
     def retract(self, dynamics: Dynamics) -> None:
@@ -376,22 +376,15 @@ class KalmanEstimator(Solver):
         if not self._iterated:
             self.model.correct(dynamics.correction)
 
-    def _groups(self, measurements: Sequence[Measurement]) -> Iterable[Sequence[Measurement]]:
-        """The measurements in one group, or those of the channels of one instrument at one time in one if quicker."""
-        return [measurements] if self._together is None else together(measurements, self._owners)
-
-    def _use_together(self, group: Sequence[Measurement], until: float) -> bool:
-        """Use the measurements of a group; False if they have to be used one by one."""
-        self._filter.in_python.propagate(self.dynamics, self.model.samples, until)
-        assert self._together is not None
-        used = self._together(group, self.covariance, self.dynamics.correction)
-        if used is None:
+    def _use_together(self, measurements: Sequence[Measurement], until: float) -> bool:
+        """Use measurements of one time by one call; False if they have to be used one by one."""
+        assert self._predict_together is not None
+        f, samples = self._filter.in_python, self.model.samples
+        readings = step_together(f, self._predict_together, measurements, self._arrays, samples, until)
+        if readings is None:
             return False
-        readings, count = self._arrays.fill(group), len(group)
-        readings.nis[:count], readings.size[:count] = used
-        readings.rejected[:count], readings.sigma[:count, 0], readings.reported[:count] = False, np.nan, 0.0
-        self._measurements = group
-        self._note(readings, count)
+        self._measurements = measurements
+        self._note(readings, len(measurements))
         return True
 
     def _note(self, readings: Readings, count: int) -> None:

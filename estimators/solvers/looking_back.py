@@ -22,6 +22,7 @@ import numpy as np
 
 from simnav.estimators.models.base import ErrorModel
 from simnav.estimators.models.chain import Chain
+from simnav.estimators.models.inertial_errors import ERROR, PART
 from simnav.geometry.earth import displace, relative_position
 from simnav.geometry.rotation import dcm_from_rpy, rpy_from_dcm
 from simnav.types import Array, Estimate
@@ -32,7 +33,7 @@ _TOLERANCE = 1e-6  # s
 
 
 def row_of(estimate: Estimate) -> Array:
-    """Position, velocity and attitude of an estimate in one (9,) array; NaN for what it does not hold."""
+    """Position, velocity and attitude of an estimate in one (9,) array, at `PART`; NaN for what it does not hold."""
     vectors = (estimate.position, estimate.velocity, estimate.attitude)
     return np.concatenate([np.full(3, np.nan) if v is None else v for v in vectors])
 
@@ -143,16 +144,16 @@ def _moved(end: StepEnd, node: Array) -> Array:
     """The state at the end of a step, moved as its newest node has moved since."""
     if end.time - end.node_time <= _TOLERANCE:
         return node
-    state, change = end.state.copy(), node[3:6] - end.node[3:6]
+    state, change = end.state.copy(), node[PART.velocity] - end.node[PART.velocity]
     speeds = np.where(np.isfinite(change), change, 0.0)
-    offset = relative_position(node[:3], end.node[:3]) + speeds * (end.time - end.node_time)
-    state[:3] = displace(state[:3], offset)
-    state[3:6] += change
-    if np.isfinite(node[6:]).all():
-        turn = dcm_from_rpy(node[6:]) @ dcm_from_rpy(end.node[6:]).T
-        state[6:] = rpy_from_dcm(turn @ dcm_from_rpy(state[6:]))
-    elif np.isfinite(node[8]):
-        state[8] += node[8] - end.node[8]
+    offset = relative_position(node[PART.position], end.node[PART.position]) + speeds * (end.time - end.node_time)
+    state[PART.position] = displace(state[PART.position], offset)
+    state[PART.velocity] += change
+    if np.isfinite(node[PART.attitude]).all():
+        turn = dcm_from_rpy(node[PART.attitude]) @ dcm_from_rpy(end.node[PART.attitude]).T
+        state[PART.attitude] = rpy_from_dcm(turn @ dcm_from_rpy(state[PART.attitude]))
+    elif np.isfinite(node[ERROR.heading]):
+        state[ERROR.heading] += node[ERROR.heading] - end.node[ERROR.heading]
     return state
 
 

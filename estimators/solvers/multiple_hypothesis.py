@@ -270,7 +270,7 @@ class MultipleHypothesis(Solver):
         for anchor in (self._anchor, self._sound):
             anchor.filter.take_over(first)
         self._groups: Mapping[str, tuple[str, ...]] = first.model.groups
-        possible = {*self._groups, *([""] if first.model.moving[1].stop > 0 else [])}
+        possible = {*self._groups, *([""] if first.model.moving.attitude_end > 0 else [])}
         if lone_fix(instruments):
             possible = set()  # it and the IMU contradict each other, and nothing says which of them is right
         self._kinds = {name: kind for name, kind in KINDS.items() if kind.doubt.group in possible}

@@ -21,6 +21,7 @@ from math import radians
 
 import numpy as np
 
+from simnav.estimators.models.inertial_errors import ERROR, PART
 from simnav.types import Array, Estimate
 
 from .hypotheses import Hypothesis
@@ -29,8 +30,10 @@ from .state_difference import differences
 __all__ = ["KNOWN_HEADING", "SeparationTest"]
 
 #: Components whose separation is tested: position, velocity, heading.
-_TESTED = (0, 1, 2, 3, 4, 5, 8)
-_IS_TESTED = np.isin(np.arange(9), _TESTED)
+_TESTED = (*range(PART.motion.start, PART.motion.stop), ERROR.heading)
+_IS_TESTED = np.isin(np.arange(PART.navigation.stop), _TESTED)
+#: The velocity north and east.
+_HORIZONTAL = slice(ERROR.velocity, ERROR.velocity + 2)
 #: Part of the main filter's sigma that a separation may have by linearisation alone.
 _LINEARISATION = 0.1
 #: Standard deviation of the heading up to which a filter is compared with another one [rad].
@@ -60,7 +63,7 @@ class SeparationTest:
         """Whether the heading of a filter is certain enough for a comparison."""
         if not self._inertial or estimate is None or estimate.covariance is None:
             return True
-        return float(estimate.covariance[8, 8]) <= KNOWN_HEADING**2
+        return float(estimate.covariance[ERROR.heading, ERROR.heading]) <= KNOWN_HEADING**2
 
     def variances(self, subs: Sequence[Hypothesis], estimate: Estimate) -> tuple[Array, Array]:
         """(k, 9) variances of sub-filters' components, and of their separation from the main filter's estimate."""
@@ -69,7 +72,8 @@ class SeparationTest:
         own = np.array([_estimate_of(sub).covariance.diagonal() for sub in subs])  # type: ignore[union-attr]
         apart = np.maximum(own - main, 0.0) + _LINEARISATION**2 * main
         if estimate.velocity is not None:  # a heading error as large as its test allows, at second order
-            apart[:, 3:5] += (0.5 * self.factor * own[:, 8:] * estimate.velocity[:2]) ** 2
+            heading = own[:, ERROR.heading, None]
+            apart[:, _HORIZONTAL] += (0.5 * self.factor * heading * estimate.velocity[:2]) ** 2
         return own, apart
 
     def largest(self, groups: Mapping[str, Sequence[Hypothesis]], estimate: Estimate) -> dict[str, float]:

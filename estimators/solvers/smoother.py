@@ -25,7 +25,7 @@ smoothing paper (2022, doi:10.1177/01423312221109880, eqs. 24-25) is the same es
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
@@ -34,7 +34,7 @@ from simnav.types import Array, Datasheet, NavigationStates
 
 from .looking_back import smoothed_rows
 
-__all__ = ["FilteredIntervals", "Smoother", "scale_of", "smoother_gains"]
+__all__ = ["FilteredIntervals", "SmoothedStop", "Smoother", "scale_of", "smoother_gains"]
 
 #: FilteredIntervals are stored, and gains are solved for, this many at a time.
 _BATCH = 512
@@ -123,6 +123,27 @@ class FilteredIntervals:
         return self.covariance[: self.count], self.transition[: self.count], self.predicted[: self.count]
 
 
+class SmoothedStop(NamedTuple):
+    """What the backward pass gives at a stop, for n states.
+
+    Attributes
+    ----------
+    stop : int
+        Its index.
+    state : list of array
+        Snapshot of the model, as the filter left it.
+    correction : (n,) array
+        c, which is added to this state.
+    covariance : (n, n) array
+        S, of the corrected state's error.
+    """
+
+    stop: int
+    state: list[Array]
+    correction: Array
+    covariance: Array
+
+
 class Smoother:
     """The smoother of the module, a piece of `KalmanEstimator`. It records the forward pass, then runs backward.
 
@@ -183,10 +204,10 @@ class Smoother:
         """Record that a step ends at the present stop."""
         self._ends.append((self.stops, time))
 
-    def _backward(self, model: ErrorModel, covariance: Array) -> Iterator[tuple[int, list[Array], Array, Array]]:
-        """For each stop, from last to first: index, state of the filter, c and S; subclasses may override it."""
+    def _backward(self, model: ErrorModel, covariance: Array) -> Iterator[SmoothedStop]:
+        """The stops, from last to first; subclasses may override it."""
         c, s = np.zeros(model.size), covariance
-        yield self.stops, model.snapshot(), c, s
+        yield SmoothedStop(self.stops, model.snapshot(), c, s)
         ahead, stop = self._here, self.stops
         for intervals in reversed(self._intervals):
             p, phi, m = intervals.matrices()
@@ -199,7 +220,7 @@ class Smoother:
                 s = 0.5 * (s + s.T)
                 ahead = intervals.correction[k]
                 stop -= 1
-                yield stop, intervals.states[k], c, s
+                yield SmoothedStop(stop, intervals.states[k], c, s)
 
     def earlier(self, model: ErrorModel, lags: Sequence[float]) -> Array | None:
         """Smoothed states of earlier times, from the measurements so far (`simnav.estimator.Estimator.earlier`).
@@ -255,13 +276,13 @@ class Smoother:
         position, velocity, attitude = np.full((3, count, 3), np.nan)
         self.smoothed_covariance = np.full((count, 9, 9), np.nan)
         now, row = model.snapshot(), count - 1
-        for stop, state, correction, spread in self._backward(model, covariance):
-            if row < 0 or self._ends[row][0] != stop:
+        for smoothed in self._backward(model, covariance):
+            if row < 0 or self._ends[row][0] != smoothed.stop:
                 continue
-            model.restore(state)
-            model.correct(correction)
-            out = model.estimate(spread)
-            while row >= 0 and self._ends[row][0] == stop:  # a step may hold no time at all
+            model.restore(smoothed.state)
+            model.correct(smoothed.correction)
+            out = model.estimate(smoothed.covariance)
+            while row >= 0 and self._ends[row][0] == smoothed.stop:  # a step may hold no time at all
                 for series, vector in ((position, out.position), (velocity, out.velocity), (attitude, out.attitude)):
                     if vector is not None:
                         series[row] = vector

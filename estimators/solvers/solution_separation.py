@@ -103,6 +103,7 @@ import numpy as np
 from simnav.estimators.composition import Solver
 from simnav.estimators.models.channels import owners, reading_of, summary
 from simnav.estimators.models.coupling import by_source
+from simnav.estimators.models.inertial_errors import ERROR
 from simnav.estimators.models.roles import fixes_and_logs
 from simnav.estimators.models.suitable import ModelChoice
 from simnav.types import KINDS, Array, Estimate, InitialState, Instruments, Measurements
@@ -246,7 +247,7 @@ class SolutionSeparation(Solver):
         self._time = start.time
         sigma = np.sqrt(np.diag(start.covariance))
         self._wrong_start: Hypothesis | None = None
-        if self._inertial and sigma[8] <= KNOWN_HEADING:
+        if self._inertial and sigma[ERROR.heading] <= KNOWN_HEADING:
             self._wrong_start = Hypothesis(_START, self._filter(start=uncertain_start(start)), start.time)
         self._disturbed = False
         self._imu = self._other_opinion_of_the_imu() if self._inertial and self._group else None

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from simnav.estimators.models.inertial_errors import PART
 from simnav.geometry.earth import displace, relative_position
 from simnav.geometry.rotation import dcm_from_rotation_vector, dcm_from_rpy, rotation_vector_from_dcm, rpy_from_dcm
 from simnav.types import Array, Estimate
@@ -25,14 +26,14 @@ def differences(estimates: Sequence[Estimate], other: Estimate) -> Array:
     found = np.zeros((len(estimates), 9))
     at, positions = _those(estimates, "position")
     if at and other.position is not None:
-        found[at, :3] = relative_position(positions, other.position)
+        found[at, PART.position] = relative_position(positions, other.position)
     at, velocities = _those(estimates, "velocity")
     if at and other.velocity is not None:
-        found[at, 3:6] = velocities - other.velocity
+        found[at, PART.velocity] = velocities - other.velocity
     at, attitudes = _those(estimates, "attitude")
     if at and other.attitude is not None:
         turns = dcm_from_rpy(attitudes) @ dcm_from_rpy(other.attitude).T
-        found[at, 6:] = rotation_vector_from_dcm(turns)
+        found[at, PART.attitude] = rotation_vector_from_dcm(turns)
     return found
 
 
@@ -54,10 +55,10 @@ def displaced(estimate: Estimate, error: Array, covariance: Array) -> Estimate:
     position, velocity, attitude = estimate.position, estimate.velocity, estimate.attitude
     return replace(
         estimate,
-        position=None if position is None else displace(position, error[:3]),
-        velocity=None if velocity is None else velocity + error[3:6],
+        position=None if position is None else displace(position, error[PART.position]),
+        velocity=None if velocity is None else velocity + error[PART.velocity],
         attitude=None
         if attitude is None
-        else rpy_from_dcm(dcm_from_rotation_vector(error[6:]) @ dcm_from_rpy(attitude)),
+        else rpy_from_dcm(dcm_from_rotation_vector(error[PART.attitude]) @ dcm_from_rpy(attitude)),
         covariance=covariance,
     )

@@ -5,16 +5,22 @@ from __future__ import annotations
 import numpy as np
 
 from simnav.compiled import kernel
+from simnav.estimators.adaptations.noise_report import CHOSEN
 from simnav.estimators.models.filtering import Readings
 from simnav.kernel_types import IntegerVector, Matrix, Vector
 from simnav.records import Record
+from simnav.structures import length, structure
 
 from .innovation_consistency import TEST, add_square, end_epoch, is_inconsistent
 
-__all__ = ["TESTS", "StepReport", "end_report", "note_readings"]
+__all__ = ["INNOVATION", "TESTS", "StepReport", "end_report", "note_readings"]
 
+#: Norm and normalised square of the last innovation of an instrument in a step.
+INNOVATION = structure(norm=float, nis=float)
 #: What a row of a report holds behind the innovations.
 TESTS = ("skipped", "variance_factor", "inconsistent")
+_TESTED = structure(**dict.fromkeys(TESTS, float))
+_NUMBER_OF_TESTS = length(_TESTED)
 
 
 class StepReport(Record):
@@ -35,7 +41,7 @@ class StepReport(Record):
     with_zero : bool
         Whether a number of 0 is reported.
     innovations : (2 i,) array
-        Norm and normalised square of the last innovation of each instrument in a step; NaN where there is none.
+        `INNOVATION` of each instrument; NaN where there is none.
     """
 
     freedom: IntegerVector
@@ -56,15 +62,17 @@ def note_readings(report: StepReport, readings: Readings, count: int) -> None:
         row = readings.instrument[k]
         at = report.index[row]
         if at >= 0 and readings.sigma[k, 0] == readings.sigma[k, 0]:
+            chosen = report.chosen[at].view(CHOSEN)[0]
             for a in range(3):
-                report.chosen[at, a] = readings.sigma[k, a]
+                chosen.sigma[a] = readings.sigma[k, a]
             if readings.reported[k] != 0.0 or report.with_zero:
-                report.chosen[at, 3] = readings.reported[k]
+                chosen.number = readings.reported[k]
         if readings.nis[k] < 0.0:
             report.skipped[0] += 1.0
             continue
         add_square(report.test, readings.nis[k], report.freedom[row])
-        report.innovations[2 * row], report.innovations[2 * row + 1] = readings.size[k], readings.nis[k]
+        innovation = report.innovations.view(INNOVATION)[row]
+        innovation.norm, innovation.nis = readings.size[k], readings.nis[k]
 
 
 @kernel
@@ -79,11 +87,12 @@ def end_report(report: StepReport, row: Vector) -> None:
         Overwritten: the innovations, `TESTS`, and the chosen noise.
     """
     end_epoch(report.test)
-    n, (j, width) = report.innovations.size, report.chosen.shape
+    n, (j, width), end = report.innovations.size, report.chosen.shape, report.innovations.size + _NUMBER_OF_TESTS
     for a in range(n):
         row[a], report.innovations[a] = report.innovations[a], np.nan
-    row[n], row[n + 1] = report.skipped[0], report.test.view(TEST)[0].variance_factor
-    row[n + 2] = 1.0 if is_inconsistent(report.test) else 0.0
+    tested = row[n:end].view(_TESTED)[0]
+    tested.skipped, tested.variance_factor = report.skipped[0], report.test.view(TEST)[0].variance_factor
+    tested.inconsistent = 1.0 if is_inconsistent(report.test) else 0.0
     for a in range(j):
         for b in range(width):
-            row[n + 3 + width * a + b] = report.chosen[a, b]
+            row[end + width * a + b] = report.chosen[a, b]

@@ -38,7 +38,7 @@ from simnav.estimators.models.base import ErrorModel, Linearised
 from simnav.kernel_types import IntegerVector, Matrix, Stack, Vector
 from simnav.types import Array, Datasheet
 
-from .smoother import Smoother, smoother_gains
+from .smoother import SmoothedStop, Smoother, smoother_gains
 
 __all__ = ["StudentTSmoother"]
 
@@ -189,7 +189,7 @@ class StudentTSmoother(Smoother):
         self._used.append(_Used(self.stops, known, jacobian.copy(), np.array(nominal)))
         super().use(correction, linearised, noise)
 
-    def _backward(self, model: ErrorModel, covariance: Array) -> Iterator[tuple[int, list[Array], Array, Array]]:
+    def _backward(self, model: ErrorModel, covariance: Array) -> Iterator[SmoothedStop]:
         matrices = [s.matrices() for s in self._intervals]
         p, phi, m = (np.concatenate(parts) for parts in zip(*matrices, strict=True))
         process = m - phi @ p @ phi.swapaxes(1, 2)
@@ -201,7 +201,7 @@ class StudentTSmoother(Smoother):
         )
         states = [state for s in self._intervals for state in s.states] + [model.snapshot()]
         for stop in range(len(states) - 1, -1, -1):
-            yield stop, states[stop], shift[stop], spread[stop]
+            yield SmoothedStop(stop, states[stop], shift[stop], spread[stop])
 
     def _smoothed(self, phi: Array, process: Array, moved: Array, first: Array) -> tuple[Array, Array]:
         """What is to be added to the filter's state at each stop, and its covariance; sets ``weights``."""
@@ -219,10 +219,11 @@ class StudentTSmoother(Smoother):
         before, after = np.zeros((2, stops, n))
         predicted, covariance = np.zeros((2, stops, n, n))
         predicted[0] = covariance[0] = first
+        filtered = _Filtered(before, predicted, after, covariance)
         for _ in range(self.passes):
             measurements = _Measurements(sizes, jacobians, known, noises, weights)
-            _forward(phi, process, moved, begin, measurements, _Filtered(before, predicted, after, covariance))
-            shift, spread = _smooth_back(phi, moved, before, predicted, after, covariance)
+            _forward(phi, process, moved, begin, measurements, filtered)
+            shift, spread = _smooth_back(phi, moved, filtered)
             new = np.ones(len(used))
             if np.isfinite(self.dof):
                 at = shift[of_stop] + moved[of_stop]  # before the corrections of the stop
@@ -245,11 +246,10 @@ class StudentTSmoother(Smoother):
         return shift, spread
 
 
-def _smooth_back(
-    phi: Array, moved: Array, before: Array, predicted: Array, after: Array, covariance: Array
-) -> tuple[Array, Array]:
+def _smooth_back(phi: Array, moved: Array, filtered: _Filtered) -> tuple[Array, Array]:
     """The Rauch-Tung-Striebel pass: delta after the corrections of each stop, and its covariance."""
-    shift, spread = after.copy(), covariance.copy()
+    before, predicted, covariance = filtered.before, filtered.predicted, filtered.covariance
+    shift, spread = filtered.after.copy(), covariance.copy()
     if len(phi) == 0:
         return shift, spread
     gains = smoother_gains(covariance[:-1], phi, predicted[1:])

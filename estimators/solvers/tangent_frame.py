@@ -20,10 +20,12 @@ coordinates", Survey Review 23(181), 1976 (its iteration gains about ten digits 
 from __future__ import annotations
 
 from math import atan2, cos, sin, sqrt
+from typing import NamedTuple
 
 import numpy as np
 
 from simnav.compiled import kernel
+from simnav.estimators.models.inertial_errors import ERROR
 from simnav.geometry.earth import (
     ECCENTRICITY_SQUARED,
     FLATTENING,
@@ -36,20 +38,76 @@ from simnav.geometry.earth import (
 from simnav.kernel_types import Matrix, Vector
 from simnav.types import Array
 
-__all__ = ["TangentFrame", "tangent_state"]
+__all__ = ["TANGENT", "GeodeticState", "LocalState", "TangentErrors", "TangentFrame", "tangent_state"]
 
 _SECOND_ECCENTRICITY_SQUARED = ECCENTRICITY_SQUARED / (1.0 - ECCENTRICITY_SQUARED)
 
 
+class TangentErrors(NamedTuple):
+    """Where the changes of a state in the frame stand: the first of the three components of each part.
+
+    Attributes
+    ----------
+    rotation, place : int
+        Rotation vector [rad] and displacement [m] in body axes.
+    speed : int
+        In the frame [m/s].
+    accelerometer_bias, gyroscope_bias : int
+        In body axes [m/s^2], [rad/s]. GTSAM's order is this one; that of `ERROR` is the other.
+    """
+
+    rotation: int = 0
+    place: int = 3
+    speed: int = 6
+    accelerometer_bias: int = 9
+    gyroscope_bias: int = 12
+
+
+TANGENT = TangentErrors()
+
+
+class LocalState(NamedTuple):
+    """A state in the frame.
+
+    Attributes
+    ----------
+    rotation : (3, 3) array
+        From body to frame.
+    place, speed : (3,) array
+        Position [m], and velocity relative to the Earth [m/s].
+    """
+
+    rotation: Matrix
+    place: Vector
+    speed: Vector
+
+
+class GeodeticState(NamedTuple):
+    """A state as `InertialModel` has it, and how its error follows from changes in the frame.
+
+    Attributes
+    ----------
+    position, velocity : (3,) array
+        Latitude, longitude [rad], height [m]; north, east, down [m/s].
+    dcm : (3, 3) array
+        Rotation from body to north-east-down.
+    error_map : (9, 9) array
+        Error of position, velocity and attitude (`ERROR`) by the changes in the frame (`TANGENT`); equations in the
+        module.
+    """
+
+    position: Vector
+    velocity: Vector
+    dcm: Matrix
+    error_map: Matrix
+
+
+def _blank() -> GeodeticState:
+    return GeodeticState(np.empty(3), np.empty(3), np.empty((3, 3)), np.empty((9, 9)))
+
+
 @kernel
-def tangent_state(
-    origin: Vector,
-    axes: Matrix,
-    local: tuple[Matrix, Vector, Vector],
-    state: tuple[Vector, Vector, Matrix],
-    error_map: Matrix,
-    attraction: Vector,
-) -> None:
+def tangent_state(origin: Vector, axes: Matrix, local: LocalState, state: GeodeticState, attraction: Vector) -> None:
     """Geodetic state of a state in the frame, and how its error changes.
 
     Parameters
@@ -58,18 +116,15 @@ def tangent_state(
         Origin of the frame, Earth-centred [m].
     axes : (3, 3) array
         Rotation from Earth-centred axes to those of the frame.
-    local : (3, 3), (3,) and (3,) arrays
-        Rotation from body to frame; position [m] and velocity relative to the Earth [m/s] in the frame.
-    state : (3,), (3,) and (3, 3) arrays
-        Filled: geodetic position [rad, rad, m], velocity north-east-down [m/s], rotation from body to north-east-down.
-    error_map : (9, 9) array
-        Filled: error of position, velocity and attitude (north-east-down) by rotation and displacement in body axes and
-        velocity change in the frame (equations in the module).
+    local : LocalState
+        The state in the frame.
+    state : GeodeticState
+        Filled.
     attraction : (3,) array
         Filled: gravity in the frame [m/s^2].
     """
     rotation, place, speed = local
-    position, velocity, dcm = state
+    position, velocity, dcm, error_map = state
     x = origin[0] + axes[0, 0] * place[0] + axes[1, 0] * place[1] + axes[2, 0] * place[2]
     y = origin[1] + axes[0, 1] * place[0] + axes[1, 1] * place[1] + axes[2, 1] * place[2]
     z = origin[2] + axes[0, 2] * place[0] + axes[1, 2] * place[1] + axes[2, 2] * place[2]
@@ -106,17 +161,20 @@ def tangent_state(
     t = s / c
     v0, v1, v2 = velocity[0], velocity[1], velocity[2]
     error_map[:] = 0.0
+    about, moved, faster = TANGENT.rotation, TANGENT.place, TANGENT.speed
     for j in range(3):
         c0, c1 = dcm[0, j], dcm[1, j]
         w0, w1, w2 = b * c1, -a * c0, -b * t * c1  # W C
         for i in range(3):
-            error_map[i, 3 + j] = dcm[i, j]
-            error_map[6 + i, j] = dcm[i, j]
-            error_map[3 + i, 6 + j] = N[i, j]
-        error_map[3, 3 + j] = v1 * w2 - v2 * w1
-        error_map[4, 3 + j] = v2 * w0 - v0 * w2
-        error_map[5, 3 + j] = v0 * w1 - v1 * w0
-        error_map[6, 3 + j], error_map[7, 3 + j], error_map[8, 3 + j] = -w0, -w1, -w2
+            error_map[ERROR.position + i, moved + j] = dcm[i, j]
+            error_map[ERROR.attitude + i, about + j] = dcm[i, j]
+            error_map[ERROR.velocity + i, faster + j] = N[i, j]
+        error_map[ERROR.velocity, moved + j] = v1 * w2 - v2 * w1
+        error_map[ERROR.velocity + 1, moved + j] = v2 * w0 - v0 * w2
+        error_map[ERROR.velocity + 2, moved + j] = v0 * w1 - v1 * w0
+        error_map[ERROR.attitude, moved + j] = -w0
+        error_map[ERROR.attitude + 1, moved + j] = -w1
+        error_map[ERROR.attitude + 2, moved + j] = -w2
 
 
 class TangentFrame:
@@ -158,7 +216,7 @@ class TangentFrame:
         turned: Array = self.axes @ north_east_down(position).T
         return turned
 
-    def state(self, rotation: Array, place: Array, speed: Array) -> tuple[Array, Array, Array, Array]:
+    def state(self, rotation: Array, place: Array, speed: Array) -> GeodeticState:
         """Convert a state in the frame to a geodetic state.
 
         Parameters
@@ -170,28 +228,18 @@ class TangentFrame:
 
         Returns
         -------
-        position, velocity : (3,) arrays
-            Latitude, longitude [rad], height [m]; north-east-down [m/s].
-        dcm : (3, 3) array
-            Direction cosine matrix from body axes to north-east-down.
-        error_map : (9, 9) array
-            Matrix from an error in the frame to the error north-east-down, see `tangent_state`.
+        GeodeticState
         """
-        position, velocity, dcm, error_map = np.empty(3), np.empty(3), np.empty((3, 3)), np.empty((9, 9))
         # GTSAM's arrays are in Fortran's order, or to be read only.
-        rotation, place, speed = (np.array(a, dtype=np.float64, order="C") for a in (rotation, place, speed))
-        tangent_state(
-            self.origin, self.axes, (rotation, place, speed), (position, velocity, dcm), error_map, np.empty(3)
-        )
-        return position, velocity, dcm, error_map
+        local = LocalState(*(np.array(a, dtype=np.float64, order="C") for a in (rotation, place, speed)))
+        state = _blank()
+        tangent_state(self.origin, self.axes, local, state, np.empty(3))
+        return state
 
     def gravity(self, place: Array) -> Array:
         """(3,) gravity at a place in the frame, less the centrifugal acceleration about the origin [m/s^2]."""
-        attraction, zero, eye = np.empty(3), np.zeros(3), np.eye(3)
-        tangent_state(
-            self.origin, self.axes, (eye, np.array(place), zero), (np.empty(3), np.empty(3), np.empty((3, 3))),
-            np.empty((9, 9)), attraction,
-        )  # fmt: skip
+        attraction, local = np.empty(3), LocalState(np.eye(3), np.array(place), np.zeros(3))
+        tangent_state(self.origin, self.axes, local, _blank(), attraction)
         w = self.rotation
         return attraction + w * (w @ place) - (w @ w) * place
 

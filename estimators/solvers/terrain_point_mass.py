@@ -177,7 +177,7 @@ class TerrainPointMass(KalmanEstimator):
         assert isinstance(own, MeasurementFunction)
         observations = KINDS[sheet.kind].observations
         assert observations is not None
-        point = own.point(m.time, *model.state_of_own(), m.side)
+        point = own.point(m.time, model.state_of_own(), m.side)
         k = len(place)
 
         def many(array: Array) -> Array:

@@ -43,7 +43,7 @@ from simnav.estimators.algebra.joseph import joseph_update
 from simnav.estimators.models.base import ErrorModel, Linearised
 from simnav.types import Array, Datasheet
 
-from .smoother import FilteredIntervals, Smoother, scale_of
+from .smoother import FilteredIntervals, SmoothedStop, Smoother, scale_of
 
 __all__ = ["TwoFilterSmoother"]
 
@@ -90,12 +90,12 @@ class TwoFilterSmoother(Smoother):
         white = np.linalg.solve(np.linalg.cholesky(noise), np.column_stack([jacobian, residual]))
         self._seen.setdefault(self.stops, []).append(_Used(white[:, -1], white[:, :-1], correction.copy()))
 
-    def _backward(self, model: ErrorModel, covariance: Array) -> Iterator[tuple[int, list[Array], Array, Array]]:
+    def _backward(self, model: ErrorModel, covariance: Array) -> Iterator[SmoothedStop]:
         n, stop = model.size, self.stops
         root, known = np.zeros((0, n)), np.zeros(0)  # U and z, just after the measurements of the stop
         if self.seed_backward:
             root, known = _information_root(covariance), np.zeros(n)
-        yield (stop, model.snapshot(), *_combine(covariance, root, known))
+        yield SmoothedStop(stop, model.snapshot(), *_combine(covariance, root, known))
         array = np.zeros((0, 0))
         for intervals in reversed(self._intervals):
             noise = _noise_roots(intervals)
@@ -114,7 +114,7 @@ class TwoFilterSmoother(Smoother):
                 triangle = np.asarray(np.linalg.qr(array, mode="r"))
                 root, known = triangle[n : 2 * n, n : 2 * n], triangle[n : 2 * n, 2 * n]
                 stop -= 1
-                yield (stop, intervals.states[k], *_combine(intervals.covariance[k], root, known))
+                yield SmoothedStop(stop, intervals.states[k], *_combine(intervals.covariance[k], root, known))
 
 
 def _noise_roots(intervals: FilteredIntervals) -> Array:

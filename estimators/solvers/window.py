@@ -358,10 +358,11 @@ class WindowEstimator(LooksBack, Solver):
     def _optimise(self, attached: int, diagnostics: dict[str, float | Array], flagged: list[tuple[str, float]]) -> None:
         """Estimate all nodes, the newest of which hold new factors, and report."""
         chain = self.chain
-        solved, cost, moved, attached = self._converge(attached)
-        chain.settle(moved)
-        self._cost_test.add(cost, float(chain.aids["weight"] @ chain.aids["components"]))
-        diagnostics["iterations"], diagnostics["cost"] = float(solved), cost
+        done = self._converge(attached)
+        attached = done.attached
+        chain.settle(done.moved)
+        self._cost_test.add(done.cost, float(chain.aids["weight"] @ chain.aids["components"]))
+        diagnostics["iterations"], diagnostics["cost"] = float(done.solved), done.cost
         diagnostics["variance_factor"] = self._cost_test.variance_factor
         if attached:
             aids, new = chain.window.aids, slice(chain.aids.last - attached, chain.aids.last)
@@ -375,7 +376,7 @@ class WindowEstimator(LooksBack, Solver):
             diagnostics["residual.motion"] = float(chain.motions.newest("norm"))
             diagnostics["weight.motion"] = float(chain.motions.newest("weight"))
 
-    def _converge(self, attached: int) -> tuple[int, float, Array, int]:
+    def _converge(self, attached: int) -> _Progress:
         """Move the nodes to the minimum of the cost.
 
         Parameters
@@ -385,17 +386,12 @@ class WindowEstimator(LooksBack, Solver):
 
         Returns
         -------
-        solved : int
-            Number of linear systems that were solved.
-        cost : float
-            Half the weighted sum of squares at the solution.
-        moved : (n,) array
-            Shift of the newest node.
-        attached : int
-            Number of remaining new factors.
+        _Progress
+            What was done, at the solution.
         """
         chain, nodes = self.chain, self.chain.nodes
-        now = _Progress(np.zeros(chain.size), self._first_new(attached), min(1.0, 2.0 * self._contraction))
+        contraction = min(1.0, 2.0 * self._contraction)
+        now = _Progress(np.zeros(chain.size), self._first_new(attached), contraction, attached)
         self._contraction, self._factors = now.contraction, None
         chain.linearise_from(now.first)
         while True:
@@ -406,7 +402,7 @@ class WindowEstimator(LooksBack, Solver):
             if now.first == len(nodes) and now.settled and now.linear:  # the weights are as they were
                 nodes["step"][:] = 0.0
                 break
-            size, attached = self._step(now.damping, now.first, attached)
+            size, now.attached = self._step(now.damping, now.first, now.attached)
             now.solved += 1
             if now.before > 0.0:
                 now.contraction = _ratio(size, now.before, now.damping)
@@ -449,7 +445,7 @@ class WindowEstimator(LooksBack, Solver):
             now.cost = chain.keep()
         self.covariance = nodes.newest("filtered").copy()
         self._eliminated = len(nodes)
-        return now.solved, now.cost, now.moved, attached
+        return now
 
     def _step(self, damping: float, first: int, attached: int) -> tuple[float, int]:
         """Solve for a step; its size, and the new factors left: none if there is no finite step with them."""
@@ -558,6 +554,8 @@ class _Progress:
         First node that must be eliminated again.
     contraction : float
         Ratio of the size of the step after a new linearisation to the size of the steps before it.
+    attached : int
+        Number of new aiding factors that are left.
     solved : int
         Number of linear systems that were solved.
     damping : float
@@ -577,12 +575,13 @@ class _Progress:
     done : bool
         Whether it was the last step.
     cost : float
-        Half the weighted sum of squares, where the last step led without a new linearisation.
+        Half the weighted sum of squares; known once the last step was taken.
     """
 
     moved: Array
     first: int
     contraction: float
+    attached: int
     solved: int = 0
     damping: float = 0.0
     latest: float = 0.0

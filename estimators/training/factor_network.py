@@ -8,7 +8,7 @@
 
 Run it; it takes less than half an hour on one core::
 
-    pip install simnav[learn]
+    pip install '.[learn]'
     python -m simnav.estimators.training.factor_network --voyages 300 --seed 0 --output factor_network.npz
 """
 

@@ -9,7 +9,7 @@
 
 Run it; it takes less than half an hour on one core::
 
-    pip install simnav[learn]
+    pip install '.[learn]'
     python -m simnav.estimators.training.noise_network --voyages 1000 --seed 0 --output noise_network.npz
 """
 

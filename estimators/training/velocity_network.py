@@ -8,7 +8,7 @@
 
 Run it; it takes less than half an hour on one core::
 
-    pip install simnav[learn]
+    pip install '.[learn]'
     python -m simnav.estimators.training.velocity_network --voyages 600 --seed 0 --output velocity_network.npz
 """
 

@@ -23,6 +23,7 @@ from simnav.compiled import kernel
 from simnav.estimators.networks.file import Network
 from simnav.estimators.networks.groups import GROUPS, group_of
 from simnav.kernel_types import IntegerVector, Matrix, Vector
+from simnav.structures import length, structure
 from simnav.types import Array, Instruments
 
 from .base import Factors
@@ -31,13 +32,20 @@ from .robust_weighting import RobustWeighting
 __all__ = ["INPUTS", "RECIPE", "VERSION", "LearnedWeights", "inputs_of", "shapes_of", "shipped"]
 
 RECIPE, VERSION = "factor-network", 1
-#: The inputs of the network, in order.
+#: The inputs of the network, in order: components and size of the residual, whitened; size of the instrument's mean
+#: residual, the residual along it, and the mean size; the sizes before and after; age and number of the instrument's
+#: measurements; size of the motion's residuals; and, by group, which one it is, and the mean sizes.
+INPUT = structure(
+    component=3, magnitude=float, size_of_mean=float, along_mean=float, mean_size=float, size_before=float,
+    size_after=float, age=float, number=float, motion=float, group=GROUPS, size_in_group=GROUPS,
+)  # fmt: skip
+NUMBER_OF_INPUTS = length(INPUT)
+#: Names of the inputs.
 INPUTS = (
     "component_0", "component_1", "component_2", "size", "size_of_mean", "along_mean", "mean_size", "size_before",
     "size_after", "age", "number", "motion", "is_fix", "is_velocity", "is_heading", "is_other", "mean_of_fixes",
     "mean_of_velocities", "mean_of_headings", "mean_of_others",
 )  # fmt: skip
-NUMBER_OF_INPUTS = len(INPUTS)
 
 
 @kernel
@@ -58,33 +66,33 @@ def _fill(
     last = np.full(k, -1, np.int64)
     newest = 0.0
     for i in range(norm.size):
-        a, own = instrument[i], log1p(norm[i] / sqrt(components[i]))
+        a, of_one = instrument[i], log1p(norm[i] / sqrt(components[i]))
         count[a] += 1.0
-        size[a] += own
+        size[a] += of_one
         in_group[group[a]] += 1.0
-        of_group[group[a]] += own
+        of_group[group[a]] += of_one
         for c in range(3):
             mean[a, c] += whitened[i, c]
         newest = max(newest, time[i])
     for i in range(norm.size):
-        a, row = instrument[i], inputs[i]
+        a, own = instrument[i], inputs[i].view(INPUT)[0]
         along, square = 0.0, 0.0
         for c in range(3):
             m = mean[a, c] / count[a]
             along += whitened[i, c] * m
             square += m * m
-            row[c] = asinh(whitened[i, c])
-        row[3] = log1p(norm[i] / sqrt(components[i]))
-        row[4], row[5], row[6] = log1p(sqrt(square)), asinh(along), size[a] / count[a]
-        row[7], row[8] = 0.0, 0.0
+            own.component[c] = asinh(whitened[i, c])
+        own.magnitude = log1p(norm[i] / sqrt(components[i]))
+        own.size_of_mean, own.along_mean, own.mean_size = log1p(sqrt(square)), asinh(along), size[a] / count[a]
+        own.size_before, own.size_after = 0.0, 0.0
         if last[a] >= 0:
-            row[7] = inputs[last[a], 3]
-            inputs[last[a], 8] = row[3]
+            before = inputs[last[a]].view(INPUT)[0]
+            own.size_before, before.size_after = before.magnitude, own.magnitude
         last[a] = i
-        row[9], row[10], row[11] = 0.3 * log1p(newest - time[i]), 0.3 * log1p(count[a]), motion
+        own.age, own.number, own.motion = 0.3 * log1p(newest - time[i]), 0.3 * log1p(count[a]), motion
         for g in range(GROUPS):
-            row[12 + g] = 1.0 if g == group[a] else 0.0
-            row[12 + GROUPS + g] = of_group[g] / in_group[g] if in_group[g] > 0.0 else 0.0
+            own.group[g] = 1.0 if g == group[a] else 0.0
+            own.size_in_group[g] = of_group[g] / in_group[g] if in_group[g] > 0.0 else 0.0
 
 
 def shapes_of(arrays: Mapping[str, Array]) -> dict[str, tuple[int, ...]]:

@@ -1,13 +1,13 @@
 """The first view of a board: what a reader has to know of it, in one picture, one sentence and four rows to take.
 
 All of it is of one track: the first that has a plain row and kinds of trouble. **Rows worth knowing**: those that are
-advised, then those that are told from the plain row and better in a kind of trouble, the best of each kind first, then
-those with the smallest score.
+advised, then those that are significantly better than the plain row in a kind of trouble, the best of each kind first,
+then those with the smallest score.
 
 =============  =========================================================================================================
 plain          The row that all others are compared with.
-robust         The smallest score among the rows that are told from the plain row and better, over all kinds of trouble.
-cheapest       Of those from which no row is told and better, the one with the smallest processor time.
+robust         The smallest score among the rows that are significantly better than the plain row, over all troubles.
+cheapest       Of those than which no row is significantly better, the one with the smallest processor time.
 most honest    Its 95 % region holds the truth nearest to 95 % of the time, of the rows with no more error than the
                plain row.
 =============  =========================================================================================================
@@ -176,7 +176,7 @@ def _known(row: TrackRow, profile: TrackProfile, track: TrackRanking) -> KnownRo
 
 
 def _specialists(profile: TrackProfile, plain: str) -> Iterator[str]:
-    """The rows that are told from the plain row and better in a kind of trouble: the best of each, the second, ..."""
+    """The rows that are significantly better than the plain row in a trouble: the best of each, the second, ..."""
     told = [[r.estimator for r in g.ranked if plain in r.better_than] for g in profile.groups]
     for place in range(max(map(len, told), default=0)):
         yield from (names[place] for names in told if place < len(names))

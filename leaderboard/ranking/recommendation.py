@@ -5,9 +5,9 @@
 is that of one track: the first that has the most of the troubles. What the other tracks have is said beside, and
 decides nothing.
 
-**Choice.** All pairs of rows are tested at once. Where no row that may be taken is told from the plain row and better,
-the plain row is taken: nothing more is shown. Otherwise the row with the smallest error among those that are told from
-the plain row, and from which no other is told and better. A row whose page advises against it
+**Choice.** All pairs of rows are tested at once. Where no row that may be taken is significantly better than the
+plain row, the plain row is taken: nothing more is shown. Otherwise the row with the smallest error among those that
+are, and than which no other row is significantly better. A row whose page advises against it
 (`simnav.estimator.Estimator.advised_against`) is not taken.
 """
 
@@ -208,7 +208,7 @@ def _undecided(runs: TrackRuns, chosen: Mapping[str, TrackRuns], wanted: Sequenc
 
 
 def _worse(fitting: Sequence[TrackRuns], chosen: Mapping[str, TrackRuns], row: str) -> tuple[Elsewhere, ...]:
-    """The other kinds of trouble in which the row is told from the plain row and worse, each on the best track."""
+    """The other kinds of trouble in which the row is significantly worse than the plain row, each on its best track."""
     names = [name for name in troubles() if name not in chosen]
     found = []
     for name, runs in _evidence(fitting, names).items() if names else ():
@@ -234,7 +234,7 @@ def _table(answer: Recommendation) -> tables.Fitted:
     interval = ", with its 95 % interval over seeds" if few else ""
     notes = [f"Error over that of {answer.plain.estimator} in the same runs{interval}."]
     if silent:
-        notes.append(f"No row is told from another in these groups: {', '.join(silent)}.")
+        notes.append(f"No two rows differ significantly in these groups: {', '.join(silent)}.")
     if len(answer.as_good) > _SHOWN - 2:
         notes.append("The document of --json has the other rows.")
     value = ["estimator", *columns[2:-2], "cost ×", "bad runs", "95 % coverage"]

@@ -70,9 +70,9 @@ def _sure(answer: Answer, row: Candidate) -> list[str]:
     if answer.confidence == "undecided":
         why = f"they cannot be ordered, for {answer.why}" if answer.why else "that is what a test of all at once says"
         rows = f"{answer.compared} rows" if answer.limit is None else f"the rows within {answer.limit:g} ms"
-        said.append(f"None of {rows} is told from the plain row and better: {why}.")
+        said.append(f"None of {rows} is significantly better than the plain row: {why}.")
     else:
-        said.append(f"A test of {answer.compared} rows at once tells it from the plain row.")
+        said.append(f"The difference from the plain row is significant (all {answer.compared} rows tested together).")
     low, high = row.result.scenarios_low, row.result.scenarios_high
     if answer.confidence != "undecided":
         if math.isnan(high):

@@ -10,7 +10,7 @@ from .trouble_profile import GroupRow, TroubleGroup
 __all__ = ["Answer", "Candidate", "Confidence", "Elsewhere"]
 
 #: How sure it is: the row is better than the plain row in other scenarios of the kind, too; it is in these scenarios;
-#: no row is told from the plain row; there is no evidence.
+#: no row is significantly better; there is no evidence.
 Confidence = Literal["beyond these scenarios", "in these scenarios", "undecided", "none"]
 
 
@@ -71,13 +71,13 @@ class Answer:
         Milliseconds that an epoch may take.
     confidence : str
         ``beyond these scenarios``: better than the plain row, and so it is likely in other scenarios of the kind;
-        ``in these scenarios``: told from the plain row there; ``undecided``: no row is; ``none``: no evidence.
+        ``in these scenarios``: significantly better there; ``undecided``: no row is; ``none``: no evidence.
     why : str
         Why there is no evidence, or why the rows cannot be ordered; empty otherwise.
     row, plain : Candidate or None
         The row that should be taken, and the plain row; None without evidence.
     as_good : tuple of Candidate
-        Rows that may be taken, too: no row is told from them and better. The cheapest first; where it is undecided,
+        Rows that may be taken, too: no row is significantly better. The cheapest first; where it is undecided,
         the one with the smallest error.
     compared : int
         Number of rows that were compared.
@@ -86,7 +86,7 @@ class Answer:
     elsewhere : tuple of Elsewhere
         The row in the same troubles on other tracks, and on recorded voyages.
     worse : tuple of Elsewhere
-        The kinds of trouble that were not asked for in which the row is told from the plain row, and worse.
+        The kinds of trouble that were not asked for in which the row is significantly worse than the plain row.
     """
 
     instruments: tuple[str, ...]

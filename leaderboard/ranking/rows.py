@@ -134,8 +134,8 @@ class Row:
     why : str
         Why it is not ranked, in one sentence; empty for those that are, and for references.
     rank_low, rank_high : int or None
-        Interval of the rank: the rows above ``rank_low`` are told from it and better, those below ``rank_high`` are
-        told from it and worse. The intervals of all rows hold together with 95 % probability. None for rows that are
+        Interval of the rank: the rows above ``rank_low`` are significantly better, those below ``rank_high``
+        significantly worse. The intervals of all rows hold together with 95 % probability. None for rows that are
         not ranked, and on a board whose rows cannot be ordered.
     may_be_best : bool
         Whether it belongs to the set that holds the best row with 95 % probability.
@@ -160,7 +160,7 @@ class Row:
     p_value : float or None
         Adjusted for all pairs, against the row with the best score; None for that row and rows that are not ranked.
     better_than, worse_than : tuple of str
-        The rows that it is told from.
+        The rows that are significantly worse, and better.
     clean, faulty : Consistency
         Before the first fault of a run, and from then on.
     update_median : float

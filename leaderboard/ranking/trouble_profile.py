@@ -61,7 +61,7 @@ class GroupRow:
     may_be_best : bool
         Whether it belongs to the set that holds the best row of the group with 95 % probability.
     better_than, worse_than : tuple of str
-        The rows that it is told from, all pairs of the group at once.
+        The rows that are significantly worse, and better: all pairs of the group tested together.
     update_median : float
         Median wall-clock time of an epoch in these runs [s].
     """
@@ -155,7 +155,7 @@ class TrackProfile:
     def silence(self) -> str:
         """The groups that separate nobody, in one sentence; empty where each separates somebody."""
         silent = [within(g.title) for g in self.groups if not g.separates]
-        return f"No row is told from another in these groups: {', '.join(silent)}." if silent else ""
+        return f"No two rows differ significantly in these groups: {', '.join(silent)}." if silent else ""
 
     def to_dict(self) -> dict[str, Any]:
         """Plain dicts and lists for JSON."""

@@ -118,15 +118,13 @@ class ChannelGraph(InertialGraph):
 
         def error(_: Any, values: Any, jacobians: Any) -> Array:
             pose, bias = values.atPose3(x), values.atConstantBias(b)
-            position, velocity, dcm, error_map = self.frame.state(
-                pose.rotation().matrix(), pose.translation(), values.atPoint3(v)
-            )
-            state = position, velocity, dcm, rate, bias.gyroscope(), values.atVector(c)
+            at = self.frame.state(pose.rotation().matrix(), pose.translation(), values.atPoint3(v))
+            state = at.position, at.velocity, at.dcm, rate, bias.gyroscope(), values.atVector(c)
             states = [array[None] for array in state]
             innovation, jacobian = many.linearise(time, value, channel, states, row, side, NODE)
             if jacobians is not None:
                 ours = jacobian.reshape(n * d, NODE + k)
-                turned = ours[:, :9] @ error_map
+                turned = ours[:, :9] @ at.error_map
                 jacobians[0], jacobians[1] = turned[:, :6], turned[:, 6:]
                 jacobians[2], jacobians[3] = np.zeros((n * d, 6)), ours[:, NODE:]
             return -innovation.ravel()

@@ -78,6 +78,7 @@ def test_the_site_builds_without_warnings(tmp_path):
     assert "not ranked" in rows
     assert "horizontal_rmse" in (tmp_path / "reference" / "scores.html").read_text()
     assert "multipath" in (tmp_path / "reference" / "instruments.html").read_text()
+    assert "<td>Recorded voyages</td>" in (tmp_path / "reference" / "scenarios.html").read_text()
     assert (tmp_path / "tutorials" / "first-estimator.ipynb").is_file()
     assert "first-estimator.ipynb" in (tmp_path / "tutorials" / "first-estimator.html").read_text()
     assert "until_decided" in (tmp_path / "reference" / "python.html").read_text()
@@ -162,12 +163,13 @@ def test_a_log_becomes_a_scenario(tmp_path, monkeypatch):
     monkeypatch.delenv("SIMNAV_DATA", raising=False)
     page = "tutorials/log-to-rank.md"
     lines = commands(page)
-    assert [line.split()[1] for line in lines] == ["simulate", "run", "evaluate"]
+    assert [line.split()[1] for line in lines] == ["simulate", "check", "run", "evaluate"]
     simnav(tmp_path, lines[0])
     assert blocks(page, "")[1].splitlines() == (tmp_path / "data/voyage/gnss.csv").read_text().splitlines()[:2]
     scenario, outage = blocks(page, "toml")
     (tmp_path / "voyage.toml").write_text(scenario + outage)
-    assert "ship-ekf" in simnav(tmp_path, lines[1])
+    assert "can be run" in simnav(tmp_path, lines[1])
+    assert "ship-ekf" in simnav(tmp_path, lines[2])
     assert [f.kind for f in load(str(tmp_path / "voyage.toml")).faults] == ["outage"]
 
 

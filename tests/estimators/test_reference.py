@@ -7,7 +7,7 @@ import pytest
 
 from simnav.estimator import make
 from simnav.estimators.models.true_motion import true_motion
-from simnav.estimators.reference import ReferenceFigure, oracle_run, reference_figure
+from simnav.estimators.reference import ReferenceFigure, oracle_run
 from simnav.geometry.earth import relative_position
 from simnav.scenario import Scenario, load
 from simnav.simulation.simulator import simulate
@@ -73,6 +73,6 @@ def test_the_true_motion_leads_to_where_the_ship_is():
 
 def test_what_has_no_reference_figure():
     with pytest.raises(SpecError, match="recorded run"):
-        reference_figure(load("car-kitti"), range(2))
+        oracle_run(load("car-kitti"), 0)
     with pytest.raises(ValueError, match="at least two runs, not 1"):
-        reference_figure(shortened("open-sea", 5.0), [0])
+        ReferenceFigure.of("open-sea", [oracle_run(shortened("open-sea", 5.0), 0)])

@@ -15,6 +15,7 @@ from simnav.estimators.models.ship import ShipModel
 from simnav.estimators.models.standing_ship import StandingShip
 from simnav.estimators.solvers.kalman import KalmanEstimator
 from simnav.estimators.solvers.smoother import Smoother
+from simnav.estimators.solvers.window import WindowEstimator
 from simnav.plugins import import_file
 from simnav.scenario import load
 from simnav.source import record
@@ -25,7 +26,7 @@ def plain(model: type) -> type:
 
     class Plain(model):
         def functions(self):
-            return ModelFunctions(*(f.function for f in super().functions()))
+            return ModelFunctions(*(f and f.function for f in super().functions()))
 
     return Plain
 
@@ -83,3 +84,21 @@ def test_a_model_of_the_guide_once_in_python_and_once_compiled(plugins, tmp_path
     np.testing.assert_allclose(trials[0].covariance, trials[1].covariance, rtol=1e-10)
     smoothed = KalmanEstimator(import_file(plugins / "drifting_buoy.py").DriftingBuoy(), smoother=Smoother())
     assert run_trial(smoothed, recording).status == "ok"
+
+
+def test_a_window_over_a_model_of_functions_is_the_filter(plugins):
+    """The motion and the readings are all but linear, so nothing is gained by linearising anew."""
+    recording = record(load("open-sea").model_copy(update={"duration": 40.0}), 1)
+    made = import_file(plugins / "drifting_buoy.py").DriftingBuoy
+    filtered, windowed = (run_trial(e, recording) for e in (KalmanEstimator(made()), WindowEstimator(made(), window=5)))
+    assert windowed.status == "ok", windowed.reason
+    np.testing.assert_allclose(windowed.position, filtered.position, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(windowed.velocity, filtered.velocity, rtol=0, atol=1e-3)
+    np.testing.assert_allclose(windowed.covariance, filtered.covariance, rtol=1e-4, atol=1e-9)
+
+
+def test_a_window_needs_the_difference_of_states():
+    recording = record(load("open-sea").model_copy(update={"duration": 5.0}), 1)
+    trial = run_trial(WindowEstimator(KinematicModel()), recording)
+    assert trial.status == "error"
+    assert "KinematicModel has no function `difference`, which a window needs" in trial.reason

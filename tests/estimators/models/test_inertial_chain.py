@@ -11,6 +11,7 @@ from simnav.estimators.models.dvl_calibration import DvlCalibrationModel
 from simnav.estimators.models.inertial import InertialModel
 from simnav.estimators.models.inertial_chain import InertialChain
 from simnav.estimators.models.nine_state import NineStateModel
+from simnav.estimators.models.propagation import correct_inertial
 from simnav.estimators.solvers.window import WindowEstimator
 from simnav.geometry.rotation import dcm_from_rotation_vector, dcm_from_rpy, left_jacobian, rotation_vector_from_dcm
 from simnav.recording import Recording
@@ -54,13 +55,11 @@ def local(chain: InertialChain, k: int, other: InertialChain, j: int) -> Array:
     """Node k of a chain less node j of another."""
     a = {name: chain.nodes[name][k] for name in chain.front.state}
     b = {name: other.nodes[name][j] for name in chain.front.state}
-    probe = InertialModel()
-    probe.position, probe.velocity = b["position"].copy(), b["velocity"].copy()
     north = 6.37e6 * 1e-6
     # Metres per radian, by the correction itself
-    probe.dcm, probe.bias, probe.calibration = b["dcm"].copy(), b["bias"].copy(), b["calibration"].copy()
-    probe.correct(np.concatenate([[north, north, 0.0], np.zeros(len(a["calibration"]) + 12)]))
-    metres = north / (probe.position - b["position"])[:2]
+    moved = {name: value.copy() for name, value in b.items()}
+    correct_inertial(*moved.values(), np.concatenate([[north, north, 0.0], np.zeros(len(a["calibration"]) + 12)]))
+    metres = north / (moved["position"] - b["position"])[:2]
     d = np.empty(chain.size)
     d[:2] = (a["position"] - b["position"])[:2] * metres
     d[2] = -(a["position"] - b["position"])[2]

@@ -13,6 +13,7 @@ from simnav.estimators.models.channels import by_channel, reading_of
 from simnav.estimators.models.inertial import InertialModel
 from simnav.estimators.models.lever_arms import with_lever_arms
 from simnav.estimators.models.measurement_functions import MeasurementFunction
+from simnav.estimators.models.measurements import State
 from simnav.estimators.models.truth_linearised import TruthLinearisedModel
 from simnav.estimators.solvers.kalman import KalmanEstimator
 from simnav.geometry.rotation import dcm_from_rpy
@@ -104,8 +105,8 @@ def test_the_jacobians_are_those_of_differences(recording: Recording, name: str)
     own, values = MeasurementFunction(sheet, places), np.array([0.4, -0.3, 0.2, 0.01, 0.002, -0.001, 0.003])
     values = values[: sum(b.size for b in sheet.blocks)]
     dcm, zero = dcm_from_rpy(np.array([0.1, -0.05, 2.0])), np.zeros(3)
-    point = own.point(0.0, np.array([0.9, 0.1, -5.0]), np.array([3.0, -2.0, 0.3]), dcm, np.array([0.2, -0.1, 0.3]),
-                      zero, values)  # fmt: skip
+    position, velocity, rate = np.array([0.9, 0.1, -5.0]), np.array([3.0, -2.0, 0.3]), np.array([0.2, -0.1, 0.3])
+    point = own.point(0.0, State(position, velocity, dcm, rate, zero, values))
     _, given = own.predict(point)
     bare = MeasurementFunction(sheet, places)
     bare._observation = lambda p, s: own.read(p)

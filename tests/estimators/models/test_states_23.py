@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from simnav.estimator import UnsuitableScenario, make
-from simnav.estimators.models.dvl_calibration import DELAY, LEVER_ARM, MISALIGNMENT, SCALE, DvlCalibrationModel
+from simnav.estimators.models.dvl_calibration import DvlCalibrationModel, DvlErrors
 from simnav.estimators.models.nine_state import NineStateModel
 from simnav.estimators.rows.kalman import Ekf9, Ekf23
 from simnav.geometry import earth, rotation
@@ -113,7 +113,7 @@ def test_acceleration_is_the_derivative_of_what_the_dvl_sees(recording_of):
         model.load(recording.data.imu)
         model.propagate(P, at)
         seen.append(-model.measure(m).innovation)
-        column = model.measure(m).jacobian[:, DELAY]
+        column = model.measure(m).jacobian[:, model.places.delay][:, 0]
     np.testing.assert_allclose(column, -(seen[1] - seen[0]) / 0.02, atol=0.04)
 
 
@@ -169,13 +169,9 @@ def test_realised_errors_are_found(recording_of, run_over):
     assert sigma[3:5].max() < 0.15
     assert sigma[6] < 0.002
     assert sigma[7] < 0.01
-    assert (slice(15, 18), slice(18, 21), 21) == (MISALIGNMENT, LEVER_ARM, SCALE)
-    assert estimator.model.blocks.of("dvl") == [
-        MISALIGNMENT,
-        LEVER_ARM,
-        slice(SCALE, SCALE + 1),
-        slice(DELAY, DELAY + 1),
-    ]
+    places = DvlErrors(slice(15, 18), slice(18, 21), slice(21, 22), slice(22, 23))
+    assert estimator.model.places == places
+    assert estimator.model.blocks.of("dvl") == list(places)
 
 
 def test_it_needs_a_dvl_and_has_23_states_whatever_else_there_is(recording_of):

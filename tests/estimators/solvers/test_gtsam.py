@@ -12,7 +12,7 @@ from simnav.estimator import make
 from simnav.estimators.models.inertial import InertialModel
 from simnav.estimators.solvers.gtsam_graph import InertialGraph
 from simnav.estimators.solvers.gtsam_solvers import FixedLagEstimator
-from simnav.estimators.solvers.tangent_frame import TangentFrame
+from simnav.estimators.solvers.tangent_frame import GeodeticState, TangentFrame
 from simnav.geometry import earth, rotation
 from simnav.recording import Recording
 from simnav.scenario import load
@@ -77,7 +77,7 @@ def attitude_error(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 def test_the_frame_and_back(position: tuple[float, float, float]):
     frame = TangentFrame(np.array([0.9, 0.1, 20.0]))
     there = np.array(position)
-    back = frame.state(np.eye(3), frame.local(there), np.zeros(3))[0]
+    back = frame.state(np.eye(3), frame.local(there), np.zeros(3)).position
     np.testing.assert_allclose(back[:2], there[:2], atol=1e-14)
     np.testing.assert_allclose(back[2], there[2], atol=1e-8)
 
@@ -104,7 +104,7 @@ def test_the_error_map_is_the_derivative_of_the_conversion():
     R = rotation.dcm_from_rpy(np.array([0.1, 0.2, 2.0]))
     place, speed = frame.local(np.array([0.901, 0.102, 5.0])), np.array([3.0, -4.0, 0.5])
 
-    def state(step: np.ndarray) -> tuple[np.ndarray, ...]:
+    def state(step: np.ndarray) -> GeodeticState:
         return frame.state(R @ rotation.dcm_from_rotation_vector(step[:3]), place + R @ step[3:6], speed + step[6:])
 
     p0, v0, c0, error_map = state(np.zeros(9))

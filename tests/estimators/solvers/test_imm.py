@@ -9,6 +9,8 @@ from scipy.stats import multivariate_normal
 from simnav.estimator import EstimatorError, make
 from simnav.estimators.algebra.joseph import joseph_update
 from simnav.estimators.solvers.imm import mixture_update
+from simnav.scenario import load
+from simnav.source import record
 
 
 def problem(seed: int, m: int = 3):
@@ -88,3 +90,12 @@ def test_the_chain_is_a_chain(n: int):
 def test_levels_that_cannot_be():
     with pytest.raises(EstimatorError, match=r"levels = 3, 1: two or more"):
         make("imm", levels="3,1")
+
+
+def test_readings_of_one_time_of_several_channels_are_mixed_one_by_one():
+    recording = record(load("satellites-open-sea").model_copy(update={"duration": 2.0}), 0)
+    plain, mixed = make("ekf"), make("imm")
+    for estimator in (plain, mixed):
+        estimator.reset(recording.start, recording.instruments)
+    assert plain.functions().predict_together is not None  # as the plain filter predicts them
+    assert mixed.functions().predict_together is None

@@ -98,7 +98,7 @@ def test_a_run_is_bad_if_it_is_lost_or_far_above_the_plain_row() -> None:
 
 def test_groups_that_separate_nobody_say_so_once() -> None:
     found = profile(made(ERRORS | EQUAL))
-    assert found.silence == "No row is told from another in these groups: nothing wrong."
+    assert found.silence == "No two rows differ significantly in these groups: nothing wrong."
     caption = profile_table(found).caption
     assert caption is not None
     assert caption.count(found.silence) == 1

@@ -1,4 +1,4 @@
-"""A barge under tow of its own engine: linear damping, and Coriolis forces from the mass matrix."""
+"""A barge with its own engine: linear damping, and Coriolis forces from the mass matrix."""
 
 from __future__ import annotations
 

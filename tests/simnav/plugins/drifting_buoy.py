@@ -12,7 +12,7 @@ from simnav.estimators.models.function_model import FunctionModel
 from simnav.estimators.models.propagation import Samples
 from simnav.geometry.earth import radii_scalar
 from simnav.structures import filled, structure
-from simnav.types import Estimate
+from simnav.types import Array, Estimate
 
 #: Time [s]; latitude, longitude [rad] and height [m]; velocity north and east [m/s]; metres for a radian.
 STATE = structure(time=float, position=3, velocity=2, metres=2)
@@ -53,18 +53,18 @@ def retract(dynamics: Dynamics) -> None:
         state.velocity[i] += dynamics.correction[2 + i]
 
 
-def inflate_and_predict(dynamics: Dynamics, readings: Readings, k: int, prediction: Prediction) -> None:
-    for i in range(4):
-        for j in range(4):
-            dynamics.covariance[i, j] *= readings.inflation[k]
-    predict(dynamics, readings, k, prediction)
+def difference(numbers: Array, other: Array, error: Array) -> None:
+    state, there = numbers.view(STATE)[0], other.view(STATE)[0]
+    for i in range(2):
+        error[i] = (state.position[i] - there.position[i]) * state.metres[i]
+        error[2 + i] = state.velocity[i] - there.velocity[i]
 
 
 class DriftingBuoy(FunctionModel):
     """Position and velocity, north and east, from GNSS alone."""
 
     size = 4
-    equations = ModelFunctions(propagate, predict, retract, inflate_and_predict)
+    equations = ModelFunctions(propagate, predict, retract, difference)
 
     def observes(self, instrument):
         return instrument.kind == "gnss_position"

@@ -1,10 +1,11 @@
-"""Doubting the motion inflates what moves, keeps correlations, and spares the errors of the instruments."""
+"""A wrong motion inflates what moves, keeps correlations, and spares the errors of the instruments."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
+from simnav.estimators.algebra.inflation import inflate_motion
 from simnav.estimators.models.inertial import InertialModel
 from simnav.estimators.models.kinematic import KinematicModel
 from simnav.estimators.models.ship import ShipModel
@@ -27,7 +28,7 @@ def test_what_is_doubted(scenario, model, moving, attitude):
     root = np.random.default_rng(0).standard_normal((model.size, model.size))
     covariance = root @ root.T
     before, first = covariance.copy(), 3.0 * covariance.diagonal()
-    model.loosen(covariance, 100.0, first)
+    inflate_motion(covariance, 100.0, first, model.moving)
     expected = np.ones(model.size)
     expected[list(moving)], expected[list(attitude)] = 100.0, 3.0
     np.testing.assert_allclose(covariance.diagonal() / before.diagonal(), expected)
@@ -41,5 +42,5 @@ def test_an_attitude_is_never_made_surer():
     covariance = model.begin(recording.start, recording.instruments)
     first = covariance.diagonal().copy()
     covariance *= 4.0  # less certain than at the start
-    model.loosen(covariance, 10.0, first)
+    inflate_motion(covariance, 10.0, first, model.moving)
     np.testing.assert_allclose(covariance.diagonal()[6:], 4.0 * first[6:])
