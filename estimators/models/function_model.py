@@ -83,8 +83,7 @@ class FunctionModel(FlatStateModel, MovingModel):
 
     def difference_all(self, states: States, others: States) -> Array:
         """As `MovingModel.difference_all`."""
-        if self.equations.difference is None:
-            raise TypeError(f"{type(self).__name__} has no function `difference`, which a window needs")
+        assert self.equations.difference is not None  # its chain asks
         errors = np.empty((len(states[0]), self.size))
         for numbers, other, error in zip(states[0], others[0], errors, strict=True):
             self.equations.difference(numbers, other, error)
@@ -124,4 +123,8 @@ class FunctionChain(MovingChain):
 
 @chain_of.register
 def _(model: FunctionModel) -> FunctionChain:
+    if model.equations.difference is None:
+        raise TypeError(
+            f"{type(model).__name__} has no function `difference` of two states, so that no graph can be made of it"
+        )
     return FunctionChain(model)

@@ -267,7 +267,7 @@ class Mckf(_Adaptive, adaptation=piece(MaximumCorrentropy, smallest=1e-3)):
 
 @register("imm")
 class Imm(Row, solver=ImmEstimator, model=Suitable):
-    version = 4
+    version = 5
     def __init__(
         self,
         *,

@@ -27,6 +27,7 @@ from simnav.estimators.adaptations.sage_husa import SageHusa
 from simnav.estimators.adaptations.truth import TrueNoise
 from simnav.estimators.adaptations.variational_bayes import VariationalBayes
 from simnav.estimators.composition import Row, Solver, documented, piece
+from simnav.estimators.models.chain import chain_of
 from simnav.estimators.models.inertial import InertialModel
 from simnav.estimators.models.inertial_points import InertialPoints
 from simnav.estimators.models.kinematic import KinematicModel
@@ -353,8 +354,10 @@ def test_isolation_is_a_piece_of_windows_with_a_weighting():
 
 
 def test_a_model_without_a_chain_makes_no_graph():
-    with pytest.raises(TypeError, match="KinematicModel has no chain, so that no graph can be made of it"):
+    with pytest.raises(TypeError, match="KinematicModel has no function `difference` of two states, so that no graph"):
         WindowEstimator(KinematicModel())
+    with pytest.raises(TypeError, match="object has no chain, so that no graph can be made of it"):
+        chain_of(object())
 
 
 FILTERS = {

@@ -95,10 +95,3 @@ def test_a_window_over_a_model_of_functions_is_the_filter(plugins):
     np.testing.assert_allclose(windowed.position, filtered.position, rtol=0, atol=1e-9)
     np.testing.assert_allclose(windowed.velocity, filtered.velocity, rtol=0, atol=1e-3)
     np.testing.assert_allclose(windowed.covariance, filtered.covariance, rtol=1e-4, atol=1e-9)
-
-
-def test_a_window_needs_the_difference_of_states():
-    recording = record(load("open-sea").model_copy(update={"duration": 5.0}), 1)
-    trial = run_trial(WindowEstimator(KinematicModel()), recording)
-    assert trial.status == "error"
-    assert "KinematicModel has no function `difference`, which a window needs" in trial.reason
