@@ -34,18 +34,13 @@ from .noise import NoiseAdaptation
 from .prediction import standardised
 from .rules import copied
 
-__all__ = ["INPUTS", "MEMORY", "RECIPE", "VERSION", "LearnedNoise", "learned_noise", "set_by_network", "shipped"]
+__all__ = ["MEMORY", "RECIPE", "VERSION", "LearnedNoise", "learned_noise", "set_by_network", "shipped"]
 
 RECIPE, VERSION = "noise-network", 1
 #: The inputs: three standardised components, size of the innovation, certainty of the prediction, time since the last
 #: reading, group of the instrument, and the mean size of the innovations of each group.
 INPUT = structure(component=3, magnitude=float, certainty=float, elapsed=float, group=GROUPS, usual=GROUPS)
 NUMBER_OF_INPUTS = length(INPUT)
-#: Names of the inputs, in order.
-INPUTS = (
-    "component_0", "component_1", "component_2", "size", "certainty", "elapsed", "is_fix", "is_velocity", "is_heading",
-    "is_other", "mean_of_fixes", "mean_of_velocities", "mean_of_headings", "mean_of_others",
-)  # fmt: skip
 #: Group of the instrument, smallest weight, and number of units; behind them are the parameters of the network.
 SETTINGS = structure(group=int, least=float, units=int)
 #: Time and inputs of the last reading; behind them is the memory of the network.

@@ -463,6 +463,14 @@ class Chain(ABC):
             Overwritten with the Jacobians of the predictions with respect to these states.
         """
 
+    def _note(self, i: int, found: tuple[Array, Array] | None, jacobian: Array) -> None:
+        """Write (d,) innovation and (d, n) Jacobian of an aid; None where the state has no reading."""
+        aids = self.aids
+        aids["residual"][i], jacobian[i], aids["components"][i] = 0.0, 0.0, 0
+        if found is not None:
+            d = len(found[0])
+            aids["residual"][i, :d], jacobian[i, :d], aids["components"][i] = *found, d
+
     def observe_own(self, first: int, row: NDArray[np.int64], jacobian: Array, *state: Array) -> None:
         """`observe` for the aids whose kind has a measurement equation of its own.
 
@@ -481,15 +489,13 @@ class Chain(ABC):
                 self._observe_many(many, channel, first, found, row, jacobian, state)
         if not one_by_one.any():
             return
-        for i in first + np.flatnonzero(one_by_one[among] & here):
+        for i in (first + np.flatnonzero(one_by_one[among] & here)).tolist():
             name = self.names[aids["instrument"][i]]
             d = len(own[name].kind.components)
-            aids["residual"][i], jacobian[i], aids["components"][i] = 0.0, 0.0, 0
             at = tuple(column[row[i]] for column in state)
-            side = self.side_of(int(i))
+            side = self.side_of(i)
             found = self.front.observe_own(name, aids["time"][i], aids["value"][i, :d], at, side)
-            if found is not None:
-                aids["residual"][i, :d], jacobian[i, :d], aids["components"][i] = *found, d
+            self._note(i, found, jacobian)
 
     def _observe_many(
         self,

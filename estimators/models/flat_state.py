@@ -7,20 +7,34 @@ windows call the methods, at a state of the model or at another one. So an equat
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
 from simnav.types import Array, Measurement
 
 from .base import ErrorModel, Linearised
-from .filtering import Dynamics, ModelFunctions, Prediction, Readings, ReadingsOfSteps
+from .filtering import Dynamics, ModelFunctions, Prediction, ReadingsOfSteps
 
 __all__ = ["FlatStateModel"]
 
-#: What is made for calls from outside of the loop.
-_ROOM = ("_own_dynamics", "_elsewhere", "_readings", "_unit")
+
+class _Room(NamedTuple):
+    """What calls from outside of the loop work on.
+
+    Attributes
+    ----------
+    dynamics : Dynamics
+        The state as the functions take it; its covariance is work space.
+    readings : ReadingsOfSteps
+        Makes arrays of a measurement.
+    unit : (n, n) array
+        The identity.
+    """
+
+    dynamics: Dynamics
+    readings: ReadingsOfSteps
+    unit: Array
 
 
 class FlatStateModel(ErrorModel):
@@ -45,46 +59,37 @@ class FlatStateModel(ErrorModel):
 
     def __getstate__(self) -> dict[str, Any]:
         """A copy makes the room for its calls itself."""
-        return {name: value for name, value in vars(self).items() if name not in _ROOM}
+        return {name: value for name, value in vars(self).items() if name != "_made_room"}
 
-    def _outside(self) -> Dynamics:
-        """The state as the functions take it, for calls from outside of the loop; its covariance is work space."""
-        found: Dynamics | None = vars(self).get("_own_dynamics")
-        if found is None or found.numbers is not self.numbers:
-            found = self._own_dynamics = self.dynamics(np.eye(self.size), self.names)
-            self._unit = np.eye(self.size)
-            self._elsewhere = replace(found, numbers=self.numbers.copy(), transition=found.transition.copy())
-            self._readings = ReadingsOfSteps(dict(zip(self.names, found.aids.components.tolist(), strict=True)))
+    @property
+    def _room(self) -> _Room:
+        """Made at the first call of a run."""
+        found: _Room | None = vars(self).get("_made_room")
+        if found is None or found.dynamics.numbers is not self.numbers:
+            unit = np.eye(self.size)
+            dynamics = self.dynamics(unit.copy(), self.names)
+            components = dict(zip(self.names, dynamics.aids.components.tolist(), strict=True))
+            found = self._made_room = _Room(dynamics, ReadingsOfSteps(components), unit)
         return found
-
-    def _at(self, numbers: Array) -> Dynamics:
-        """The same at another flat state."""
-        self._outside()
-        self._elsewhere.numbers[:] = numbers
-        return self._elsewhere
 
     def propagate(self, covariance: Array, until: float) -> None:
         """Advance the state and its covariance."""
         if until <= self.time:
             return
-        own = self._outside()
+        own = self._room.dynamics
         own.covariance[...] = covariance
         self.equations.propagate(own, self.samples, until)
         covariance[...] = own.covariance
 
     def measure(self, measurement: Measurement) -> Linearised | None:
         """Linearise a measurement."""
-        own = self._outside()
-        return self._linearised(own, self._readings.fill([measurement]))
+        return self._linearised(self._room.dynamics, measurement)
 
-    def linearise(self, name: str, time: float, value: Array, numbers: Array) -> Linearised | None:
-        """Linearise a measurement of an instrument at another flat state."""
-        there = self._at(numbers)
-        return self._linearised(there, self._readings.fill([Measurement(time, name, "", value)]))
-
-    def _linearised(self, dynamics: Dynamics, readings: Readings) -> Linearised | None:
-        """Predict the first reading: with the covariance 1, P H' is the Jacobian."""
-        dynamics.covariance[...] = self._unit
+    def _linearised(self, dynamics: Dynamics, measurement: Measurement) -> Linearised | None:
+        """Predict a reading: with the covariance 1, P H' is the Jacobian."""
+        room = self._room
+        dynamics.covariance[...] = room.unit
+        readings = room.readings.fill([measurement])
         d = int(readings.components[0])
         found = Prediction(np.empty(d), np.empty((self.size, d)), np.empty((d, d)), np.empty((d, d)), np.empty((d, d)))
         if not self.equations.predict(dynamics, readings, 0, found):
@@ -93,6 +98,6 @@ class FlatStateModel(ErrorModel):
 
     def correct(self, dx: Array) -> None:
         """Add a correction to the state."""
-        own = self._outside()
+        own = self._room.dynamics
         own.correction[:] = dx
         self.equations.retract(own)

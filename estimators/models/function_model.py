@@ -13,13 +13,14 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from simnav.types import Array
+from simnav.types import Array, Measurement
 
-from .base import NO_SAMPLES
+from .base import NO_SAMPLES, Linearised
 from .chain import chain_of
 from .columns import Columns
 from .filtering import AidTable, Dynamics
@@ -69,7 +70,20 @@ class FunctionModel(FlatStateModel, MovingModel):
 
     def carry(self, error: Array, elapsed: float) -> None:
         """Take an error, or several in columns, through the last propagation, in place."""
-        error[...] = self._outside().transition @ error
+        error[...] = self._room.dynamics.transition @ error
+
+    def _at(self, numbers: Array) -> Dynamics:
+        """Another flat state as the functions take it."""
+        own = self._room.dynamics
+        there: Dynamics | None = vars(self).get("_elsewhere")
+        if there is None or there.aids is not own.aids:
+            there = self._elsewhere = replace(own, numbers=own.numbers.copy(), transition=own.transition.copy())
+        there.numbers[:] = numbers
+        return there
+
+    def linearise(self, name: str, time: float, value: Array, numbers: Array) -> Linearised | None:
+        """Linearise a measurement of an instrument at another flat state."""
+        return self._linearised(self._at(numbers), Measurement(time, name, "", value))
 
     def move_all(self, states: States, elapsed: Array, jacobian: Array | None = None) -> None:
         """As `MovingModel.move_all`."""
@@ -112,13 +126,10 @@ class FunctionChain(MovingChain):
     def observe(self, first: int, row: NDArray[np.int64], states: Columns, prefix: str, jacobian: Array) -> None:
         """As `Chain.observe`."""
         aids, numbers = self.aids, states[f"{prefix}numbers"]
-        for i in first + np.flatnonzero(row[first:] >= 0):
-            aids["residual"][i], jacobian[i], aids["components"][i] = 0.0, 0.0, 0
+        for i in (first + np.flatnonzero(row[first:] >= 0)).tolist():
             name = self.names[aids["instrument"][i]]
             found = self.front.linearise(name, aids["time"][i], aids["value"][i], numbers[row[i]])
-            if found is not None:
-                d = len(found.innovation)
-                aids["residual"][i, :d], jacobian[i, :d], aids["components"][i] = found.innovation, found.jacobian, d
+            self._note(i, None if found is None else (found.innovation, found.jacobian), jacobian)
 
 
 @chain_of.register

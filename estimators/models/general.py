@@ -315,14 +315,12 @@ class GeneralChain(MovingChain):
     def observe(self, first: int, row: NDArray[np.int64], states: Columns, prefix: str, jacobian: Array) -> None:
         """As `Chain.observe`."""
         aids, x, extra = self.aids, states[f"{prefix}x"], states[f"{prefix}extra"]
-        for i in first + np.flatnonzero(row[first:] >= 0):
+        for i in (first + np.flatnonzero(row[first:] >= 0)).tolist():
             name = self.names[aids["instrument"][i]]
             d = len(self.front._white[name])
-            aids["residual"][i], jacobian[i], aids["components"][i] = 0.0, 0.0, 0
-            side = self.side_of(int(i)) if name in self.front.own else NO_SIDE
+            side = self.side_of(i) if name in self.front.own else NO_SIDE
             found = self.front.linearise(name, aids["time"][i], aids["value"][i, :d], x[row[i]], extra[row[i]], side)
-            if found is not None:
-                aids["residual"][i, :d], jacobian[i, :d], aids["components"][i] = *found, d
+            self._note(i, found, jacobian)
 
 
 @chain_of.register

@@ -275,9 +275,10 @@ class DeadReckoningEstimator(Solver):
         c, P, start = self._dcm, self._covariance, self._start
         v = c @ self._body
         G = np.zeros((9, 6))
-        G[0, _ERROR.north] = G[1, _ERROR.east] = G[8, _ERROR.heading] = 1.0
-        G[3, _ERROR.heading], G[3, _ERROR.ahead], G[3, _ERROR.abeam] = -v[1], c[0, 0], c[0, 1]
-        G[4, _ERROR.heading], G[4, _ERROR.ahead], G[4, _ERROR.abeam] = v[0], c[1, 0], c[1, 1]
+        place, speed = ERROR.position, ERROR.velocity
+        G[place, _ERROR.north] = G[place + 1, _ERROR.east] = G[ERROR.heading, _ERROR.heading] = 1.0
+        G[speed, [_ERROR.heading, _ERROR.ahead, _ERROR.abeam]] = -v[1], c[0, 0], c[0, 1]
+        G[speed + 1, [_ERROR.heading, _ERROR.ahead, _ERROR.abeam]] = v[0], c[1, 0], c[1, 1]
         full = G @ P @ G.T
         sigma = float(self._source.sigma[0])
         full[range(3, 6), range(3, 6)] += sigma**2 + SEAWAY**2
