@@ -1,8 +1,8 @@
 """Measurement models of the inertial state: the predicted reading of each kind of instrument, and its Jacobian.
 
-One function, `observe_inertial`, computes all of them, for a filter with one measurement at a time and for a window
-with many. With position p, velocity v, direction cosine matrix C, lever arm l, body rate relative to the Earth w,
-height h and ``(.)_D`` for a down component (Groves 2013, section 14.3):
+`observe_inertial` is for a filter with one measurement at a time and for a window with many; each kind of reading is a
+function of its own. With position p, velocity v, direction cosine matrix C, lever arm l, body rate relative to the
+Earth w, height h and ``(.)_D`` for a down component (Groves 2013, section 14.3):
 
 - GNSS position: ``p + C l``; attitude ``-[C l x]``
 - GNSS velocity: ``v + C (w x l)``; attitude ``-[C (w x l) x]``; gyroscope bias ``C [l x]``
@@ -44,6 +44,8 @@ NAVIGATION_STATES = ERROR.calibration
 
 #: What `observe_inertial` calls the measurement equations: `simnav.estimators.models.equations.Equation.code`.
 GNSS_POSITION, TERRAIN_FIX, GNSS_VELOCITY, DVL, SPEED_LOG, HEADING, DEPTH = range(7)
+#: Number of components of the reading by each of them.
+COMPONENTS = (3, 2, 3, 3, 1, 1, 1)
 #: In the place of a code: the kind of instrument has a function of its own (`simnav.kinds.Kind.observation`).
 OWN = -1
 
@@ -98,6 +100,134 @@ def _fill(jacobian: Array, row: int, first: int, values: tuple[float, float, flo
 
 
 @helper
+def _to_navigation_axes(dcm: Array, x: float, y: float, z: float) -> tuple[float, float, float]:
+    """``C x``, of a vector in body axes."""
+    return (
+        dcm[0, 0] * x + dcm[0, 1] * y + dcm[0, 2] * z,
+        dcm[1, 0] * x + dcm[1, 1] * y + dcm[1, 2] * z,
+        dcm[2, 0] * x + dcm[2, 1] * y + dcm[2, 2] * z,
+    )
+
+
+@helper
+def _swing(state: State, arm: Array) -> tuple[float, float, float]:
+    """``w x l``: what the turning adds to the velocity at the end of a lever arm, in body axes."""
+    dcm, rate, bias = state.dcm, state.rate, state.bias
+    # Relative to the Earth; the transport rate, under 1e-6 rad/s, is left out.
+    e0, e2 = ROTATION_RATE * cos(state.position[0]), -ROTATION_RATE * sin(state.position[0])
+    w0 = rate[0] - bias[0] - dcm[0, 0] * e0 - dcm[2, 0] * e2
+    w1 = rate[1] - bias[1] - dcm[0, 1] * e0 - dcm[2, 1] * e2
+    w2 = rate[2] - bias[2] - dcm[0, 2] * e0 - dcm[2, 2] * e2
+    return cross(w0, w1, w2, arm[0], arm[1], arm[2])
+
+
+@helper
+def _observe_horizontal_position(arm: Array, value: Array, state: State, innovation: Array, jacobian: Array) -> None:
+    """Linearise a terrain fix, and the horizontal part of a GNSS position."""
+    position = state.position
+    c0, c1, c2 = _to_navigation_axes(state.dcm, arm[0], arm[1], arm[2])
+    meridian, prime = radii_scalar(sin(position[0]))
+    east = value[1] - position[1]
+    innovation[0] = (value[0] - position[0]) * (meridian + position[2]) - c0
+    innovation[1] = atan2(sin(east), cos(east)) * (prime + position[2]) * cos(position[0]) - c1
+    jacobian[0, ERROR.position], jacobian[1, ERROR.position + 1] = 1.0, 1.0
+    _fill(jacobian, 0, ERROR.attitude, (0.0, c2, -c1))
+    _fill(jacobian, 1, ERROR.attitude, (-c2, 0.0, c0))
+
+
+@helper
+def _observe_down(arm: Array, down: float, state: State, row: int, innovation: Array, jacobian: Array) -> None:
+    """Linearise a depth, and the height of a GNSS position as a depth below the ellipsoid."""
+    c0, c1, c2 = _to_navigation_axes(state.dcm, arm[0], arm[1], arm[2])
+    innovation[row] = down + state.position[2] - c2
+    jacobian[row, ERROR.position + 2] = 1.0
+    _fill(jacobian, row, ERROR.attitude, (c1, -c0, 0.0))
+
+
+@helper
+def _observe_gnss_velocity(arm: Array, value: Array, state: State, innovation: Array, jacobian: Array) -> None:
+    """Linearise the velocity of a GNSS antenna."""
+    dcm = state.dcm
+    u0, u1, u2 = _swing(state, arm)
+    t0, t1, t2 = _to_navigation_axes(dcm, u0, u1, u2)
+    innovation[0] = value[0] - state.velocity[0] - t0
+    innovation[1] = value[1] - state.velocity[1] - t1
+    innovation[2] = value[2] - state.velocity[2] - t2
+    _fill(jacobian, 0, ERROR.attitude, (0.0, t2, -t1))
+    _fill(jacobian, 1, ERROR.attitude, (-t2, 0.0, t0))
+    _fill(jacobian, 2, ERROR.attitude, (t1, -t0, 0.0))
+    for i in range(3):
+        jacobian[i, ERROR.velocity + i] = 1.0
+        # row i of C times [l x]
+        _fill(jacobian, i, ERROR.gyroscope_bias, cross(dcm[i, 0], dcm[i, 1], dcm[i, 2], arm[0], arm[1], arm[2]))
+
+
+@helper
+def _along_body_axis(state: State, axis: int, v0: float, v1: float, v2: float, jacobian: Array) -> float:
+    """Component of a velocity along a body axis; its derivatives by velocity and attitude go into the row."""
+    c0, c1, c2 = state.dcm[0, axis], state.dcm[1, axis], state.dcm[2, axis]
+    _fill(jacobian, axis, ERROR.velocity, (c0, c1, c2))
+    _fill(jacobian, axis, ERROR.attitude, cross(c0, c1, c2, v0, v1, v2))
+    component: float = c0 * v0 + c1 * v1 + c2 * v2
+    return component
+
+
+@helper
+def _observe_dvl(aid: Aid, value: Array, state: State, innovation: Array, jacobian: Array) -> None:
+    """Linearise the velocity of a DVL, with scale factor and misalignment where they are states."""
+    arm, scale_at = aid.lever_arm, aid.scale_at
+    v0, v1, v2 = state.velocity[0], state.velocity[1], state.velocity[2]
+    u0, u1, u2 = _swing(state, arm)
+    u0 += _along_body_axis(state, 0, v0, v1, v2, jacobian)
+    u1 += _along_body_axis(state, 1, v0, v1, v2, jacobian)
+    u2 += _along_body_axis(state, 2, v0, v1, v2, jacobian)
+    _fill(jacobian, 0, ERROR.gyroscope_bias, (0.0, -arm[2], arm[1]))
+    _fill(jacobian, 1, ERROR.gyroscope_bias, (arm[2], 0.0, -arm[0]))
+    _fill(jacobian, 2, ERROR.gyroscope_bias, (-arm[1], arm[0], 0.0))
+    innovation[0], innovation[1], innovation[2] = value[0] - u0, value[1] - u1, value[2] - u2
+    if scale_at >= 0:
+        k = scale_at - NAVIGATION_STATES
+        s, a0, a1, a2 = (
+            state.calibration[k],
+            state.calibration[k + 1],
+            state.calibration[k + 2],
+            state.calibration[k + 3],
+        )
+        jacobian[0, scale_at], jacobian[0, scale_at + 2], jacobian[0, scale_at + 3] = u0, -u2, u1
+        jacobian[1, scale_at], jacobian[1, scale_at + 1], jacobian[1, scale_at + 3] = u1, u2, -u0
+        jacobian[2, scale_at], jacobian[2, scale_at + 1], jacobian[2, scale_at + 2] = u2, -u1, u0
+        innovation[0] = innovation[0] - s * u0 - (u1 * a2 - u2 * a1)
+        innovation[1] -= s * u1 + u2 * a0 - u0 * a2
+        innovation[2] -= s * u2 + u0 * a1 - u1 * a0
+
+
+@helper
+def _observe_speed_log(aid: Aid, value: Array, state: State, innovation: Array, jacobian: Array) -> None:
+    """Linearise the speed of a log through the water, with current and scale factor where they are states."""
+    arm, bias_at, scale_at = aid.lever_arm, aid.bias_at, aid.scale_at
+    v0, v1, v2 = state.velocity[0], state.velocity[1], state.velocity[2]
+    if bias_at >= 0:
+        k = bias_at - NAVIGATION_STATES
+        v0, v1 = v0 - state.calibration[k + 1], v1 - state.calibration[k + 2]
+        jacobian[0, bias_at + 1], jacobian[0, bias_at + 2] = -state.dcm[0, 0], -state.dcm[1, 0]
+    u0 = _swing(state, arm)[0] + _along_body_axis(state, 0, v0, v1, v2, jacobian)
+    _fill(jacobian, 0, ERROR.gyroscope_bias, (0.0, -arm[2], arm[1]))
+    innovation[0] = value[0] - u0
+    if scale_at >= 0:
+        jacobian[0, scale_at] = u0
+        innovation[0] -= state.calibration[scale_at - NAVIGATION_STATES] * u0
+
+
+@helper
+def _observe_heading(value: Array, state: State, innovation: Array, jacobian: Array) -> None:
+    """Linearise a heading."""
+    c0, c1 = state.dcm[0, 0], state.dcm[1, 0]
+    slope = -state.dcm[2, 0] / (c0 * c0 + c1 * c1)
+    _fill(jacobian, 0, ERROR.attitude, (slope * c0, slope * c1, 1.0))
+    innovation[0] = value[0] - atan2(c1, c0)
+
+
+@helper
 def observe_inertial(aid: Aid, value: Array, state: State, innovation: Array, jacobian: Array) -> int:
     """Compute innovation and Jacobian of one measurement (equations in the module).
 
@@ -119,104 +249,34 @@ def observe_inertial(aid: Aid, value: Array, state: State, innovation: Array, ja
     int
         Number d of components; 0 if there is no such measurement at this state (a heading near the vertical).
     """
-    code, arm, bias_at, scale_at = aid.code, aid.lever_arm, aid.bias_at, aid.scale_at
-    position, velocity, dcm, rate, bias, calibration = state
-    d = 3
-    if code == TERRAIN_FIX:
-        d = 2
-    elif code in (SPEED_LOG, HEADING, DEPTH):
-        d = 1
+    code, arm, bias_at = aid.code, aid.lever_arm, aid.bias_at
+    d = COMPONENTS[code]
     for i in range(d):
         for j in range(jacobian.shape[1]):
             jacobian[i, j] = 0.0
-    l0, l1, l2 = arm[0], arm[1], arm[2]
+    if code == HEADING and not has_heading(state.dcm):
+        return 0
 
-    if code in (GNSS_POSITION, TERRAIN_FIX, DEPTH):
-        c2 = dcm[2, 0] * l0 + dcm[2, 1] * l1 + dcm[2, 2] * l2
-        c0 = dcm[0, 0] * l0 + dcm[0, 1] * l1 + dcm[0, 2] * l2
-        c1 = dcm[1, 0] * l0 + dcm[1, 1] * l1 + dcm[1, 2] * l2
-        if code == DEPTH:
-            innovation[0] = value[0] + position[2] - c2
-            jacobian[0, ERROR.position + 2] = 1.0
-            _fill(jacobian, 0, ERROR.attitude, (c1, -c0, 0.0))
-        else:
-            meridian, prime = radii_scalar(sin(position[0]))
-            east = value[1] - position[1]
-            innovation[0] = (value[0] - position[0]) * (meridian + position[2]) - c0
-            innovation[1] = atan2(sin(east), cos(east)) * (prime + position[2]) * cos(position[0]) - c1
-            jacobian[0, ERROR.position], jacobian[1, ERROR.position + 1] = 1.0, 1.0
-            _fill(jacobian, 0, ERROR.attitude, (0.0, c2, -c1))
-            _fill(jacobian, 1, ERROR.attitude, (-c2, 0.0, c0))
-            if code == GNSS_POSITION:
-                innovation[2] = position[2] - value[2] - c2
-                jacobian[2, ERROR.position + 2] = 1.0
-                _fill(jacobian, 2, ERROR.attitude, (c1, -c0, 0.0))
-
+    if code == GNSS_POSITION:
+        _observe_horizontal_position(arm, value, state, innovation, jacobian)
+        _observe_down(arm, -value[2], state, 2, innovation, jacobian)
+    elif code == TERRAIN_FIX:
+        _observe_horizontal_position(arm, value, state, innovation, jacobian)
+    elif code == GNSS_VELOCITY:
+        _observe_gnss_velocity(arm, value, state, innovation, jacobian)
+    elif code == DVL:
+        _observe_dvl(aid, value, state, innovation, jacobian)
+    elif code == SPEED_LOG:
+        _observe_speed_log(aid, value, state, innovation, jacobian)
     elif code == HEADING:
-        if not has_heading(dcm):
-            return 0
-        c0, c1 = dcm[0, 0], dcm[1, 0]
-        level = c0 * c0 + c1 * c1
-        slope = -dcm[2, 0] / level
-        _fill(jacobian, 0, ERROR.attitude, (slope * c0, slope * c1, 1.0))
-        innovation[0] = value[0] - atan2(c1, c0)
-
+        _observe_heading(value, state, innovation, jacobian)
     else:
-        # Relative to the Earth; the transport rate, under 1e-6 rad/s, is left out.
-        e0, e2 = ROTATION_RATE * cos(position[0]), -ROTATION_RATE * sin(position[0])
-        w0 = rate[0] - bias[0] - dcm[0, 0] * e0 - dcm[2, 0] * e2
-        w1 = rate[1] - bias[1] - dcm[0, 1] * e0 - dcm[2, 1] * e2
-        w2 = rate[2] - bias[2] - dcm[0, 2] * e0 - dcm[2, 2] * e2
-        u0, u1, u2 = cross(w0, w1, w2, l0, l1, l2)
-        v0, v1, v2 = velocity[0], velocity[1], velocity[2]
-        if code == GNSS_VELOCITY:
-            t0 = dcm[0, 0] * u0 + dcm[0, 1] * u1 + dcm[0, 2] * u2
-            t1 = dcm[1, 0] * u0 + dcm[1, 1] * u1 + dcm[1, 2] * u2
-            t2 = dcm[2, 0] * u0 + dcm[2, 1] * u1 + dcm[2, 2] * u2
-            innovation[0], innovation[1], innovation[2] = value[0] - v0 - t0, value[1] - v1 - t1, value[2] - v2 - t2
-            _fill(jacobian, 0, ERROR.attitude, (0.0, t2, -t1))
-            _fill(jacobian, 1, ERROR.attitude, (-t2, 0.0, t0))
-            _fill(jacobian, 2, ERROR.attitude, (t1, -t0, 0.0))
-            for i in range(3):
-                jacobian[i, ERROR.velocity + i] = 1.0
-                # row i of C times [l x]
-                _fill(jacobian, i, ERROR.gyroscope_bias, cross(dcm[i, 0], dcm[i, 1], dcm[i, 2], l0, l1, l2))
-        else:
-            if code == SPEED_LOG and bias_at >= 0:
-                k = bias_at - NAVIGATION_STATES
-                v0, v1 = v0 - calibration[k + 1], v1 - calibration[k + 2]
-                jacobian[0, bias_at + 1], jacobian[0, bias_at + 2] = -dcm[0, 0], -dcm[1, 0]
-            for i in range(d):
-                c0, c1, c2 = dcm[0, i], dcm[1, i], dcm[2, i]
-                _fill(jacobian, i, ERROR.velocity, (c0, c1, c2))
-                _fill(jacobian, i, ERROR.attitude, cross(c0, c1, c2, v0, v1, v2))
-            u0 += dcm[0, 0] * v0 + dcm[1, 0] * v1 + dcm[2, 0] * v2
-            _fill(jacobian, 0, ERROR.gyroscope_bias, (0.0, -l2, l1))
-            innovation[0] = value[0] - u0
-            if code == DVL:
-                u1 += dcm[0, 1] * v0 + dcm[1, 1] * v1 + dcm[2, 1] * v2
-                u2 += dcm[0, 2] * v0 + dcm[1, 2] * v1 + dcm[2, 2] * v2
-                _fill(jacobian, 1, ERROR.gyroscope_bias, (l2, 0.0, -l0))
-                _fill(jacobian, 2, ERROR.gyroscope_bias, (-l1, l0, 0.0))
-                innovation[1], innovation[2] = value[1] - u1, value[2] - u2
-            if scale_at >= 0:
-                k = scale_at - NAVIGATION_STATES
-                s = calibration[k]
-                jacobian[0, scale_at] = u0
-                innovation[0] -= s * u0
-                if code == DVL:
-                    a0, a1, a2 = calibration[k + 1], calibration[k + 2], calibration[k + 3]
-                    jacobian[0, scale_at + 2], jacobian[0, scale_at + 3] = -u2, u1
-                    jacobian[1, scale_at], jacobian[1, scale_at + 1], jacobian[1, scale_at + 3] = u1, u2, -u0
-                    jacobian[2, scale_at], jacobian[2, scale_at + 1], jacobian[2, scale_at + 2] = u2, -u1, u0
-                    innovation[0] -= u1 * a2 - u2 * a1
-                    innovation[1] -= s * u1 + u2 * a0 - u0 * a2
-                    innovation[2] -= s * u2 + u0 * a1 - u1 * a0
+        _observe_down(arm, value[0], state, 0, innovation, jacobian)
 
     if bias_at >= 0:
         for i in range(d):
             jacobian[i, bias_at + i] = 1.0
-            innovation[i] -= calibration[bias_at - NAVIGATION_STATES + i]
+            innovation[i] -= state.calibration[bias_at - NAVIGATION_STATES + i]
     if code == HEADING:
         innovation[0] = atan2(sin(innovation[0]), cos(innovation[0]))
     return d
