@@ -154,7 +154,8 @@ def limits(track: TrackTable) -> str:
     said = []
     costs = [c.value for r in best if (c := cost_of(r.estimator, track.plain, track.score)) is not None]
     if costs:
-        said.append(f"{'it takes' if len(best) == 1 else 'they take'} {spread(costs, '{:.2g}')} times the processor time of `{track.plain}`")
+        take = "it takes" if len(best) == 1 else "they take"
+        said.append(f"{take} {spread(costs, '{:.2g}')} times the processor time of `{track.plain}`")
     beside = [
         (x / own, r.estimator, s) for r in best for s, x in r.ratios.items() if (own := plain.ratios.get(s, 0.0)) > 0.0
     ]
