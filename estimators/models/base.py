@@ -27,6 +27,7 @@ from simnav.types import (
 from .channel_readings import ChannelReadings
 from .filtering import Dynamics, ModelFunctions, aid_table
 from .measurement_functions import MeasurementFunction
+from .named_state import NamedState
 from .propagation import Samples
 
 __all__ = ["NO_SAMPLES", "ErrorModel", "Linearised"]
@@ -143,7 +144,7 @@ class ErrorModel(ABC):
         """Linearise a measurement at the present state; None if it cannot be used."""
 
     def observe_own(
-        self, name: str, time: float, value: Array, state: tuple[Array, ...], side: Array = NO_SIDE
+        self, name: str, time: float, value: Array, state: NamedState, side: Array = NO_SIDE
     ) -> tuple[Array, Array] | None:
         """Innovation and Jacobian of a measurement of an instrument in ``own``, at any state.
 
@@ -155,8 +156,8 @@ class ErrorModel(ABC):
             Time of validity [s].
         value : (d,) array
             The measured value.
-        state : tuple of array
-            The arrays that describe a state of this model, as its chain keeps them.
+        state : NamedState
+            A state of this model.
         side : (s,) array
             Side information of the reading (`simnav.kinds.Kind.side`).
 

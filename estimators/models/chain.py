@@ -52,6 +52,7 @@ from .columns import Columns, Made
 from .filtering import Dynamics
 from .intermediate_states import IntermediateStates
 from .marginalisation import Reference, keep_covariance, marginalise, subtract_step
+from .named_state import NamedState, at_row
 
 __all__ = ["Chain", "FactorFunctions", "MotionSinceNode", "attach_one", "begin_motion", "chain_of"]
 
@@ -471,30 +472,29 @@ class Chain(ABC):
             d = len(found[0])
             aids["residual"][i, :d], jacobian[i, :d], aids["components"][i] = *found, d
 
-    def observe_own(self, first: int, row: NDArray[np.int64], jacobian: Array, *state: Array) -> None:
+    def observe_own(self, first: int, row: NDArray[np.int64], jacobian: Array, states: NamedState) -> None:
         """`observe` for the aids whose kind has a measurement equation of its own.
 
         Parameters
         ----------
         first, row, jacobian
             As of `observe`.
-        *state : (K, ...) array
-            The states, as `simnav.estimators.models.base.ErrorModel.observe_own` takes one of them.
+        states : NamedState
+            K states, as `simnav.estimators.models.base.ErrorModel.observe_own` takes one of them.
         """
         aids, own = self.aids, self.front.own
         one_by_one = self._one_by_one
         here, among = row[first:] >= 0, aids["instrument"][first:]
         for many, channel in self._many:
             if (found := here & (channel[among] >= 0)).any():
-                self._observe_many(many, channel, first, found, row, jacobian, state)
+                self._observe_many(many, channel, first, found, row, jacobian, states)
         if not one_by_one.any():
             return
         for i in (first + np.flatnonzero(one_by_one[among] & here)).tolist():
             name = self.names[aids["instrument"][i]]
             d = len(own[name].kind.components)
-            at = tuple(column[row[i]] for column in state)
-            side = self.side_of(i)
-            found = self.front.observe_own(name, aids["time"][i], aids["value"][i, :d], at, side)
+            at = at_row(states, row[i])
+            found = self.front.observe_own(name, aids["time"][i], aids["value"][i, :d], at, self.side_of(i))
             self._note(i, found, jacobian)
 
     def _observe_many(
@@ -505,7 +505,7 @@ class Chain(ABC):
         found: Flags,
         row: NDArray[np.int64],
         jacobian: Array,
-        states: tuple[Array, ...],
+        states: NamedState,
     ) -> None:
         """`observe_own` for the readings of an instrument with channels: those ``found`` among the aids from one on."""
         aids, d = self.aids, len(many.kind.components)
@@ -516,8 +516,7 @@ class Chain(ABC):
         out = jacobian[rows, :d] if isinstance(rows, slice) else None
         innovation, of_these = many.linearise(
             aids["time"][rows], aids["value"][rows, :d], channel[aids["instrument"][rows]],
-            [column[low:high] for column in states], at - low, aids["side"][rows, : len(many.kind.side)],
-            jacobian.shape[2] - states[-1].shape[1], out,
+            at_row(states, slice(low, high)), at - low, aids["side"][rows, : len(many.kind.side)], out,
         )  # fmt: skip
         aids["residual"][rows], aids["components"][rows] = 0.0, d
         aids["residual"][rows, :d] = innovation

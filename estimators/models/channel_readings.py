@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from math import isfinite
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,8 +21,10 @@ from simnav.types import Array
 
 from .ambiguity import innovation_of
 from .channels import ChannelDatasheet, whole
-from .inertial_errors import PART
+from .inertial_errors import ERROR, PART
 from .measurement_functions import Kinematics, MeasurementFunction
+from .measurements import State
+from .named_state import NamedState
 
 __all__ = ["ChannelReadings", "channel_readings_of"]
 
@@ -66,6 +69,9 @@ class ChannelReadings:
         Whether the noise of a reading depends on the state (`MeasurementFunction.has_noise`).
     """
 
+    #: Index in the error state of the first of `_own_states`.
+    first_own: ClassVar[int] = ERROR.calibration
+
     def __init__(self, own: Mapping[str, MeasurementFunction], bias_at: Mapping[str, int]):
         first = next(iter(own.values()))
         assert isinstance(first.sheet, ChannelDatasheet)
@@ -95,10 +101,9 @@ class ChannelReadings:
         time: Array,
         value: Array,
         channel: NDArray[np.intp],
-        states: Sequence[Array],
+        states: NamedState,
         row: NDArray[np.intp],
         side: Array,
-        offset: int,
         out: Array | None = None,
     ) -> tuple[Array, Array]:
         """Innovations and Jacobians of n readings.
@@ -111,25 +116,23 @@ class ChannelReadings:
             Measured values.
         channel : (n,) int array
             Their channels, as of `channels`.
-        states : sequence of array
-            K states: positions, velocities, DCMs, outputs of the gyroscopes, their biases first, calibrations (K, m).
+        states : NamedState
+            K states of the model.
         row : (n,) int array
             Which of the states each reading is predicted at.
         side : (n, s) array
             Their side information.
-        offset : int
-            Index in the error state of the first calibration state.
-        out : (n, d, offset + m) array, optional
+        out : (n, d, e) array, optional
             Overwritten with the Jacobians, and returned; None: they are in a new array.
 
         Returns
         -------
         innovation : (n, d) array
             Measured minus predicted.
-        jacobian : (n, d, offset + m) array
+        jacobian : (n, d, e) array
             Derivative of the prediction by the error state.
         """
-        own = states[-1].take(row, axis=0)
+        offset, own = self.first_own, self._own_states(states).take(row, axis=0)
         blocks = {name: np.broadcast_to(zero, (len(time), zero.shape[1])) for name, zero in self._zeros.items()}
         for name, at in self._at:
             blocks[name] = own[:, at]
@@ -149,11 +152,18 @@ class ChannelReadings:
             reading[biased] = self.kind.add_error(reading[biased], own[biased[:, None], columns - offset])
         return innovation_of(self.kind, self._sheet, value, reading), jacobian
 
-    def _navigation(self, states: Sequence[Array], row: NDArray[np.intp], own: Array) -> Kinematics:
-        """The motion at each of n readings; ``own`` is the (n, m) calibration there."""
-        position, velocity, dcm, rate, bias, _ = states
-        turning = rate[:, :3] - bias[:, :3] - np.einsum("nji,nj->ni", dcm, earth_rate(position[:, 0]))
-        return Kinematics(*(column.take(row, axis=0) for column in (position, velocity, dcm, turning)))
+    def _own_states(self, states: NamedState) -> Array:
+        """(K, m) array: where the states of the instrument are, from `first_own` of the error state on."""
+        assert isinstance(states, State)
+        return states.calibration
+
+    def _navigation(self, states: NamedState, row: NDArray[np.intp], own: Array) -> Kinematics:
+        """The motion at each of n readings; ``own`` is what `_own_states` has there."""
+        assert isinstance(states, State)
+        turning = states.rate[:, :3] - states.bias[:, :3]
+        turning -= np.einsum("nji,nj->ni", states.dcm, earth_rate(states.position[:, 0]))
+        motion = Kinematics(states.position, states.velocity, states.dcm, turning)
+        return Kinematics(*(column.take(row, axis=0) for column in motion))
 
     def _by_navigation(self, derivative: Array, own: Array, jacobian: Array) -> None:
         """Write the (n, d, 9) derivative by the navigation state into that by the error state."""

@@ -77,6 +77,7 @@ from .measurements import (
     State,
     has_heading,
 )
+from .named_state import NamedState, at_row
 from .propagation import (
     CLOCK,
     IMU_NOISE,
@@ -403,10 +404,11 @@ class InertialModel(FlatStateModel):
         return State(self.position, self.velocity, self.dcm, inertial, self.bias, self.calibration)
 
     def observe_own(
-        self, name: str, time: float, value: Array, state: tuple[Array, ...], side: Array = NO_SIDE
+        self, name: str, time: float, value: Array, state: NamedState, side: Array = NO_SIDE
     ) -> tuple[Array, Array] | None:
-        """As `ErrorModel.observe_own`; the state is that of `State`."""
-        found = self._linearise_own(name, time, value, State(*state), side)
+        """As `ErrorModel.observe_own`, at a `State`."""
+        assert isinstance(state, State)
+        found = self._linearise_own(name, time, value, state, side)
         return None if found is None else found[:2]
 
     def _linearise_own(
@@ -440,8 +442,8 @@ class InertialModel(FlatStateModel):
         k, side, (beyond, unit) = len(names), np.array(sides), self._beyond[names[0]]
         noise = beyond + many.noise(side)[:, :, None] * unit
         innovation, jacobian = many.linearise(
-            np.array(times), np.array(values), many.channels(names), [array[None] for array in self._state()],
-            np.zeros(k, dtype=np.intp), side, _NAV,
+            np.array(times), np.array(values), many.channels(names), at_row(self._state(), None),
+            np.zeros(k, dtype=np.intp), side,
         )  # fmt: skip
         return Linearised(innovation, jacobian, noise)
 

@@ -325,7 +325,7 @@ class InertialChain(Chain):
         position, velocity, dcm, bias, calibration = (states[prefix + name] for name in self.front.state)
         arrays = [states[name] for name in self.node_arrays]
         inertial = arrays[0] if len(arrays) == 1 else np.hstack(arrays)
-        self.observe_own(first, row, wide, position, velocity, dcm, inertial, bias, calibration)
+        self.observe_own(first, row, wide, State(position, velocity, dcm, inertial, bias, calibration))
         if wide is not jacobian:
             own = self._instruments.code[self.aids["instrument"][first:]] == OWN
             here = np.flatnonzero((row[first:] >= 0) & own) + first

@@ -122,7 +122,7 @@ def _swing(state: State, arm: Array) -> tuple[float, float, float]:
 
 
 @helper
-def _observe_horizontal_position(arm: Array, value: Array, state: State, innovation: Array, jacobian: Array) -> None:
+def observe_horizontal_position(arm: Array, value: Array, state: State, innovation: Array, jacobian: Array) -> None:
     """Linearise a terrain fix, and the horizontal part of a GNSS position."""
     position = state.position
     c0, c1, c2 = _to_navigation_axes(state.dcm, arm[0], arm[1], arm[2])
@@ -136,7 +136,7 @@ def _observe_horizontal_position(arm: Array, value: Array, state: State, innovat
 
 
 @helper
-def _observe_down(arm: Array, down: float, state: State, row: int, innovation: Array, jacobian: Array) -> None:
+def observe_down(arm: Array, down: float, state: State, row: int, innovation: Array, jacobian: Array) -> None:
     """Linearise a depth, and the height of a GNSS position as a depth below the ellipsoid."""
     c0, c1, c2 = _to_navigation_axes(state.dcm, arm[0], arm[1], arm[2])
     innovation[row] = down + state.position[2] - c2
@@ -145,7 +145,7 @@ def _observe_down(arm: Array, down: float, state: State, row: int, innovation: A
 
 
 @helper
-def _observe_gnss_velocity(arm: Array, value: Array, state: State, innovation: Array, jacobian: Array) -> None:
+def observe_gnss_velocity(arm: Array, value: Array, state: State, innovation: Array, jacobian: Array) -> None:
     """Linearise the velocity of a GNSS antenna."""
     dcm = state.dcm
     u0, u1, u2 = _swing(state, arm)
@@ -173,7 +173,7 @@ def _along_body_axis(state: State, axis: int, v0: float, v1: float, v2: float, j
 
 
 @helper
-def _observe_dvl(aid: Aid, value: Array, state: State, innovation: Array, jacobian: Array) -> None:
+def observe_dvl(aid: Aid, value: Array, state: State, innovation: Array, jacobian: Array) -> None:
     """Linearise the velocity of a DVL, with scale factor and misalignment where they are states."""
     arm, scale_at = aid.lever_arm, aid.scale_at
     v0, v1, v2 = state.velocity[0], state.velocity[1], state.velocity[2]
@@ -202,7 +202,7 @@ def _observe_dvl(aid: Aid, value: Array, state: State, innovation: Array, jacobi
 
 
 @helper
-def _observe_speed_log(aid: Aid, value: Array, state: State, innovation: Array, jacobian: Array) -> None:
+def observe_speed_log(aid: Aid, value: Array, state: State, innovation: Array, jacobian: Array) -> None:
     """Linearise the speed of a log through the water, with current and scale factor where they are states."""
     arm, bias_at, scale_at = aid.lever_arm, aid.bias_at, aid.scale_at
     v0, v1, v2 = state.velocity[0], state.velocity[1], state.velocity[2]
@@ -219,7 +219,7 @@ def _observe_speed_log(aid: Aid, value: Array, state: State, innovation: Array, 
 
 
 @helper
-def _observe_heading(value: Array, state: State, innovation: Array, jacobian: Array) -> None:
+def observe_heading(value: Array, state: State, innovation: Array, jacobian: Array) -> None:
     """Linearise a heading."""
     c0, c1 = state.dcm[0, 0], state.dcm[1, 0]
     slope = -state.dcm[2, 0] / (c0 * c0 + c1 * c1)
@@ -258,20 +258,20 @@ def observe_inertial(aid: Aid, value: Array, state: State, innovation: Array, ja
         return 0
 
     if code == GNSS_POSITION:
-        _observe_horizontal_position(arm, value, state, innovation, jacobian)
-        _observe_down(arm, -value[2], state, 2, innovation, jacobian)
+        observe_horizontal_position(arm, value, state, innovation, jacobian)
+        observe_down(arm, -value[2], state, 2, innovation, jacobian)
     elif code == TERRAIN_FIX:
-        _observe_horizontal_position(arm, value, state, innovation, jacobian)
+        observe_horizontal_position(arm, value, state, innovation, jacobian)
     elif code == GNSS_VELOCITY:
-        _observe_gnss_velocity(arm, value, state, innovation, jacobian)
+        observe_gnss_velocity(arm, value, state, innovation, jacobian)
     elif code == DVL:
-        _observe_dvl(aid, value, state, innovation, jacobian)
+        observe_dvl(aid, value, state, innovation, jacobian)
     elif code == SPEED_LOG:
-        _observe_speed_log(aid, value, state, innovation, jacobian)
+        observe_speed_log(aid, value, state, innovation, jacobian)
     elif code == HEADING:
-        _observe_heading(value, state, innovation, jacobian)
+        observe_heading(value, state, innovation, jacobian)
     else:
-        _observe_down(arm, value[0], state, 0, innovation, jacobian)
+        observe_down(arm, value[0], state, 0, innovation, jacobian)
 
     if bias_at >= 0:
         for i in range(d):

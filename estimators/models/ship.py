@@ -45,6 +45,7 @@ from .inertial_errors import ERROR
 from .lever_arms import has_measurement_function, with_lever_arms
 from .measurements import wrap
 from .moving_chain import MovingModel
+from .named_state import NamedState
 from .ship_functions import SHIP_FUNCTIONS, SHIP_MOTION, SHIP_NUMBERS, ship_state
 from .ship_kernels import (
     BODY_VELOCITY,
@@ -60,7 +61,7 @@ from .ship_kernels import (
     observe_ship,
     sail_ships,
 )
-from .ship_observation import HEEL, VERTICAL_SPEED, ShipObservation, ShipReadings
+from .ship_observation import HEEL, VERTICAL_SPEED, PlacedShip, ShipObservation, ShipReadings
 from .state_blocks import StateBlocks
 
 __all__ = ["OBSERVED", "POSITIONS", "ShipModel"]
@@ -288,11 +289,11 @@ class ShipModel(FlatStateModel, MovingModel):
         return super().measure(measurement)
 
     def observe_own(
-        self, name: str, time: float, value: Array, state: tuple[Array, ...], side: Array = NO_SIDE
+        self, name: str, time: float, value: Array, state: NamedState, side: Array = NO_SIDE
     ) -> tuple[Array, Array] | None:
-        """As `ErrorModel.observe_own`; the state is ``position, x``."""
-        position, x = state
-        found = self.own[name].observe(time, value, position, x, side)
+        """As `ErrorModel.observe_own`, at a `PlacedShip`."""
+        assert isinstance(state, PlacedShip)
+        found = self.own[name].observe(time, value, state.position, state.x, side)
         return None if found is None else (found.innovation, found.jacobian)
 
     def move_all(self, states: tuple[Array, ...], elapsed: Array, jacobian: Array | None = None) -> None:

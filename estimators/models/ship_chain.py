@@ -23,6 +23,7 @@ from .filtering import AidTable, aid_of
 from .moving_chain import MovingChain
 from .ship import ShipModel
 from .ship_kernels import VELOCITY, fill_jacobian, residual_of
+from .ship_observation import PlacedShip
 
 __all__ = ["ShipChain"]
 
@@ -102,7 +103,8 @@ class ShipChain(MovingChain):
             states[f"{prefix}position"], states[f"{prefix}x"], aids["residual"], jacobian,
         )  # fmt: skip
         if self.front.own:
-            self.observe_own(first, row, jacobian, states[f"{prefix}position"], states[f"{prefix}x"])
+            at = PlacedShip(states[f"{prefix}position"], states[f"{prefix}x"])
+            self.observe_own(first, row, jacobian, at)
 
 
 @chain_of.register

@@ -7,7 +7,7 @@ What a reading depends on beyond that is noise: height, vertical speed, roll and
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from math import cos, sin
 from typing import NamedTuple
 
@@ -23,14 +23,30 @@ from .base import Linearised
 from .channel_readings import ChannelReadings
 from .inertial_errors import ERROR, PART
 from .measurement_functions import Kinematics, MeasurementFunction
+from .named_state import NamedState
 from .ship_kernels import SHIP
 
-__all__ = ["HEEL", "VERTICAL_SPEED", "PredictedReading", "ShipObservation", "ShipReadings"]
+__all__ = ["HEEL", "VERTICAL_SPEED", "PlacedShip", "PredictedReading", "ShipObservation", "ShipReadings"]
 
 #: Roll and pitch, which the model takes for zero, one sigma [rad].
 HEEL = 0.03
 #: Vertical speed, which the model takes for zero, one sigma [m/s].
 VERTICAL_SPEED = 1.0
+
+
+class PlacedShip(NamedTuple):
+    """A state of a ship, or K of them.
+
+    Attributes
+    ----------
+    position : (3,) or (K, 3) array
+        Latitude, longitude [rad] and height [m].
+    x : (n,) or (K, n) array
+        The other states (`simnav.estimators.models.ship_kernels`).
+    """
+
+    position: Array
+    x: Array
 
 
 class PredictedReading(NamedTuple):
@@ -170,10 +186,17 @@ class ShipObservation(MeasurementFunction):
 
 
 class ShipReadings(ChannelReadings):
-    """The readings of all channels of an instrument, at the states ``position, x`` of a ship."""
+    """The readings of all channels of an instrument, at states of a ship (`PlacedShip`)."""
 
-    def _navigation(self, states: Sequence[Array], row: NDArray[np.intp], own: Array) -> Kinematics:
-        return Kinematics(states[0].take(row, axis=0), *_kinematics(own))
+    first_own = 0
+
+    def _own_states(self, states: NamedState) -> Array:
+        assert isinstance(states, PlacedShip)
+        return states.x
+
+    def _navigation(self, states: NamedState, row: NDArray[np.intp], own: Array) -> Kinematics:
+        assert isinstance(states, PlacedShip)
+        return Kinematics(states.position.take(row, axis=0), *_kinematics(own))
 
     def _by_navigation(self, derivative: Array, own: Array, jacobian: Array) -> None:
         c, s, u = np.cos(own[:, SHIP.heading, None]), np.sin(own[:, SHIP.heading, None]), own[:, SHIP.speed, None]

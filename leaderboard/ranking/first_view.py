@@ -1,13 +1,13 @@
 """The first view of a board: what a reader has to know of it, in one picture, one sentence and four rows to take.
 
 All of it is of one track: the first that has a plain row and kinds of trouble. **Rows worth knowing**: those that are
-advised, then those that are significantly better than the plain row in a kind of trouble, the best of each kind first,
-then those with the smallest score.
+advised, then those that are significantly better than the plain row in a kind of trouble and have no more error over
+all kinds, the best of each kind first, then those with the smallest score.
 
 =============  =========================================================================================================
 plain          The row that all others are compared with.
 robust         The smallest score among the rows that are significantly better than the plain row, over all troubles.
-cheapest       Of those than which no row is significantly better, the one with the smallest processor time.
+cheapest       Of the same rows, the one with the smallest processor time.
 most honest    Its 95 % region holds the truth nearest to 95 % of the time, of the rows with no more error than the
                plain row.
 =============  =========================================================================================================
@@ -25,7 +25,7 @@ from simnav.leaderboard.figures.ratio_map import written_map
 from . import tables
 from .board import Ranking, TrackRanking, TrackRow
 from .stored_costs import cost_of
-from .summary import best_rows, less
+from .summary import less
 from .trouble_profile import GroupRow, TrackProfile, TroubleGroup
 from .troubles import within
 
@@ -154,7 +154,8 @@ def first_view(ranking: Ranking, profiles: Sequence[TrackProfile]) -> FirstView 
     if track.plain not in rows:
         return None
     advice = tuple(_advice(track, profile, rows))
-    names = [a.estimator for a in advice] + list(_specialists(profile, track.plain)) + list(rows)
+    harmless = [n for n in _specialists(profile, track.plain) if n in rows and rows[n].to_plain <= 1.0]
+    names = [a.estimator for a in advice] + harmless + list(rows)
     chosen = list(dict.fromkeys(n for n in names if n in rows))[:KNOWN]
     chosen.sort(key=lambda n: (n != track.plain, rows[n].to_plain, n))
     return FirstView(
@@ -188,12 +189,11 @@ def _advice(track: TrackRanking, profile: TrackProfile, rows: dict[str, KnownRow
     told = [r.estimator for r in track.rows if r.estimator in rows and plain in r.better_than]
     if told and not track.insufficient:
         yield Advice("robust", told[0], _why_robust(rows[told[0]], plain))
-        may_be_best = {r.estimator for r in best_rows(track)}
-        costs = [(rows[n].cost, n) for n in told if n in may_be_best and math.isfinite(rows[n].cost)]
+        costs = [(rows[n].cost, n) for n in told if math.isfinite(rows[n].cost)]
         if costs:
             cost, cheap = min(costs)
-            yield Advice("cheapest", cheap, f"of the filters that may be the best: {tables.number(cost, 2)} times the "
-                         f"processor time of `{plain}`")  # fmt: skip
+            yield Advice("cheapest", cheap, f"{less(rows[cheap].to_plain):.0f} % less error over all kinds of trouble, "
+                         f"with {tables.number(cost, 2)} times the processor time of `{plain}`")  # fmt: skip
     honest = [r for r in rows.values() if r.to_plain <= 1.0 and math.isfinite(r.coverage)]
     if honest:
         best = min(honest, key=lambda r: abs(r.coverage - _STATED))

@@ -154,13 +154,15 @@ def limits(track: TrackTable) -> str:
     said = []
     costs = [c.value for r in best if (c := cost_of(r.estimator, track.plain, track.score)) is not None]
     if costs:
-        said.append(f"they take {spread(costs, '{:.2g}')} times the processor time of `{track.plain}`")
+        take = "it takes" if len(best) == 1 else "they take"
+        said.append(f"{take} {spread(costs, '{:.2g}')} times the processor time of `{track.plain}`")
     beside = [
         (x / own, r.estimator, s) for r in best for s, x in r.ratios.items() if (own := plain.ratios.get(s, 0.0)) > 0.0
     ]
     worst = max(beside, default=(0.0, "", ""))
     if worst[0] > _WORSE:
-        said.append(f"the worst of them on one scenario is `{worst[1]}` on {worst[2]}, with {_less([worst[0]])}")
+        of = "its worst scenario is" if len(best) == 1 else f"the worst of them on one scenario is `{worst[1]}` on"
+        said.append(f"{of} {worst[2]}, with {_less([worst[0]])}")
     text = "; ".join(said)
     return f"{text[0].upper()}{text[1:]}." if text else ""
 

@@ -18,7 +18,9 @@ from simnav.estimators.models.columns import Columns
 from simnav.estimators.models.delayed import DELAY
 from simnav.estimators.models.inertial import InertialModel
 from simnav.estimators.models.measurement_functions import MeasurementFunction
+from simnav.estimators.models.measurements import State
 from simnav.estimators.models.ship import ShipModel
+from simnav.estimators.models.ship_observation import PlacedShip
 from simnav.estimators.solvers.admission import Admission, together
 from simnav.geometry.earth import relative_position
 from simnav.kinds import Component, Kind
@@ -27,7 +29,7 @@ from simnav.recording import Recording
 from simnav.scenario import Scenario
 from simnav.source import record
 from simnav.trial import run_trial
-from simnav.types import Array, Measurement
+from simnav.types import Measurement
 from tests.cases.raw_gnss import raw_gnss
 
 BEAMS = """
@@ -55,13 +57,13 @@ def recording() -> Recording:
     return record(raw_gnss(30.0), 1)
 
 
-def wandering(model: InertialModel, count: int) -> tuple[list[list[Array]], list[Array]]:
+def wandering(model: InertialModel, count: int) -> tuple[list[State], State]:
     """States of a model that is corrected at random, one by one, and the same as columns."""
     rng, states = np.random.default_rng(1), []
     for _ in range(count):
         model.correct(rng.standard_normal(model.size) * 0.01)
-        states.append([a.copy() for a in model._state()])
-    return states, [np.stack(column) for column in zip(*states, strict=True)]
+        states.append(State(*(a.copy() for a in model._state())))
+    return states, State(*(np.stack(column) for column in zip(*states, strict=True)))
 
 
 def test_innovations_and_jacobians(recording: Recording):
@@ -72,7 +74,6 @@ def test_innovations_and_jacobians(recording: Recording):
     rows = np.arange(0, len(stream), 7)
     names = [f"gnss:{stream.channels[c]}" for c in stream.channel[rows]]
     states, columns = wandering(model, len(rows))
-    offset = model.size - len(model.calibration)
     innovation, jacobian = many.linearise(
         stream.time[rows],
         stream.value[rows],
@@ -80,10 +81,9 @@ def test_innovations_and_jacobians(recording: Recording):
         columns,
         np.arange(len(rows)),
         stream.side[rows],
-        offset,
     )
     for k, (row, name) in enumerate(zip(rows, names, strict=True)):
-        one = model.observe_own(name, float(stream.time[row]), stream.value[row], tuple(states[k]), stream.side[row])
+        one = model.observe_own(name, float(stream.time[row]), stream.value[row], states[k], stream.side[row])
         assert one is not None
         np.testing.assert_allclose(innovation[k], one[0], rtol=0.0, atol=1e-6)
         np.testing.assert_allclose(jacobian[k], one[1], rtol=1e-9, atol=1e-9)
@@ -103,12 +103,9 @@ def test_channels_with_biases():
     rows = np.arange(len(stream))
     names = [f"beams:{stream.channels[c]}" for c in stream.channel]
     states, columns = wandering(model, len(rows))
-    offset = model.size - len(model.calibration)
-    innovation, jacobian = many.linearise(
-        stream.time, stream.value, many.channels(names), columns, rows, stream.side, offset
-    )
+    innovation, jacobian = many.linearise(stream.time, stream.value, many.channels(names), columns, rows, stream.side)
     for k, name in enumerate(names):
-        one = model.observe_own(name, float(stream.time[k]), stream.value[k], tuple(states[k]), stream.side[k])
+        one = model.observe_own(name, float(stream.time[k]), stream.value[k], states[k], stream.side[k])
         assert one is not None
         assert one[1][0, model.bias_at[name]] == 1.0
         np.testing.assert_allclose(innovation[k], one[0], rtol=0.0, atol=1e-12)
@@ -130,12 +127,10 @@ def test_beams_of_a_ship():
     names = [f"beams:{stream.channels[c]}" for c in stream.channel]
     for _ in names:
         model.correct(rng.standard_normal(model.size) * 0.1)
-        states.append((model.position.copy(), model.x.copy()))
-    columns = [np.stack(column) for column in zip(*states, strict=True)]
+        states.append(PlacedShip(model.position.copy(), model.x.copy()))
+    columns = PlacedShip(*(np.stack(column) for column in zip(*states, strict=True)))
     rows = np.arange(len(stream))
-    innovation, jacobian = many.linearise(
-        stream.time, stream.value, many.channels(names), columns, rows, stream.side, 0
-    )
+    innovation, jacobian = many.linearise(stream.time, stream.value, many.channels(names), columns, rows, stream.side)
     for k, name in enumerate(names):
         one = model.observe_own(name, float(stream.time[k]), stream.value[k], states[k], stream.side[k])
         assert one is not None

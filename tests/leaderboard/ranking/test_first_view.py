@@ -72,6 +72,10 @@ def test_what_to_take_has_reasons_and_the_sentence_few_numbers(view: FirstView) 
     assert (advice["plain"].estimator, advice["robust"].estimator) == ("ekf", "iae")
     assert advice["most honest"].estimator == "adkf-paper"  # it has no more error than the plain row over all kinds
     assert "95 %" in advice["most honest"].reason
+    better = [r for r in view.rows if r.to_plain < 0.9 and math.isfinite(r.cost)]
+    cheap = min(better, key=lambda r: r.cost)
+    assert advice["cheapest"].estimator == cheap.estimator
+    assert advice["cheapest"].reason.startswith(f"{100.0 * (1.0 - cheap.to_plain):.0f} % less error over all kinds")
     assert advice["robust"].reason.startswith("35 % less error than `ekf` over all kinds of trouble, and no run")
     assert view.sentence.startswith("Where nothing is wrong, no filter is shown to be better than the plain filter")
     assert view.sentence.endswith("% less with fixes that lie slowly.")
