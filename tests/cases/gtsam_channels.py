@@ -23,6 +23,8 @@ import numpy as np
 
 from simnav.estimators.models.channels import by_channel, owners
 from simnav.estimators.models.inertial import InertialModel
+from simnav.estimators.models.measurements import State
+from simnav.estimators.models.named_state import at_row
 from simnav.estimators.solvers.admission import Admission, together
 from simnav.estimators.solvers.gtsam_graph import InertialGraph
 from simnav.estimators.solvers.gtsam_solvers import LONGEST, THRESHOLDS, FixedLagEstimator
@@ -119,9 +121,8 @@ class ChannelGraph(InertialGraph):
         def error(_: Any, values: Any, jacobians: Any) -> Array:
             pose, bias = values.atPose3(x), values.atConstantBias(b)
             at = self.frame.state(pose.rotation().matrix(), pose.translation(), values.atPoint3(v))
-            state = at.position, at.velocity, at.dcm, rate, bias.gyroscope(), values.atVector(c)
-            states = [array[None] for array in state]
-            innovation, jacobian = many.linearise(time, value, channel, states, row, side, NODE)
+            state = State(at.position, at.velocity, at.dcm, rate, bias.gyroscope(), values.atVector(c))
+            innovation, jacobian = many.linearise(time, value, channel, at_row(state, None), row, side)
             if jacobians is not None:
                 ours = jacobian.reshape(n * d, NODE + k)
                 turned = ours[:, :9] @ at.error_map
