@@ -359,6 +359,7 @@ def publish_standard(request: PublishRequest) -> Published:
         If runs are missing or out of date; then nothing is written.
     """
     from simnav.leaderboard.papers.page import pages_in
+    from simnav.leaderboard.ranking.trouble_profile import profiles
     from simnav.leaderboard.results.web_addresses import linked_from
     from simnav.leaderboard.site.site import build
     from simnav.leaderboard.standard.drawn import attached, stored_sweeps
@@ -392,5 +393,5 @@ def publish_standard(request: PublishRequest) -> Published:
         output = absolute(request.site)
         build(found, made.ranking, output, home=linked_from(output), progress=request.progress, workers=request.workers,
               papers=pages_in(Path("reproduced")), editions=pages_of(read(file)), seeds=seeds,
-              sweeps=stored_sweeps(found))  # fmt: skip
+              sweeps=stored_sweeps(found), profiles=profiles(made.results))  # fmt: skip
     return made

@@ -47,7 +47,7 @@ def learned_words(learned: Mapping[str, Any]) -> str:
     ('learned from runs of streams 5 to 8, 20', '')
     >>> record = {"voyages": 9, "families": ["a", "b"], "parameters": 50, "seconds_per_epoch": 3.1}
     >>> learned_words({"trained_on": record})
-    'learned from 9 voyages of a, b; 50 parameters; 3.1 s an epoch'
+    'learned from 9 voyages of a, b; 50 parameters; 3.1 s for each pass over them'
     """
     record = learned.get("trained_on")
     record = record if isinstance(record, Mapping) else {}
@@ -60,7 +60,7 @@ def learned_words(learned: Mapping[str, Any]) -> str:
         size, epoch = record.get("parameters"), record.get("seconds_per_epoch")
         words = f"learned from {voyages} voyages of {scenario}"
         words += f"; {size} parameters" if isinstance(size, int) else ""
-        return words + (f"; {epoch:g} s an epoch" if isinstance(epoch, (int, float)) else "")
+        return words + (f"; {epoch:g} s for each pass over them" if isinstance(epoch, (int, float)) else "")
     if streams:
         return f"learned from runs of streams {streams}{more}"
     return f"learned from {', '.join(f'{k} {v}' for k, v in list(record.items())[:3])[:200]}" if record else ""

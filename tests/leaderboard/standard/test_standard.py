@@ -20,6 +20,7 @@ from simnav.leaderboard.campaign import campaign, resolution
 from simnav.leaderboard.campaign.fingerprint import estimator_source
 from simnav.leaderboard.cli.application import app
 from simnav.leaderboard.ranking.ranking import rank
+from simnav.leaderboard.ranking.trouble_profile import profiles
 from simnav.leaderboard.results import store
 from simnav.leaderboard.results.errors import RequestError
 from simnav.leaderboard.results.packing import write_packed
@@ -155,6 +156,16 @@ def test_an_edit_changes_nothing_and_a_raised_version_runs_that_row_only(
     monkeypatch.undo()  # as it was, for the tests that follow
     run(home, home / "work")
     publish(home, home / "work")
+
+
+def test_the_site_of_what_is_published_has_the_results_by_kind_of_trouble(
+    home: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    built: dict[str, object] = {}
+    monkeypatch.setattr("simnav.leaderboard.site.site.build", lambda *_, **options: built.update(options))
+    made = publish(home, home / "work", site=tmp_path / "site")
+    assert built["profiles"] == profiles(made.results)
+    assert [p.track for p in profiles(made.results)] == ["generalisation"]
 
 
 def test_the_audit_repeats_a_sample_and_finds_a_wrong_score(home: Path, tmp_path: Path) -> None:
