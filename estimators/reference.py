@@ -17,9 +17,8 @@ from math import sqrt
 
 import numpy as np
 
-from simnav.estimators.adaptations.truth import TrueNoise
-from simnav.estimators.solvers.oracle import OracleEstimator
-from simnav.estimators.solvers.smoother import Smoother
+from simnav.estimator import make
+from simnav.estimators.rows.oracles import OracleRts
 from simnav.scenario import Scenario
 from simnav.scoring import errors
 from simnav.scoring.consistency import nees
@@ -77,13 +76,16 @@ def oracle_run(scenario: Scenario, seed: int) -> OracleRun:
     if scenario.recorded:
         raise SpecError(f"{scenario.id} is a recorded run; its noise is not known, and so it has no reference figure")
     recording = simulate(scenario, seed)
-    smoother = Smoother()
-    trial = run_trial(OracleEstimator(TrueNoise(), smoother), recording)
+    row = make("oracle-rts")  # the row of the board, which uses late readings at their time of validity
+    trial = run_trial(row, recording)
     if trial.status != "ok" or trial.covariance is None:
         raise SpecError(f"{scenario.id}, seed {seed}: the oracle ended with {trial.status}: {trial.reason}")
     real_time = _summary(errors(trial, recording), trial.covariance)
     after = smoothed_errors(trial, recording)
-    assert after is not None, "it has a smoother"
+    assert isinstance(row, OracleRts)
+    smoother = row.solver.smoother
+    assert after is not None
+    assert smoother is not None, "it has a smoother"
     smoothed = _summary(after, smoother.smoothed_covariance)
     return OracleRun(seed, *real_time, *smoothed)
 
