@@ -19,6 +19,7 @@ import numpy as np
 
 from simnav.estimator import make
 from simnav.estimators.rows.oracles import OracleRts
+from simnav.estimators.solvers.oracle import OracleEstimator
 from simnav.scenario import Scenario
 from simnav.scoring import errors
 from simnav.scoring.consistency import nees
@@ -82,11 +83,11 @@ def oracle_run(scenario: Scenario, seed: int) -> OracleRun:
         raise SpecError(f"{scenario.id}, seed {seed}: the oracle ended with {trial.status}: {trial.reason}")
     real_time = _summary(errors(trial, recording), trial.covariance)
     after = smoothed_errors(trial, recording)
+    assert after is not None, "it has a smoother"
     assert isinstance(row, OracleRts)
-    smoother = row.solver.smoother
-    assert after is not None
-    assert smoother is not None, "it has a smoother"
-    smoothed = _summary(after, smoother.smoothed_covariance)
+    assert isinstance(row.solver, OracleEstimator)
+    assert row.solver.smoother is not None
+    smoothed = _summary(after, row.solver.smoother.smoothed_covariance)
     return OracleRun(seed, *real_time, *smoothed)
 
 
