@@ -11,8 +11,9 @@ from simnav.estimators.models.filtering import Aid, Dynamics, ModelFunctions, Pr
 from simnav.estimators.models.function_model import FunctionModel
 from simnav.estimators.models.propagation import Samples
 from simnav.geometry.earth import radii_scalar
+from simnav.kernel_types import Vector
 from simnav.structures import filled, structure
-from simnav.types import Array, Estimate
+from simnav.types import Estimate
 
 #: Time [s]; latitude, longitude [rad] and height [m]; velocity north and east [m/s]; metres for a radian.
 STATE = structure(time=float, position=3, velocity=2, metres=2)
@@ -53,7 +54,7 @@ def retract(dynamics: Dynamics) -> None:
         state.velocity[i] += dynamics.correction[2 + i]
 
 
-def difference(numbers: Array, other: Array, error: Array) -> None:
+def difference(numbers: Vector, other: Vector, error: Vector) -> None:
     state, there = numbers.view(STATE)[0], other.view(STATE)[0]
     for i in range(2):
         error[i] = (state.position[i] - there.position[i]) * state.metres[i]
