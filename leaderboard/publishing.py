@@ -386,10 +386,8 @@ def publish_standard(request: PublishRequest) -> Published:
         )
     if request.site is not None:
         # Scores are those that were published: they are shorter, and decide how a run at a limit ended.
-        scores = {(r.scenario, r.estimator, r.seed): r.scores for r in made.results}
-        every = ((r, scores.get((r.scenario, r.estimator, r.seed))) for r in results_of(working, series=True))
-        found = [replace(r, scores=known) for r, known in every if known is not None]
-        found, seeds = attached(found)
+        # The site that everybody makes of the packed results: with the series that come with simnav, and no others.
+        found, seeds = attached([replace(r, series={}) for r in made.results])
         output = absolute(request.site)
         build(found, made.ranking, output, home=linked_from(output), progress=request.progress, workers=request.workers,
               papers=pages_in(Path("reproduced")), editions=pages_of(read(file)), seeds=seeds,

@@ -35,11 +35,12 @@ __all__ = ["MOST_IN_JSON", "SCHEMA_VERSION", "Document", "table", "write_json", 
 #: Raised whenever a reader of ``results.json`` would have to change.
 SCHEMA_VERSION = 2
 
-#: Runs that ``results.json`` holds at most; of more it holds the ranking alone.
+#: Runs that ``results.json`` holds at most; of more it holds the ranking of the tracks alone.
 MOST_IN_JSON = 20_000
 
 _CHUNK = 8192  # runs that are converted at a time
 _DIGITS = 4  # of figures of the ranking
+_BITS = 16  # of figures of more runs than `MOST_IN_JSON`: a part in 50 000
 _FACTS = ("scenario", "seed", "draws", "estimator", "parameters", "learned", "reference", "status", "reason", "note")
 _COSTS = ("seconds", "peak_memory")
 #: Column -> attribute: how a run ended as tables count it, and why.
@@ -123,13 +124,12 @@ def _run(result: Result) -> dict[str, Any]:
 def write_json(document: Document, path: Path) -> list[Path]:
     """Write ``results.json``: a line a run. NaN is not JSON and has become null.
 
-    Of more than `MOST_IN_JSON` runs it has neither the list of the runs nor the ratios of each: they are in the Parquet
-    file. Figures of the ranking have `_DIGITS` digits.
+    Of more than `MOST_IN_JSON` runs it has neither the runs, which are in the Parquet file, nor the ranking of each
+    scenario. Figures of the ranking have `_DIGITS` digits.
     """
     found, many = _short(document._head()), len(document.results) > MOST_IN_JSON
-    for scenario in found["ranking"].get("scenarios", ()) if many else ():
-        for row in scenario["rows"]:
-            row["ratios"] = {}
+    if many:
+        found["ranking"]["scenarios"] = []
     head = json.dumps(found, allow_nan=False, ensure_ascii=False, separators=(",", ":"))
     results = () if many else document.results
     lines = (json.dumps(_run(r), allow_nan=False, ensure_ascii=False, separators=(",", ":")) for r in results)
@@ -152,17 +152,29 @@ def _short(value: Any) -> Any:
 
 @writes("results", "parquet")
 def write_parquet(document: Document, path: Path) -> list[Path]:
-    """A row a run, a column a score."""
+    """A row a run, a column a score. Figures of more than `MOST_IN_JSON` runs are rounded, for the file's size."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
     every = pa.concat_tables(document.tables()).combine_chunks()
     real = [f.name for f in every.schema if f.type == pa.float64()]  # their bytes side by side take a third less
+    for name in real if len(document.results) > MOST_IN_JSON else ():
+        k = every.column_names.index(name)
+        every = every.set_column(k, every.schema.field(k), _rounded(every[name].combine_chunks()))
     rest = [name for name in every.column_names if name not in real]
     with complete_file(path) as part:
         pq.write_table(every, part, compression="zstd", compression_level=9, use_dictionary=rest,
                        use_byte_stream_split=real)  # fmt: skip
     return [path]
+
+
+def _rounded(column: pa.DoubleArray) -> pa.DoubleArray:
+    """The same column with `_BITS` binary digits: the zeros after them take no space."""
+    import pyarrow as pa
+
+    mantissa, exponent = np.frexp(column.to_numpy(zero_copy_only=False))
+    figures = np.ldexp(np.round(np.ldexp(mantissa, _BITS)), exponent - _BITS)
+    return pa.array(figures, mask=column.is_null().to_numpy(zero_copy_only=False))
 
 
 def table(results: Sequence[Result]) -> pa.Table:

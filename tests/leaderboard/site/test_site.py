@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import unquote, urlparse
 
+import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
@@ -21,6 +22,7 @@ from simnav.leaderboard.ranking.board import TrackRow
 from simnav.leaderboard.ranking.ranking import rank
 from simnav.leaderboard.ranking.runs import group
 from simnav.leaderboard.ranking.stored_costs import cost_of
+from simnav.leaderboard.results import export
 from simnav.leaderboard.results.errors import RequestError
 from simnav.leaderboard.results.export import SCHEMA_VERSION
 from simnav.leaderboard.results.result import Result
@@ -354,6 +356,26 @@ def test_json_keeps_to_its_schema(folder, results):
     assert first["scores"]["horizontal_rmse"] == mine.scores["horizontal_rmse"]
     assert first["scores"]["vertical_rmse"] is None
     assert [t["track"] for t in document["ranking"]["tracks"]] == ["other", "fjords"]
+
+
+def test_files_of_many_runs_are_short(folder, results, tmp_path, monkeypatch):
+    monkeypatch.setattr(export, "MOST_IN_JSON", len(results) - 1)
+    document = export.Document(results, rank(results).to_dict())
+    export.write_json(document, tmp_path / "results.json")
+    short = json.loads((tmp_path / "results.json").read_text())
+    conforms(short, json.loads((folder / "results.schema.json").read_text()), "results.json")
+    assert (short["results"], short["ranking"]["scenarios"]) == ([], [])
+    assert short["ranking"]["tracks"]
+    export.write_parquet(document, tmp_path / "results.parquet")
+    rounded, whole = pq.read_table(tmp_path / "results.parquet"), export.table(results)
+    assert rounded.schema.equals(whole.schema, check_metadata=True)
+    for name in whole.column_names:
+        a, b = rounded[name], whole[name]
+        assert a.null_count == b.null_count, name
+        if b.type == "double":
+            np.testing.assert_allclose(a.to_numpy(), b.to_numpy(), rtol=2e-5, err_msg=name)
+        else:
+            assert a.equals(b), name
 
 
 def conforms(value, schema, where):
