@@ -126,6 +126,8 @@ class MultipleHypothesisEkf(Row, solver=MultipleHypothesis, model=DoubtedInstrum
     --------
     2
         The evidence counts readings of one time of several channels (satellites, beams, points of a terrain), too.
+    3
+        A start whose heading is not known to 15 deg is a bank of headings.
     """
 
-    version = 2
+    version = 3

@@ -76,7 +76,7 @@ class MidValue(
 
 @register("mh-ekf")
 class MultipleHypothesisEkf(Row, solver=MultipleHypothesis, model=DoubtedInstruments):
-    version = 2
+    version = 3
     def __init__(
         self,
         *,

@@ -23,7 +23,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from math import ceil, degrees, exp, log, pi, radians, sqrt
+from math import ceil, exp, log, pi, radians, sqrt
 from typing import ClassVar
 
 import numpy as np
@@ -40,7 +40,7 @@ from simnav.types import Array, Estimate, InitialState, Instruments, Measurement
 from .kalman import FilterFunctions, KalmanEstimator
 from .state_difference import difference, displaced
 
-__all__ = ["HeadingBank", "initial_headings"]
+__all__ = ["HeadingBank", "initial_headings", "same_heading", "starts_by_heading"]
 
 #: Smallest probability of a measurement in the likelihood.
 _CLIP = 0.9999
@@ -78,6 +78,48 @@ def initial_headings(sigma: float, spacing: float) -> tuple[Array, Array]:
     return offsets, weights / weights.sum()
 
 
+def starts_by_heading(start: InitialState, above: float, spacing: float) -> list[tuple[InitialState, float]]:
+    """The start as a mixture of starts whose headings are known well enough to be linearised at.
+
+    Parameters
+    ----------
+    start : InitialState
+        The start.
+    above : float
+        The start itself is returned, if its heading's standard deviation is not above this [rad].
+    spacing : float
+        Largest distance between neighbouring headings [rad].
+
+    Returns
+    -------
+    list of (InitialState, float)
+        The starts, and their weights, which sum to 1.
+    """
+    sigma = sqrt(float(start.covariance[ERROR.heading, ERROR.heading]))
+    if sigma <= above:
+        return [(start, 1.0)]
+    offsets, weights = initial_headings(sigma, spacing)
+    narrow, starts = min(1.0, _OVERLAP * _step(offsets) / sigma), []
+    for offset, weight in zip(offsets.tolist(), weights.tolist(), strict=True):
+        covariance = start.covariance.copy()
+        covariance[ERROR.heading] *= narrow
+        covariance[:, ERROR.heading] *= narrow
+        attitude = np.asarray(wrap_angle(start.attitude + np.array([0.0, 0.0, offset])))
+        starts.append((replace(start, attitude=attitude, covariance=covariance), weight))
+    return starts
+
+
+def same_heading(one: Estimate, other: Estimate) -> bool:
+    """Whether the headings of two estimates differ by less than `_SAME` of the smaller one of their sigmas."""
+    assert one.attitude is not None
+    assert other.attitude is not None
+    assert one.covariance is not None
+    assert other.covariance is not None
+    at = (ERROR.heading, ERROR.heading)
+    variance = min(float(one.covariance[at]), float(other.covariance[at]))
+    return abs(float(wrap_angle(one.attitude[2] - other.attitude[2]))) < _SAME * sqrt(max(variance, 0.0))
+
+
 class _Scored(KalmanEstimator):
     """The filter, with the logarithm of the likelihood of its innovations."""
 
@@ -109,15 +151,6 @@ class _Hypothesis:
     filter: KalmanEstimator
     weight: float
     estimate: Estimate | None = None
-
-    @property
-    def heading(self) -> tuple[float, float]:
-        """Heading and its standard deviation [rad]."""
-        assert self.estimate is not None
-        assert self.estimate.attitude is not None
-        assert self.estimate.covariance is not None
-        variance = float(self.estimate.covariance[ERROR.heading, ERROR.heading])
-        return float(self.estimate.attitude[2]), sqrt(max(variance, 0.0))
 
 
 class HeadingBank(Solver):
@@ -154,23 +187,12 @@ class HeadingBank(Solver):
 
     def reset(self, start: InitialState, instruments: Instruments) -> None:
         """Begin a run; UnsuitableScenario if the model lacks an instrument."""
-        sigma = sqrt(float(start.covariance[ERROR.heading, ERROR.heading]))
-        offsets, weights = np.zeros(1), np.ones(1)
-        if degrees(sigma) > self.above_deg:
-            offsets, weights = initial_headings(sigma, radians(self.spacing_deg))
+        starts = starts_by_heading(start, radians(self.above_deg), radians(self.spacing_deg))
+        kind = KalmanEstimator if len(starts) == 1 else _Scored
         self._hypotheses = []
-        for offset, weight in zip(offsets.tolist(), weights.tolist(), strict=True):
-            kind = KalmanEstimator if len(offsets) == 1 else _Scored
+        for own, weight in starts:
             one = kind(copy.deepcopy(self._choice))
             one.row = self.label
-            own = start
-            if len(offsets) > 1:
-                narrow = min(1.0, _OVERLAP * _step(offsets) / sigma)
-                covariance = start.covariance.copy()
-                covariance[ERROR.heading] *= narrow
-                covariance[:, ERROR.heading] *= narrow
-                attitude = start.attitude + np.array([0.0, 0.0, offset])
-                own = replace(start, attitude=np.asarray(wrap_angle(attitude)), covariance=covariance)
             one.reset(own, instruments)
             self._hypotheses.append(_Hypothesis(one, weight))
 
@@ -213,10 +235,10 @@ class HeadingBank(Solver):
         for h in sorted(self._hypotheses, key=lambda h: -h.weight):
             if kept and h.weight < _LEAST:
                 continue
-            heading, sigma = h.heading
+            assert h.estimate is not None
             for other in kept:
-                theirs, wide = other.heading
-                if abs(float(wrap_angle(heading - theirs))) < _SAME * min(sigma, wide):
+                assert other.estimate is not None
+                if same_heading(h.estimate, other.estimate):
                     other.weight += h.weight
                     break
             else:

@@ -21,6 +21,7 @@ from simnav.estimators.adaptations.prediction import PredictionTest
 from simnav.estimators.models.doubted_instruments import DoubtingModel
 from simnav.estimators.models.filtering import Dynamics, Prediction, Readings
 from simnav.estimators.models.roles import fixes_and_logs
+from simnav.kernel_types import Vector
 from simnav.types import Estimate, ImuSamples, InitialState, Instruments, Measurement
 
 from .imm import ImmEstimator, mix
@@ -65,6 +66,27 @@ class Step(NamedTuple):
     readings: Sequence[Measurement]
     until: float
     saturated: float = 0.0
+
+
+class Evidence(NamedTuple):
+    """What measurements say of a hypothesis: log density, sum of the NIS, and its degrees of freedom."""
+
+    density: float
+    nis: float
+    freedom: float
+
+
+@kernel
+def evidence_of(readings: Readings, count: int, shares: Vector) -> Evidence:
+    """Sum over the first readings, each by the share of its instrument; one that was not used has a negative NIS."""
+    density = nis = freedom = 0.0
+    for k in range(count):
+        if readings.nis[k] >= 0.0:
+            share = shares[readings.instrument[k]]
+            density += share * readings.reported[k]
+            nis += share * readings.nis[k]
+            freedom += share * readings.components[k]
+    return Evidence(density, nis, freedom)
 
 
 @kernel(passed=True)
@@ -145,9 +167,9 @@ class HypothesisFilter(ImmEstimator):
         """Add the evidence of the measurements, and keep what became of each."""
         if not count:
             return
-        nis = readings.nis[:count]
-        share = np.where(nis >= 0.0, self._shares[readings.instrument[:count]], 0.0)
-        self.evidence += float(share @ readings.reported[:count])
-        self.nis += float(share @ nis)
-        self.freedom += float(share @ readings.components[:count])
-        self.notes += zip(self._measurements, nis.tolist(), readings.size[:count].tolist(), strict=True)
+        said: Evidence = evidence_of.unchecked(readings, count, self._shares)
+        self.evidence += said.density
+        self.nis += said.nis
+        self.freedom += said.freedom
+        nis, size = readings.nis[:count].tolist(), readings.size[:count].tolist()
+        self.notes += zip(self._measurements, nis, size, strict=True)

@@ -26,9 +26,11 @@ probable of more than `filters`, and of more than `ALIKE` with the same doubts.
 
 **Prior probabilities.** A fault of each kind begins once in `onset` seconds, or more rarely by the factor of the kind
 (`KINDS`), and lasts for `end` seconds, in the mean. At the start the position is wrong with the probability
-`WRONG_POSITION`, and the attitude, too, with `WRONG_START`. Until `TRUST` seconds have confirmed the start, no fault is
-looked for: an instrument and the start contradict each other, and nothing says which of them is right. The same holds
-of a rare fix that has only the IMU beside it (`lone_fix`): there no fault is looked for at all.
+`WRONG_POSITION`, and the attitude, too, with `WRONG_START`. A start whose heading is not known to `NARROW` is a bank of
+starts at headings round the circle instead (`simnav.estimators.solvers.heading_bank`), for a filter that is linearised
+at a wrong heading may never recover. Until `TRUST` seconds have confirmed the start, and one heading is left, no fault
+is looked for: an instrument and the start contradict each other, and nothing says which of them is right. The same
+holds of a rare fix that has only the IMU beside it (`lone_fix`): there no fault is looked for at all.
 
 Gross errors and a noise beyond the datasheet need no hypothesis: in each filter the noise of every instrument switches
 between levels (`simnav.estimators.solvers.hypothesis_filter`).
@@ -60,6 +62,7 @@ from simnav.kernel_types import Matrix, Vector
 from simnav.types import Array, Estimate, InitialState, Instruments, Measurement, Measurements
 
 from .admission import Admission
+from .heading_bank import same_heading, starts_by_heading
 from .hypotheses import uncertain_start
 from .hypothesis_filter import HypothesisFilter, Step, lone_fix
 from .innovation_consistency import TEST, add_square, begun_test, end_epoch, is_inconsistent
@@ -103,6 +106,9 @@ KINDS: Mapping[str, Kind] = {
 WATCH = 20.0
 #: Prior probabilities that the position at the start is wrong, and that the attitude is, too.
 WRONG_POSITION, WRONG_START = 0.02, 0.02
+#: A heading at the start that is less well known than this is a bank of headings at most so far apart [rad]: the
+#: defaults of `HeadingBank`.
+NARROW, SPACING = radians(15.0), radians(20.0)
 #: No fault is looked for before this time [s]: until then an instrument and the start contradict each other, and the
 #: start has not been confirmed.
 TRUST = 30.0
@@ -258,12 +264,14 @@ class MultipleHypothesis(Solver):
             one.reset(own, instruments)
             return one
 
-        first = made(start)
-        self._hypotheses = [
-            _Hypothesis({}, first, log(1.0 - WRONG_POSITION - WRONG_START)),
-            _Hypothesis({}, made(uncertain_start(start, attitude=False)), log(WRONG_POSITION)),
-            _Hypothesis({}, made(uncertain_start(start)), log(WRONG_START)),
-        ]
+        starts = starts_by_heading(start, NARROW, SPACING)
+        wrong = [(uncertain_start(start, attitude=False), WRONG_POSITION)]
+        if len(starts) == 1:
+            wrong += [(uncertain_start(start), WRONG_START)]
+        right = 1.0 - sum(probability for _, probability in wrong)
+        self._bank = [_Hypothesis({}, made(own), log(right * weight)) for own, weight in starts]
+        first = self._bank[0].filter
+        self._hypotheses = [*self._bank, *(_Hypothesis({}, made(own), log(weight)) for own, weight in wrong)]
         # One more than may stay: the last one is begun before it is known which is dropped.
         self._spare = [made(start) for _ in range(self.filters - 2)]
         self._anchor, self._sound = (_Hypothesis({}, made(start), 0.0) for _ in range(2))
@@ -331,6 +339,7 @@ class MultipleHypothesis(Solver):
         taken = self._normalise()
         for h in [h for h in self._hypotheses if h.weight < self._hypotheses[0].weight - LEAST]:
             self._drop(h)
+        self._merge_bank(time)
         taken += self._normalise()
         anchor, lead = self._anchor, self._hypotheses[0]
         anchor.filter.take_over(lead.filter)
@@ -342,6 +351,22 @@ class MultipleHypothesis(Solver):
             self._since_sound.taken += taken
             if time - self._since_sound.start > LONGEST:
                 self._since_sound = None
+
+    def _merge_bank(self, time: float) -> None:
+        """Let filters of the bank that have reached the same heading be one; no fault is looked for before."""
+        kept = list[tuple[_Hypothesis, Estimate]]()
+        for h in sorted((h for h in self._bank if h in self._hypotheses), key=lambda h: -h.weight):
+            own = h.filter.estimate()
+            for other, its in kept:
+                if same_heading(own, its):
+                    other.weight = float(np.logaddexp(other.weight, h.weight))
+                    self._drop(h)
+                    break
+            else:
+                kept.append((h, own))
+        self._bank = [h for h, _ in kept] if len(kept) > 1 else []
+        if self._bank:
+            self._trusted = self._watch = max(self._trusted, time)
 
     def _begin_all(self, time: float) -> None:
         """Begin the hypotheses that are due."""

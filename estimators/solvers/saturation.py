@@ -10,6 +10,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from simnav.compiled import kernel, ready
+from simnav.kernel_types import FlagVector, Matrix
 from simnav.types import ImuDatasheet, ImuSamples
 
 __all__ = ["Saturation"]
@@ -18,6 +20,45 @@ __all__ = ["Saturation"]
 REPEATED = 3
 #: A reading is far above its noise if it is larger by this than bias and white noise of a sample.
 FAR = 10.0
+
+
+@kernel
+def largest_saturated(
+    rates: Matrix, before: Matrix, coarse: FlagVector, begins: bool, least: float, limit: float
+) -> float:
+    """The largest rate of (N, 3) ``rates`` at which a gyroscope saturates [rad/s]; 0 where none does.
+
+    Parameters
+    ----------
+    rates : (N, 3) array
+        Angular rates [rad/s].
+    before : (r, 3) array
+        The readings before, newest last; those of ``rates`` take their place.
+    coarse : (3,) bool array
+        Gyroscopes that repeat themselves at any rate; more are found while the run ``begins``.
+    begins : bool
+        Whether a repeated reading shows a coarse gyroscope.
+    least, limit : float
+        A repeated reading counts above the first, any reading from the second on [rad/s].
+    """
+    count, r, largest = rates.shape[0], before.shape[0], 0.0
+    for begun in (False, True):  # the coarse ones are known before the readings are judged
+        for i in range(3):
+            for k in range(count):
+                repeated = True
+                for j in range(1, r + 1):
+                    repeated &= (rates[k - j, i] if k >= j else before[r + k - j, i]) == rates[k, i]
+                if not begun:
+                    coarse[i] |= begins and repeated
+                    continue
+                size = abs(rates[k, i])
+                if size > largest and (size >= limit or (repeated and not coarse[i] and size > least)):
+                    largest = size
+    for j in range(r):
+        at = count - r + j
+        for i in range(3):
+            before[j, i] = rates[at, i] if at >= 0 else before[j + count, i]
+    return largest
 
 
 class Saturation:
@@ -44,11 +85,8 @@ class Saturation:
         """The largest rate at which a gyroscope saturates in the samples of a step [rad/s]; 0 where none does."""
         if imu is None or len(imu) == 0:
             return 0.0
-        rates = np.concatenate([self._before, imu.angular_rate])
-        self._before = rates[1 - REPEATED :].copy()
-        size = np.abs(rates[REPEATED - 1 :])
-        repeated = np.all([rates[k : len(size) + k] == rates[REPEATED - 1 :] for k in range(REPEATED - 1)], axis=0)
-        if imu.time[0] < self._until:
-            self._coarse |= repeated.any(axis=0)
-        saturated = (repeated & ~self._coarse & (size > self._least)) | (size >= self._range)
-        return float(np.max(size, where=saturated, initial=0.0))
+        begins = bool(imu.time[0] < self._until)
+        found: float = largest_saturated.unchecked(
+            ready(imu.angular_rate), self._before, self._coarse, begins, self._least, self._range
+        )
+        return found
