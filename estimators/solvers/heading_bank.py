@@ -38,7 +38,7 @@ from simnav.geometry.rotation import wrap_angle
 from simnav.types import Array, Estimate, InitialState, Instruments, Measurements
 
 from .kalman import FilterFunctions, KalmanEstimator
-from .state_difference import difference, displaced
+from .state_difference import mean_of
 
 __all__ = ["HeadingBank", "initial_headings", "same_heading", "starts_by_heading"]
 
@@ -250,16 +250,9 @@ class HeadingBank(Solver):
 
     def _mean(self, first: _Hypothesis) -> Estimate:
         """The mean of the mixture and its covariance, in the tangent space of the most probable filter."""
-        assert first.estimate is not None
-        apart = np.stack([difference(h.estimate, first.estimate) for h in self._hypotheses if h.estimate is not None])
-        weights = np.array([h.weight for h in self._hypotheses])
-        mean = weights @ apart
-        covariance = np.zeros((9, 9))
-        for h, d in zip(self._hypotheses, apart - mean, strict=True):
-            assert h.estimate is not None
-            assert h.estimate.covariance is not None
-            covariance += h.weight * (h.estimate.covariance + np.outer(d, d))
-        return displaced(first.estimate, mean, covariance)
+        ordered = [first, *(h for h in self._hypotheses if h is not first)]
+        estimates = [h.estimate for h in ordered if h.estimate is not None]
+        return mean_of(estimates, np.array([h.weight for h in ordered]))
 
 
 def _step(offsets: Array) -> float:

@@ -68,7 +68,7 @@ from .hypothesis_filter import HypothesisFilter, Step, lone_fix
 from .innovation_consistency import TEST, add_square, begun_test, end_epoch, is_inconsistent
 from .kalman import KalmanEstimator
 from .saturation import Saturation
-from .state_difference import differences, displaced
+from .state_difference import mean_of
 
 __all__ = ["KINDS", "Kind", "MultipleHypothesis"]
 
@@ -460,13 +460,7 @@ class MultipleHypothesis(Solver):
         estimates = [first, *(h.filter.estimate() for h in kept[1:])]
         weights = np.exp([h.weight for h in kept])
         weights /= weights.sum()
-        apart = differences(estimates, first)
-        mean = weights @ apart
-        apart -= mean
-        covariance = (weights[:, None] * apart).T @ apart
-        for weight, one in zip(weights.tolist(), estimates, strict=True):
-            covariance += weight * one.covariance
-        return displaced(first, mean, covariance)
+        return mean_of(estimates, weights)
 
     def _report(self, estimate: Estimate, notes: list[tuple[Measurement, float, float]]) -> None:
         """Set diagnostics and flags of an estimate.
