@@ -167,8 +167,13 @@ def difference(estimate: Estimate, other: Estimate) -> Array:
 
 def _moved(estimate: Estimate, state: Array, covariance: Array) -> Estimate:
     """The estimate with the vectors that it has in nine numbers, and another covariance."""
-    vectors = {name: None if getattr(estimate, name) is None else state[part] for name, part in _PARTS.items()}
-    return replace(estimate, covariance=covariance, **vectors)
+    return replace(
+        estimate,
+        position=None if estimate.position is None else state[PART.position],
+        velocity=None if estimate.velocity is None else state[PART.velocity],
+        attitude=None if estimate.attitude is None else state[PART.attitude],
+        covariance=covariance,
+    )
 
 
 def displaced(estimate: Estimate, error: Array, covariance: Array) -> Estimate:
