@@ -385,8 +385,7 @@ def publish_standard(request: PublishRequest) -> Published:
             preliminary=request.preliminary,
         )
     if request.site is not None:
-        # Scores are those that were published: they are shorter, and decide how a run at a limit ended.
-        # The site that everybody makes of the packed results: with the series that come with simnav, and no others.
+        # As everybody makes it of the packed results: with the series that come with simnav, and no others.
         found, seeds = attached([replace(r, series={}) for r in made.results])
         output = absolute(request.site)
         build(found, made.ranking, output, home=linked_from(output), progress=request.progress, workers=request.workers,

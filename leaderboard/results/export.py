@@ -19,6 +19,7 @@ import numpy as np
 
 from simnav.scoring import SCORES
 
+from .binary_digits import with_bits
 from .files import complete_file
 from .formats import writes
 from .plain import as_json
@@ -81,6 +82,11 @@ class Document:
     command: str = ""
     generated: str = ""
 
+    @property
+    def is_long(self) -> bool:
+        """Whether it has more than `MOST_IN_JSON` runs, so that its files are kept short."""
+        return len(self.results) > MOST_IN_JSON
+
     def to_dict(self) -> dict[str, Any]:
         """The content of ``results.json``.
 
@@ -127,11 +133,11 @@ def write_json(document: Document, path: Path) -> list[Path]:
     Of more than `MOST_IN_JSON` runs it has neither the runs, which are in the Parquet file, nor the ranking of each
     scenario. Figures of the ranking have `_DIGITS` digits.
     """
-    found, many = _short(document._head()), len(document.results) > MOST_IN_JSON
-    if many:
+    found = _short(document._head())
+    if document.is_long:
         found["ranking"]["scenarios"] = []
     head = json.dumps(found, allow_nan=False, ensure_ascii=False, separators=(",", ":"))
-    results = () if many else document.results
+    results = () if document.is_long else document.results
     lines = (json.dumps(_run(r), allow_nan=False, ensure_ascii=False, separators=(",", ":")) for r in results)
     with complete_file(path) as part, open(part, "w", encoding="utf-8") as file:
         file.write(head[:-1] + ',\n "results": [')
@@ -158,23 +164,16 @@ def write_parquet(document: Document, path: Path) -> list[Path]:
 
     every = pa.concat_tables(document.tables()).combine_chunks()
     real = [f.name for f in every.schema if f.type == pa.float64()]  # their bytes side by side take a third less
-    for name in real if len(document.results) > MOST_IN_JSON else ():
-        k = every.column_names.index(name)
-        every = every.set_column(k, every.schema.field(k), _rounded(every[name].combine_chunks()))
+    for name in real if document.is_long else ():
+        column, k = every[name].combine_chunks(), every.column_names.index(name)
+        figures = with_bits(column.to_numpy(zero_copy_only=False), _BITS)
+        shorter = pa.array(figures, mask=column.is_null().to_numpy(zero_copy_only=False))
+        every = every.set_column(k, every.schema.field(k), shorter)
     rest = [name for name in every.column_names if name not in real]
     with complete_file(path) as part:
         pq.write_table(every, part, compression="zstd", compression_level=9, use_dictionary=rest,
                        use_byte_stream_split=real)  # fmt: skip
     return [path]
-
-
-def _rounded(column: pa.DoubleArray) -> pa.DoubleArray:
-    """The same column with `_BITS` binary digits: the zeros after them take no space."""
-    import pyarrow as pa
-
-    mantissa, exponent = np.frexp(column.to_numpy(zero_copy_only=False))
-    figures = np.ldexp(np.round(np.ldexp(mantissa, _BITS)), exponent - _BITS)
-    return pa.array(figures, mask=column.is_null().to_numpy(zero_copy_only=False))
 
 
 def table(results: Sequence[Result]) -> pa.Table:

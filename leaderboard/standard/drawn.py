@@ -21,6 +21,7 @@ import numpy as np
 from simnav.leaderboard.profiles import Profile, read_profile
 from simnav.leaderboard.ranking.superseded import version_of
 from simnav.leaderboard.results import store
+from simnav.leaderboard.results.binary_digits import with_bits
 from simnav.leaderboard.results.packing import write_packed
 from simnav.leaderboard.results.result import Result, Series
 from simnav.leaderboard.results.stored_series import read_ahead
@@ -151,9 +152,7 @@ def _quantiles(series: Mapping[str, Series]) -> dict[str, Series]:
 
 
 def _rounded(values: Series) -> Series:
-    """Figures with `_BITS` binary digits: zeros at the end take no space in a file."""
-    mantissa, exponent = np.frexp(values)
-    return np.asarray(np.ldexp(np.round(mantissa * 2**_BITS) / 2**_BITS, exponent), dtype=np.float32)
+    return np.asarray(with_bits(values, _BITS), dtype=np.float32)
 
 
 def attached(results: Iterable[Result], folder: Path = DRAWN) -> tuple[list[Result], dict[str, list[int]]]:
