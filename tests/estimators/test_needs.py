@@ -15,9 +15,8 @@ from simnav.testing.contract_check import contract_recording
 from simnav.types import Instruments
 from tests.cases.sorts_of_rows import first_of_each_solver
 
-#: One row of each solver and model: what a row needs follows from its pieces. The filters of two are those of ``ekf``,
-#: and begin slowly, for they are many.
-FIRST = set(first_of_each_solver()) - {"solution-separation", "mh-ekf"}
+#: One row of each solver and model: what a row needs follows from its pieces.
+FIRST = set(first_of_each_solver())
 
 
 @pytest.fixture(scope="module")
