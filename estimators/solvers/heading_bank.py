@@ -21,7 +21,7 @@ heading errors B. M. Scherzinger, *Inertial navigator error models for large hea
 from __future__ import annotations
 
 import copy
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import ceil, exp, log, pi, radians, sqrt
 from typing import ClassVar
@@ -40,7 +40,7 @@ from simnav.types import Array, Estimate, InitialState, Instruments, Measurement
 from .kalman import FilterFunctions, KalmanEstimator
 from .state_difference import mean_of
 
-__all__ = ["HeadingBank", "initial_headings", "same_heading", "starts_by_heading"]
+__all__ = ["HeadingBank", "first_of_each_heading", "initial_headings", "starts_by_heading"]
 
 #: Smallest probability of a measurement in the likelihood.
 _CLIP = 0.9999
@@ -109,7 +109,16 @@ def starts_by_heading(start: InitialState, above: float, spacing: float) -> list
     return starts
 
 
-def same_heading(one: Estimate, other: Estimate) -> bool:
+def first_of_each_heading(estimates: Sequence[Estimate]) -> list[int]:
+    """For each of the estimates the index of the first that has the same heading: its own, if there is none before."""
+    firsts = list[int]()
+    for k, one in enumerate(estimates):
+        before = dict.fromkeys(firsts)
+        firsts.append(next((i for i in before if _same_heading(one, estimates[i])), k))
+    return firsts
+
+
+def _same_heading(one: Estimate, other: Estimate) -> bool:
     """Whether the headings of two estimates differ by less than `_SAME` of the smaller one of their sigmas."""
     assert one.attitude is not None
     assert other.attitude is not None
@@ -231,18 +240,14 @@ class HeadingBank(Solver):
         weights /= weights.sum()
         for h, weight in zip(self._hypotheses, weights.tolist(), strict=True):
             h.weight = weight
+        first, *others = sorted(self._hypotheses, key=lambda h: -h.weight)
+        left = [first, *(h for h in others if h.weight >= _LEAST)]
         kept: list[_Hypothesis] = []
-        for h in sorted(self._hypotheses, key=lambda h: -h.weight):
-            if kept and h.weight < _LEAST:
-                continue
-            assert h.estimate is not None
-            for other in kept:
-                assert other.estimate is not None
-                if same_heading(h.estimate, other.estimate):
-                    other.weight += h.weight
-                    break
-            else:
+        for h, k in zip(left, first_of_each_heading([h.estimate for h in left if h.estimate is not None]), strict=True):
+            if left[k] is h:
                 kept.append(h)
+            else:
+                left[k].weight += h.weight
         total = sum(h.weight for h in kept)
         for h in kept:
             h.weight /= total

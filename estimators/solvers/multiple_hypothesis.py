@@ -62,7 +62,7 @@ from simnav.kernel_types import Matrix, Vector
 from simnav.types import Array, Estimate, InitialState, Instruments, Measurement, Measurements
 
 from .admission import Admission
-from .heading_bank import same_heading, starts_by_heading
+from .heading_bank import first_of_each_heading, starts_by_heading
 from .hypotheses import uncertain_start
 from .hypothesis_filter import HypothesisFilter, Step, lone_fix
 from .innovation_consistency import TEST, add_square, begun_test, end_epoch, is_inconsistent
@@ -354,17 +354,14 @@ class MultipleHypothesis(Solver):
 
     def _merge_bank(self, time: float) -> None:
         """Let filters of the bank that have reached the same heading be one; no fault is looked for before."""
-        kept = list[tuple[_Hypothesis, Estimate]]()
-        for h in sorted((h for h in self._bank if h in self._hypotheses), key=lambda h: -h.weight):
-            own = h.filter.estimate()
-            for other, its in kept:
-                if same_heading(own, its):
-                    other.weight = float(np.logaddexp(other.weight, h.weight))
-                    self._drop(h)
-                    break
-            else:
-                kept.append((h, own))
-        self._bank = [h for h, _ in kept] if len(kept) > 1 else []
+        left = sorted((h for h in self._bank if h in self._hypotheses), key=lambda h: -h.weight)
+        firsts = first_of_each_heading([h.filter.estimate() for h in left])
+        for h, first in zip(left, (left[k] for k in firsts), strict=True):
+            if first is not h:
+                first.weight = float(np.logaddexp(first.weight, h.weight))
+                self._drop(h)
+        kept = [left[k] for k in dict.fromkeys(firsts)]
+        self._bank = kept if len(kept) > 1 else []
         if self._bank:
             self._trusted = self._watch = max(self._trusted, time)
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from simnav.compiled import kernel, ready
+from simnav.compiled import helper, kernel, ready
 from simnav.kernel_types import FlagVector, Matrix
 from simnav.types import ImuDatasheet, ImuSamples
 
@@ -20,6 +20,15 @@ __all__ = ["Saturation"]
 REPEATED = 3
 #: A reading is far above its noise if it is larger by this than bias and white noise of a sample.
 FAR = 10.0
+
+
+@helper
+def _repeats(rates: Matrix, before: Matrix, k: int, i: int) -> bool:
+    """Whether a reading of a gyroscope equals all of those before it that are kept."""
+    for j in range(1, before.shape[0] + 1):
+        if (rates[k - j, i] if k >= j else before[before.shape[0] + k - j, i]) != rates[k, i]:
+            return False
+    return True
 
 
 @kernel
@@ -42,18 +51,14 @@ def largest_saturated(
         A repeated reading counts above the first, any reading from the second on [rad/s].
     """
     count, r, largest = rates.shape[0], before.shape[0], 0.0
-    for begun in (False, True):  # the coarse ones are known before the readings are judged
-        for i in range(3):
-            for k in range(count):
-                repeated = True
-                for j in range(1, r + 1):
-                    repeated &= (rates[k - j, i] if k >= j else before[r + k - j, i]) == rates[k, i]
-                if not begun:
-                    coarse[i] |= begins and repeated
-                    continue
-                size = abs(rates[k, i])
-                if size > largest and (size >= limit or (repeated and not coarse[i] and size > least)):
-                    largest = size
+    for i in range(3):
+        for k in range(count):
+            coarse[i] |= begins and _repeats(rates, before, k, i)
+        for k in range(count):
+            size = abs(rates[k, i])
+            if size > largest:
+                saturated = size > least and not coarse[i] and _repeats(rates, before, k, i)
+                largest = size if saturated or size >= limit else largest
     for j in range(r):
         at = count - r + j
         for i in range(3):
