@@ -279,6 +279,17 @@ class Row(Estimator):
             return instruments
         return instruments.without({name for sheet in instruments.values() for name in sheet.sources})
 
+    @property
+    def trained_on(self) -> Mapping[str, Any]:
+        """The record of the training of a piece that learned; empty if none did."""
+        pieces = (vars(self.solver).get(name) for name in self.recipe)
+        return next((record for piece in pieces if (record := getattr(piece, "trained_on", None))), {})
+
+    @property
+    def learned_from(self) -> Sequence[tuple[int, int]]:
+        """The random streams of the training voyages, as their record tells them."""
+        return [(int(first), int(last)) for first, last in self.trained_on.get("streams", ())]
+
     def reset(self, start: InitialState, instruments: Instruments) -> None:
         """Begin a run; UnsuitableScenario where the pieces lack an instrument."""
         if self.loose and (lack := lacking((_SOLUTIONS,), instruments)):

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from math import exp, log1p, sqrt
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -165,6 +165,11 @@ class Anfis(NoiseAdaptation):
         if self.parameters.features != features:
             raise ValueError(f"{path}: features should be {features!r}, not {self.parameters.features!r}")
         self.features, self.lowest, self.highest, self.level = features, lowest, highest, level
+
+    @property
+    def trained_on(self) -> dict[str, Any]:
+        """The record of the training."""
+        return self.parameters.record
 
     def reset(self, instruments: Instruments) -> None:
         """Begin a run. The network was trained with a model that does not use the IMU."""

@@ -17,13 +17,14 @@ from __future__ import annotations
 from functools import partial
 from math import asinh, exp, log, log1p, sqrt
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from simnav.compiled import helper, kernel
 from simnav.estimators.algebra.direct_update import normalised_square
 from simnav.estimators.models.filtering import Prediction, Readings
-from simnav.estimators.networks.file import Network
+from simnav.estimators.networks.file import Network, shipped
 from simnav.estimators.networks.groups import GROUPS, group_of
 from simnav.estimators.networks.recurrent import advance, fitting, flat
 from simnav.kernel_types import Vector
@@ -34,7 +35,7 @@ from .noise import NoiseAdaptation
 from .prediction import standardised
 from .rules import copied
 
-__all__ = ["MEMORY", "RECIPE", "VERSION", "LearnedNoise", "learned_noise", "set_by_network", "shipped"]
+__all__ = ["MEMORY", "RECIPE", "VERSION", "LearnedNoise", "learned_noise", "set_by_network"]
 
 RECIPE, VERSION = "noise-network", 1
 #: The inputs: three standardised components, size of the innovation, certainty of the prediction, time since the last
@@ -100,11 +101,6 @@ def learned_noise(
     return set_by_network(settings, memory, common, readings, k, prediction)
 
 
-def shipped() -> Path:
-    """The network that comes with simnav."""
-    return Path(__file__).parents[1] / "networks" / "noise_network.npz"
-
-
 class LearnedNoise(NoiseAdaptation):
     """The noise of each reading from a recurrent network, which sees the innovations (see the module).
 
@@ -113,7 +109,9 @@ class LearnedNoise(NoiseAdaptation):
     Parameters
     ----------
     file : str
-        Network of the recipe `simnav.estimators.training.noise_network`; empty: the one that comes with simnav.
+        Network of the recipe `simnav.estimators.training.noise_network`; empty: the one of ``budget``.
+    budget : int
+        Budget of training voyages of a network that comes with simnav: 1000 or 20000.
     highest : float
         Bound of the sigma, as a multiple of the datasheet's; the lowest is the datasheet's.
 
@@ -122,16 +120,16 @@ class LearnedNoise(NoiseAdaptation):
     NetworkError
         If the file cannot be used.
     ValueError
-        If the bound is below 1.
+        If the bound is below 1, or no network of this budget comes with simnav.
     """
 
     rule = learned_noise
     reported = "weight"
 
-    def __init__(self, file: str = "", highest: float = 30.0):
+    def __init__(self, file: str = "", highest: float = 30.0, budget: int = 1000):
         if not highest >= 1.0:
             raise ValueError(f"highest = {highest:g}: it must be at least 1")
-        path = Path(file).expanduser() if file else shipped()
+        path = Path(file).expanduser() if file else shipped(RECIPE, budget)
         self.use(Network.load(path, RECIPE, VERSION, partial(fitting, NUMBER_OF_INPUTS)))
         self.highest = highest
 
@@ -139,6 +137,11 @@ class LearnedNoise(NoiseAdaptation):
         """Take a network in place of that of the file."""
         self.network, self._weights = network, flat(network.arrays)
         self._units = len(network.arrays["output_weight"])
+
+    @property
+    def trained_on(self) -> dict[str, Any]:
+        """The record of the training."""
+        return self.network.record
 
     def in_scope(self, kind: str) -> bool:
         """Whether the network has learned from this kind of instrument."""

@@ -18,10 +18,12 @@ import numpy as np
 
 from simnav.types import Array
 
-__all__ = ["FORMAT", "Network", "NetworkError", "Shapes"]
+__all__ = ["BUDGETS", "FORMAT", "Network", "NetworkError", "Shapes", "shipped"]
 
 #: Version of the format; raised when it changes.
 FORMAT = 1
+#: A network that comes with simnav learned from so many voyages at most; there is one for each budget.
+BUDGETS = (1000, 20_000)
 
 
 #: From the arrays of a file to the shapes that they should have.
@@ -63,9 +65,9 @@ class Network:
         return sum(int(array.size) for array in self.arrays.values())
 
     @property
-    def learned_from(self) -> list[tuple[int, int]]:
-        """The random streams of the training voyages."""
-        return [(int(first), int(last)) for first, last in self.trained_on.get("streams", [])]
+    def record(self) -> dict[str, Any]:
+        """The record of the training, with the number of parameters, for a board."""
+        return {**self.trained_on, "parameters": self.parameters}
 
     def save(self, path: str | Path) -> None:
         """Write the file; OSError if it cannot be written."""
@@ -118,3 +120,14 @@ class Network:
                 raise NetworkError(f"{path}: {name} should hold finite numbers")
         own = {name: np.asarray(arrays[name], dtype=np.float64) for name in expected}
         return cls(recipe, version, own, kinds, record)
+
+
+def shipped(recipe: str, budget: int) -> Path:
+    """The file of a network that comes with simnav; ValueError if there is none of this budget.
+
+    >>> shipped("noise-network", 1000).name
+    'noise_network_1000.npz'
+    """
+    if budget not in BUDGETS:
+        raise ValueError(f"budget = {budget}: networks come with the budgets {' and '.join(map(str, BUDGETS))}")
+    return Path(__file__).with_name(f"{recipe.replace('-', '_')}_{budget}.npz")

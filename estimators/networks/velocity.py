@@ -15,7 +15,6 @@ outage may have any length. The recipe is `simnav.estimators.training.velocity_n
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path
 
 import numpy as np
 
@@ -182,8 +181,3 @@ class VelocityNetwork:
         output = np.empty(_OUTPUTS)
         advance(self._weights, inputs, self._memory, output)
         return output[:3], np.exp(np.clip(output[3:], LOWEST, HIGHEST))
-
-    @staticmethod
-    def shipped() -> Path:
-        """The network that comes with simnav."""
-        return Path(__file__).parent / "velocity_network.npz"

@@ -5,7 +5,7 @@ Each is ``ekf`` (``ship-ekf`` without an IMU) or the window of the robust rows, 
 
 from simnav.estimator import register
 from simnav.estimators.adaptations.learned_noise import LearnedNoise
-from simnav.estimators.composition import piece
+from simnav.estimators.composition import Row, piece
 from simnav.estimators.models.inertial import InertialModel
 from simnav.estimators.models.suitable import Suitable
 from simnav.estimators.solvers.iterated import poor_heading
@@ -15,13 +15,11 @@ from simnav.estimators.solvers.window import WindowEstimator
 from simnav.estimators.weightings.fault_isolation import FaultIsolation
 from simnav.estimators.weightings.learned_weights import LearnedWeights
 
-from .network_row import NetworkRow
-
-__all__ = ["BeamsEkf", "NetEkf", "NetFgo"]
+__all__ = ["BeamsEkf", "NetEkf", "NetEkf20000", "NetFgo", "NetFgo20000"]
 
 
 @register("net-ekf")
-class NetEkf(NetworkRow, solver=KalmanEstimator, model=Suitable, iteration=poor_heading, adaptation=LearnedNoise):
+class NetEkf(Row, solver=KalmanEstimator, model=Suitable, iteration=poor_heading, adaptation=LearnedNoise):
     """EKF whose measurement noise a recurrent network sets, from the innovations of all instruments.
 
     The network learned from 1000 voyages of six training families. In the standard result it has 0.69 times the error
@@ -45,7 +43,7 @@ class NetEkf(NetworkRow, solver=KalmanEstimator, model=Suitable, iteration=poor_
 
 @register("net-fgo")
 class NetFgo(
-    NetworkRow,
+    Row,
     solver=piece(WindowEstimator, defaults={"tolerance": 0.05}, every_sample=False),
     model=Suitable,
     weighting=LearnedWeights,
@@ -75,7 +73,7 @@ class NetFgo(
 
 @register("beams-ekf")
 class BeamsEkf(
-    NetworkRow,
+    Row,
     solver=MissingVelocityEstimator,
     model=InertialModel,
     velocity=PredictedVelocity,
@@ -94,3 +92,23 @@ class BeamsEkf(
     data-driven approach enhancing Doppler velocity log measurements for autonomous underwater vehicle navigation*,
     Engineering Applications of Artificial Intelligence 114, 2022.
     """
+
+
+@register("net-ekf-20000")
+class NetEkf20000(NetEkf, adaptation=piece(LearnedNoise, budget=20_000)):
+    """``net-ekf`` whose network learned from 20 000 voyages in place of 1000.
+
+    Source: as ``net-ekf``.
+    """
+
+    version = 1
+
+
+@register("net-fgo-20000")
+class NetFgo20000(NetFgo, weighting=piece(LearnedWeights, budget=20_000)):
+    """``net-fgo`` whose network learned from 5000 voyages in place of 300.
+
+    Source: as ``net-fgo``.
+    """
+
+    version = 1

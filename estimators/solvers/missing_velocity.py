@@ -12,14 +12,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
 from simnav.estimator import UnsuitableScenario
 from simnav.estimator.needs import IMU, Needs
 from simnav.estimators.models.suitable import ModelChoice
-from simnav.estimators.networks.file import Network
+from simnav.estimators.networks.file import Network, shipped
 from simnav.estimators.networks.velocity import (
     PERIOD,
     RECIPE,
@@ -43,7 +43,9 @@ class PredictedVelocity:
     Parameters
     ----------
     file : str
-        Network of the recipe `simnav.estimators.training.velocity_network`; empty: the one that comes with simnav.
+        Network of the recipe `simnav.estimators.training.velocity_network`; empty: the one of ``budget``.
+    budget : int
+        Budget of training voyages of a network that comes with simnav: 1000 or 20000.
     lasting : float
         Time for which the error of a prediction is the same [s].
 
@@ -52,15 +54,20 @@ class PredictedVelocity:
     NetworkError
         If the file cannot be used.
     ValueError
-        If the time is not positive.
+        If the time is not positive, or no network of this budget comes with simnav.
     """
 
-    def __init__(self, file: str = "", lasting: float = 10.0):
+    def __init__(self, file: str = "", lasting: float = 10.0, budget: int = 1000):
         if not lasting > 0.0:
             raise ValueError(f"lasting = {lasting:g}: it must be positive")
-        path = Path(file).expanduser() if file else VelocityNetwork.shipped()
+        path = Path(file).expanduser() if file else shipped(RECIPE, budget)
         self.network = Network.load(path, RECIPE, VERSION, shapes_of)
         self.lasting = lasting
+
+    @property
+    def trained_on(self) -> dict[str, Any]:
+        """The record of the training."""
+        return self.network.record
 
     def begin(self, sheet: Datasheet, start: InitialState, name: str) -> None:
         """Begin a run with a DVL; its predictions have the name of an instrument."""

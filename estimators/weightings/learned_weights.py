@@ -16,11 +16,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from math import asinh, log1p, sqrt
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from simnav.compiled import kernel
-from simnav.estimators.networks.file import Network
+from simnav.estimators.networks.file import Network, shipped
 from simnav.estimators.networks.groups import GROUPS, group_of
 from simnav.kernel_types import IntegerVector, Matrix, Vector
 from simnav.structures import length, structure
@@ -127,11 +128,6 @@ def inputs_of(factors: Factors, group: Mapping[str, int]) -> Array:
     return inputs
 
 
-def shipped() -> Path:
-    """The network that comes with simnav."""
-    return Path(__file__).parents[1] / "networks" / "factor_network.npz"
-
-
 class LearnedWeights(RobustWeighting):
     """Weights from a network, which sees the residuals of the whole window (see the module).
 
@@ -140,18 +136,27 @@ class LearnedWeights(RobustWeighting):
     Parameters
     ----------
     file : str
-        Network of the recipe `simnav.estimators.training.factor_network`; empty: the one that comes with simnav.
+        Network of the recipe `simnav.estimators.training.factor_network`; empty: the one of ``budget``.
+    budget : int
+        Budget of training voyages of a network that comes with simnav: 1000 or 20000.
 
     Raises
     ------
     NetworkError
         If the file cannot be used.
+    ValueError
+        If no network of this budget comes with simnav.
     """
 
-    def __init__(self, file: str = "", smallest: float = 1e-3):
+    def __init__(self, file: str = "", smallest: float = 1e-3, budget: int = 1000):
         super().__init__(smallest)
-        path = Path(file).expanduser() if file else shipped()
+        path = Path(file).expanduser() if file else shipped(RECIPE, budget)
         self.network = Network.load(path, RECIPE, VERSION, shapes_of)
+
+    @property
+    def trained_on(self) -> dict[str, Any]:
+        """The record of the training."""
+        return self.network.record
 
     def reset(self, instruments: Instruments) -> None:
         """Begin a run."""

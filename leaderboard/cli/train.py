@@ -65,6 +65,9 @@ def show(out: Output, request: TrainAnfisCommand) -> None:
         "simulator": simulator_version(),
         **{f"{kind}_seeds": [start, start + count[kind] - 1] for kind, start in first.items()},
         "fixes": len(data["training"].outputs),
+        "scenario": "three ships, five conditions of GNSS",
+        "voyages": seeds * len(scenarios()),
+        "streams": [[scenarios()[0].root(seed) for seed in (FIRST_TRAINING_SEED, FIRST_TRAINING_SEED + seeds - 1)]],
     })  # fmt: skip
     with mistakes(OSError):
         parameters.save(path)

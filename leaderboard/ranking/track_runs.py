@@ -16,7 +16,7 @@ from .learning import voyages_of
 from .runs import Runs, group
 from .scenario_runs import ScenarioRuns
 from .statistics import FIRST
-from .tracks import BUDGETS, LEARNED_ON, RECORDED, Track, budget_of, catalogued, title, tracks_of
+from .tracks import BUDGETS, LEARNED_ON, RECORDED, Track, catalogued, title, tracks_of
 from .troubles import trouble_of
 from .variants import families, surplus
 
@@ -107,15 +107,20 @@ def _most(by: Mapping[str, Runs]) -> int:
 
 
 def _learned(found: Sequence[TrackRuns]) -> Iterator[TrackRuns]:
-    """The runs of the rows that learned, by the number of voyages; a track of one row alone is left out."""
+    """The runs of the rows that learned from no more voyages than a budget.
+
+    A track of one row alone is left out, and one of the same rows as a smaller budget.
+    """
     parts = [runs for runs in found if runs.track.name in LEARNED_ON]
     tables = [table for runs in parts for table in runs.tables]
     cells = {name: cell for table in tables for name, cell in table.cells.items()}
-    rows = {name: budget_of(voyages_of(cell.runs.results)) for name, cell in cells.items()}
+    voyages = {name: voyages_of(cell.runs.results) for name, cell in cells.items()}
     references = {name for name, cell in cells.items() if cell.runs.reference}
-    for name in BUDGETS:
-        mine = {row for row, budget in rows.items() if budget == name}
-        if len(mine) > 1:
+    fewer: set[str] = set()
+    for name, budget in BUDGETS.items():
+        mine = {row for row, count in voyages.items() if count <= budget}
+        if len(mine) > 1 and mine != fewer:
+            fewer = mine
             apart = {row: family for runs in parts for row, family in runs.apart.items()}
             track = Track(name, title(name), parts[0].track.score, tuple(table.name for table in tables))
             yield TrackRuns(track, tables, apart).of_rows(mine | references)

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from simnav.scenario.catalogue import Header
 
 __all__ = [
-    "BUDGETS", "LEARNED_ON", "POST_PROCESSED", "RECORDED", "RECORDINGS", "SMOOTHED", "Track", "budget_of", "catalogued",
+    "BUDGETS", "LEARNED_ON", "POST_PROCESSED", "RECORDED", "RECORDINGS", "SMOOTHED", "Track", "catalogued",
     "is_derived", "title", "tracks_of",
 ]  # fmt: skip
 
@@ -112,15 +112,6 @@ def tracks_of(scenarios: Iterable[str], track: Mapping[str, str], score: str | N
 def is_derived(track: str) -> bool:
     """Whether a track is made of the scenarios of others."""
     return track == "post-processing" or track in BUDGETS
-
-
-def budget_of(voyages: int) -> str:
-    """The track of a row that learned from so many voyages; empty for more than the largest budget.
-
-    >>> budget_of(300), budget_of(1001), budget_of(10**6)
-    ('learned-1000', 'learned-20000', '')
-    """
-    return next((name for name, most in BUDGETS.items() if voyages <= most), "")
 
 
 def title(track: str) -> str:

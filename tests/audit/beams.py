@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from simnav.estimator import make
-from simnav.estimators.networks.file import Network
+from simnav.estimators.networks.file import Network, shipped
 from simnav.estimators.networks.velocity import RECIPE, VERSION, VelocityNetwork, shapes_of
 from simnav.estimators.training.recipe import FIRST_COMPARED, error_over_plain
 from simnav.estimators.training.velocity_network import FAMILIES, gather, lost
@@ -41,7 +41,7 @@ def held(path: Path) -> str:
 def measure(family: str) -> dict[str, float]:
     """The figures of a family."""
     recordings = list(voyages((family,), "validation", range(FIRST_COMPARED, FIRST_COMPARED + VOYAGES)))
-    network = Network.load(VelocityNetwork.shipped(), RECIPE, VERSION, shapes_of)
+    network = Network.load(shipped(RECIPE, 1000), RECIPE, VERSION, shapes_of)
     ratios = []
     for part in (part for voyage in gather(recordings) for part in voyage):
         asked, missing = VelocityNetwork(network), part.missing > 0

@@ -224,6 +224,9 @@ def test_seeds_of_training_and_validation_are_never_scored():
         record_ = Parameters.load(shipped(features)).record
         (first, last), (check, end) = record_["training_seeds"], record_["validation_seeds"]
         assert scored < FIRST_TRAINING_SEED == first <= last < FIRST_VALIDATION_SEED == check <= end
+        row = make("anfis-fgo", features=features)
+        assert row.learned_from == [(first, last)]
+        assert row.trained_on["voyages"] == len(scenarios()) * (last - first + 1)
         assert record_["command"] == f"simnav train anfis --features {features} --seeds {last - first + 1}"
     with pytest.raises(ValueError, match="seed 49 may be scored"):
         gather([49])

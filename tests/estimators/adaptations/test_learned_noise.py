@@ -17,7 +17,7 @@ from simnav.estimators.adaptations.learned_noise import (
     set_by_network,
 )
 from simnav.estimators.models.filtering import Prediction, room_for
-from simnav.estimators.networks.file import Network, NetworkError
+from simnav.estimators.networks.file import BUDGETS, Network, NetworkError
 from simnav.estimators.networks.recurrent import shapes
 from simnav.estimators.training.voyages import streams_of
 from simnav.estimators.weightings.learned_weights import LearnedWeights
@@ -88,18 +88,21 @@ def test_a_file_that_is_no_network_of_the_recipe_is_refused(tmp_path):
         LearnedWeights(path)
     with pytest.raises(EstimatorError, match=r"estimator 'net-fgo': .*n\.npz: recipe should be"):
         make("net-fgo", file=path)
+    with pytest.raises(EstimatorError, match="budget = 5: networks come with the budgets 1000 and 20000"):
+        make("net-fgo", budget=5)
     with pytest.raises(ValueError, match=r"highest = 0\.5: it must be at least 1"):
         LearnedNoise(path, highest=0.5)
 
 
 @pytest.mark.parametrize("name", ["net-ekf", "net-fgo"])
-def test_the_rows_run_and_say_what_they_learned_from(name):
-    row = make(name)
+@pytest.mark.parametrize("budget", BUDGETS)
+def test_the_networks_that_come_with_simnav_say_what_they_learned_from(name, budget):
+    row = make(name if budget == BUDGETS[0] else f"{name}-{budget}")
     trial = run_trial(row, recording())
     assert trial.status == "ok", trial.reason
     told = row.trained_on
     families, voyages = tuple(told["families"]), told["voyages"]
     assert row.learned_from == streams_of(families, "train", voyages)
-    assert voyages >= 100
-    assert told["parameters"] == row.network.parameters > 1000
+    assert budget / 4 <= voyages <= budget
+    assert told["parameters"] > 1000
     assert {"families", "seed", "epochs", "seconds_per_epoch", "versions"} <= set(told)

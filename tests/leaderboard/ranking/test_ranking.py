@@ -512,18 +512,22 @@ def test_a_board_says_what_its_ratios_are_to() -> None:
 
 
 def test_rows_that_learned_are_ranked_among_themselves_by_the_number_of_voyages():
-    """Those of one budget, on the scenarios of other tracks, which keep all their rows."""
+    """Those within a budget, on the scenarios of other tracks, which keep all their rows."""
     results = campaign(SIMPLE, seeds=12)
     for name, voyages in (("good", 1000), ("fair", 64), ("poor", 20_000), ("bad", 20_001)):
         results = changed(results, name, range(12), learned={"trained_on": {"voyages": voyages}})
     of = {"one-v1": "generalisation", "two-v1": "generalisation-no-imu"}
     found = rank(results, tracks=of)
-    assert [t.track for t in found.tracks] == ["generalisation", "generalisation-no-imu", "learned-1000"]
+    budgets = ["learned-1000", "learned-20000"]
+    assert [t.track for t in found.tracks] == ["generalisation", "generalisation-no-imu", *budgets]
     track = found.track("learned-1000")
     assert [(r.estimator, r.ranked) for r in track.rows] == [("good", True), ("fair", True), ("oracle", False)]
     assert track.rows[0].score == pytest.approx((1.2 * 2.2 / 2.0) ** 0.5, rel=0.05)
+    assert {r.estimator for r in found.track("learned-20000").rows} == {"good", "fair", "poor", "oracle"}
     assert {r.estimator for r in found.scenario("one-v1").rows} == set(SIMPLE["one-v1"])
     more = changed(results, "fair", range(12), learned={"trained_on": {"voyages": 1001}})
     assert [t.track for t in rank(more, tracks=of).tracks][2:] == ["learned-20000"]
     untold = changed(results, "fair", [3], learned={})
-    assert len(rank(untold, tracks=of).tracks) == 2
+    assert [t.track for t in rank(untold, tracks=of).tracks][2:] == ["learned-20000"]
+    few = changed(results, "poor", range(12), learned={})
+    assert [t.track for t in rank(few, tracks=of).tracks][2:] == ["learned-1000"]
