@@ -15,7 +15,7 @@ from simnav.estimators.solvers.window import WindowEstimator
 from simnav.estimators.weightings.fault_isolation import FaultIsolation
 from simnav.estimators.weightings.learned_weights import LearnedWeights
 
-__all__ = ["BeamsEkf", "NetEkf", "NetEkf20000", "NetFgo", "NetFgo20000"]
+__all__ = ["BeamsEkf", "BeamsEkf20000", "NetEkf", "NetEkf20000", "NetFgo", "NetFgo20000"]
 
 
 @register("net-ekf")
@@ -109,6 +109,16 @@ class NetFgo20000(NetFgo, weighting=piece(LearnedWeights, budget=20_000)):
     """``net-fgo`` whose network learned from 5000 voyages in place of 300.
 
     Source: as ``net-fgo``.
+    """
+
+    version = 1
+
+
+@register("beams-ekf-20000")
+class BeamsEkf20000(BeamsEkf, velocity=piece(PredictedVelocity, budget=20_000)):
+    """``beams-ekf`` whose network learned from 10 000 voyages in place of 600.
+
+    Source: as ``beams-ekf``.
     """
 
     version = 1

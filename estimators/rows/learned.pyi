@@ -12,7 +12,7 @@ from simnav.estimators.solvers.window import WindowEstimator
 from simnav.estimators.weightings.fault_isolation import FaultIsolation
 from simnav.estimators.weightings.learned_weights import LearnedWeights
 
-__all__ = ["BeamsEkf", "NetEkf", "NetEkf20000", "NetFgo", "NetFgo20000"]
+__all__ = ["BeamsEkf", "BeamsEkf20000", "NetEkf", "NetEkf20000", "NetFgo", "NetFgo20000"]
 
 @register("net-ekf")
 class NetEkf(Row, solver=KalmanEstimator, model=Suitable, iteration=poor_heading, adaptation=LearnedNoise):
@@ -94,4 +94,16 @@ class NetFgo20000(NetFgo, weighting=piece(LearnedWeights, budget=20_000)):
         tolerance: float = 0.05,
         iterations: int = 10,
         spacing: float = 0.5,
+    ) -> None: ...
+
+@register("beams-ekf-20000")
+class BeamsEkf20000(BeamsEkf, velocity=piece(PredictedVelocity, budget=20_000)):
+    version = 1
+    def __init__(
+        self,
+        *,
+        calibrate: bool = True,
+        file: str = "",
+        lasting: float = 10.0,
+        iterate_above_deg: float | None = None,
     ) -> None: ...

@@ -27,8 +27,8 @@ from simnav.trial import run_trial
 
 
 @cache
-def recording():
-    return record(load("gnss-noise-step").model_copy(update={"duration": 20.0, "faults": ()}), 1)
+def recording(scenario="gnss-noise-step"):
+    return record(load(scenario).model_copy(update={"duration": 20.0, "faults": ()}), 1)
 
 
 def constant(path, information, kinds):
@@ -94,11 +94,14 @@ def test_a_file_that_is_no_network_of_the_recipe_is_refused(tmp_path):
         LearnedNoise(path, highest=0.5)
 
 
-@pytest.mark.parametrize("name", ["net-ekf", "net-fgo"])
+@pytest.mark.parametrize(
+    ("name", "scenario"),
+    [("net-ekf", "gnss-noise-step"), ("net-fgo", "gnss-noise-step"), ("beams-ekf", "auv-soft-mud")],
+)
 @pytest.mark.parametrize("budget", BUDGETS)
-def test_the_networks_that_come_with_simnav_say_what_they_learned_from(name, budget):
+def test_the_networks_that_come_with_simnav_say_what_they_learned_from(name, scenario, budget):
     row = make(name if budget == BUDGETS[0] else f"{name}-{budget}")
-    trial = run_trial(row, recording())
+    trial = run_trial(row, recording(scenario))
     assert trial.status == "ok", trial.reason
     told = row.trained_on
     families, voyages = tuple(told["families"]), told["voyages"]
