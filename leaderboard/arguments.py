@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Callable, Collection, Iterable
+from collections.abc import Callable, Collection, Iterable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -24,6 +24,7 @@ __all__ = [
     "scenario_of",
     "scenarios_of",
     "seeds_of",
+    "split_names",
 ]
 
 
@@ -142,3 +143,13 @@ def seeds_of(seed: Any, runs: Any) -> range:
     if count > MOST_RUNS:
         raise RequestError(f"runs = {count}: at most {MOST_RUNS} are possible")
     return range(first, first + count)
+
+
+def split_names(given: Sequence[str] | str) -> tuple[str, ...]:
+    """Names, one by one; a text may hold several, separated by commas.
+
+    >>> split_names(["ekf, ukf", "sw-fgo"])
+    ('ekf', 'ukf', 'sw-fgo')
+    """
+    texts = [given] if isinstance(given, str) else given
+    return tuple(name.strip() for text in texts for name in text.split(",") if name.strip())

@@ -14,7 +14,7 @@ from simnav.leaderboard.campaign.request import EstimatorRequest, file_of
 from simnav.leaderboard.results.errors import RequestError, StoreError, mistakes
 from simnav.leaderboard.results.scratch import scratch
 
-from .arguments import absolute, results_of
+from .arguments import absolute, results_of, split_names
 from .calls import call, whole_number
 from .inspection import rank
 from .publishing_requests import (
@@ -267,7 +267,7 @@ def run_standard(request: StandardRequest) -> CampaignReport:
         begin(folder, standard.RESULTS if request.shipped is None else absolute(request.shipped))
         summary = run(
             read_profile(request.profile), folder, workers=whole_number("workers", request.workers, 1),
-            minutes=request.minutes, force=request.force, shard=request.shard, progress=request.progress,
+            minutes=request.minutes, force=split_names(request.force), shard=request.shard, progress=request.progress,
         )  # fmt: skip
     found = results_of(folder)
     return CampaignReport(found, rank(found, requested=requested.read(folder)), summary)

@@ -18,7 +18,7 @@ from simnav.leaderboard.campaign.suitability import require_suitable, with_long_
 from simnav.leaderboard.results.errors import RequestError, StoreError, mistakes
 from simnav.leaderboard.results.scratch import scratch
 
-from .arguments import absolute, results_of, scenario_of, scenarios_of, seeds_of
+from .arguments import absolute, results_of, scenario_of, scenarios_of, seeds_of, split_names
 from .baselines import baselines_or
 from .calls import call, whole_number
 from .estimator_output import first_lines
@@ -202,7 +202,7 @@ def campaign(request: CampaignRequest) -> CampaignReport:
     tracks: dict[str, str] = {}
     end = None if request.minutes is None else time.monotonic() + 60.0 * request.minutes
     asked = [requests(estimators, request.parameters) for _, estimators, _ in parts]
-    request = replace(request, force=_names(request.force))
+    request = replace(request, force=split_names(request.force))
     require_known(request.force, asked)
     for (scenarios, _, runs), everyone in zip(parts, asked, strict=True):
         chosen = scenarios_of(scenarios, optional=request.profile is not None)
@@ -393,16 +393,6 @@ def _folder(keep: str | os.PathLike[str] | None) -> Iterator[Path]:
         return
     with scratch("evaluate") as home:
         yield home / "results"
-
-
-def _names(given: Sequence[str] | str) -> tuple[str, ...]:
-    """Names, one by one; a text may hold several, separated by commas.
-
-    >>> _names(["ekf, ukf", "sw-fgo"])
-    ('ekf', 'ukf', 'sw-fgo')
-    """
-    texts = [given] if isinstance(given, str) else given
-    return tuple(name.strip() for text in texts for name in text.split(",") if name.strip())
 
 
 def _run(

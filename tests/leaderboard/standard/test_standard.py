@@ -118,7 +118,7 @@ def test_an_edit_changes_nothing_and_a_raised_version_runs_that_row_only(
     assert not publishing.check_standard(home / "shipped")
     same = run(home, tmp_path / "edited")
     assert (same.summary.skipped, same.summary.computed, same.summary.left) == (4, 0, 0)
-    anew = run(home, tmp_path / "edited", force=["gnss-only"], minutes=0.0)
+    anew = run(home, tmp_path / "edited", force=["gnss-only, gnss-only"], minutes=0.0)  # names with a comma
     assert (anew.summary.skipped, anew.summary.left) == (2, 2)
     monkeypatch.setattr(find("gnss-only"), "version", 2)
     found = publishing.check_standard(home / "shipped")
