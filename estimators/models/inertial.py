@@ -136,6 +136,7 @@ class InertialModel(FlatStateModel):
     delayed: bool = False
     state = ("position", "velocity", "dcm", "bias", "calibration")
     memory = ("numbers",)
+    constant = ("instruments", "bias_at", "scale_at", "uncalibrated", "own", "many", "_many_of", "_beyond", "_fused")
     attitude_at = ERROR.attitude
     equations = INERTIAL_FUNCTIONS
     moving = MotionStates(ERROR.position, ERROR.attitude, ERROR.attitude, ERROR.gyroscope_bias)
