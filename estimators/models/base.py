@@ -104,7 +104,7 @@ class ErrorModel(ABC):
         memo[id(self)] = made
         own = vars(self)
         memo |= {id(own[name]): own[name] for name in self.constant if name in own}
-        state = copy.deepcopy(self.__getstate__(), memo)
+        state: Any = copy.deepcopy(self.__getstate__(), memo)
         if hasattr(made, "__setstate__"):
             made.__setstate__(state)
         elif state is not None:
