@@ -222,9 +222,7 @@ class SolutionSeparation(Solver):
         self._names = [name for name, sheet in instruments.items() if self._main.model.observes(sheet)]
         self._components = {name: len(KINDS[instruments[name].kind].errors) for name in self._names}
         begun = self._filter()  # to copy it takes a fifth of the time
-        self._pairs = {
-            name: [Hypothesis(name, copy.deepcopy(begun), start.time) for _ in range(2)] for name in self._names
-        }
+        self._pairs = {n: [Hypothesis(n, copy.deepcopy(begun), start.time) for _ in range(2)] for n in self._names}
         hypotheses = len(self._names) + 1
         self._test = SeparationTest(self.false_alarm, len(self._names), self._inertial)
         self._quiet = -float(ndtri(0.25 * self.risk / hypotheses))
