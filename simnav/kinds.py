@@ -567,8 +567,10 @@ class Datasheet:
             raise ValueError(f"unknown kind of instrument {self.kind!r}; there are: {', '.join(KINDS)}")
         d = len(KINDS[self.kind].errors)
         for name in ("sigma", "bias", "bias_instability"):
-            value = np.broadcast_to(np.asarray(getattr(self, name), dtype=np.float64), (d,)).copy()
-            object.__setattr__(self, name, value)
+            value = np.asarray(getattr(self, name), dtype=np.float64)
+            if value.shape != (d,):  # else it is left out: a copy of a datasheet is made often, and this takes long
+                value = np.broadcast_to(value, (d,))
+            object.__setattr__(self, name, value.copy())
 
     @property
     def role(self) -> Role:

@@ -53,8 +53,14 @@ def pytest_collect_file(file_path: Path) -> Generator[None, list[pytest.Collecto
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Tests that wait for other processes come first: other workers compute meanwhile, and nobody waits at the end."""
-    items.sort(key=lambda item: item.path.parent.name not in ("campaign", "hostile"))
+    """The longest test comes first, so that nobody waits for it at the end.
+
+    Tests that wait for other processes come next: other workers compute meanwhile.
+    """
+    folders = "campaign", "hostile"
+    items.sort(
+        key=lambda item: 0 if item.path.name == "test_types.py" else 1 if item.path.parent.name in folders else 2
+    )
 
 
 def pytest_collection_finish() -> None:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import copy
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
-from typing import ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
@@ -93,6 +94,22 @@ class ErrorModel(ABC):
     attitude_at: ClassVar[int | None] = None
     #: The states whose covariance is inflated where the motion is wrong.
     moving: ClassVar[MotionStates] = ALL_STATES
+    #: Names of attributes that do not change in a run, and that copies have in common: an estimator that takes late
+    #: readings is copied in each step.
+    constant: ClassVar[tuple[str, ...]] = ()
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
+        """A copy, with what is `constant` in common."""
+        made = object.__new__(type(self))
+        memo[id(self)] = made
+        own = vars(self)
+        memo |= {id(own[name]): own[name] for name in self.constant if name in own}
+        state: Any = copy.deepcopy(self.__getstate__(), memo)
+        if hasattr(made, "__setstate__"):
+            made.__setstate__(state)
+        elif state is not None:
+            vars(made).update(state)
+        return made
 
     @property
     def needs(self) -> Needs:

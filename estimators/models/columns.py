@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Callable
 from typing import Any, TypeVar
 
@@ -79,6 +80,14 @@ class Columns(dict[str, Any]):
 
     def __reduce__(self) -> tuple[Any, ...]:
         return _restored, (vars(self),)  # copies have views of their own
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Columns:
+        """A copy of the rows. Those that are free, the most and the largest part, are zero in it."""
+        for column in self._columns.values():
+            if id(column) not in memo:
+                memo[id(column)] = made = np.zeros(column.shape, column.dtype)
+                made[self.first : self.last] = column[self.first : self.last]
+        return _restored(copy.deepcopy(vars(self), memo))
 
     def newest(self, name: str) -> Any:
         """A view of the last row's entry in a column."""

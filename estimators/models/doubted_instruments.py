@@ -233,6 +233,8 @@ def _with_biases(instruments: Instruments) -> Instruments:
 class _Inertial(DoubtingModel, InertialModel):
     """The inertial model."""
 
+    constant = (*InertialModel.constant, "places", "groups", "stated_noise")
+
     def begin(self, start: InitialState, instruments: Instruments) -> Array:
         """Set the state; UnsuitableScenario without an IMU."""
         covariance = super().begin(start, _with_biases(instruments))

@@ -42,6 +42,10 @@ class Aid(NamedTuple):
     bias_at: int
     scale_at: int
 
+    def __deepcopy__(self, memo: object) -> Aid:
+        """Itself: it never changes, and an estimator that takes late readings is copied in each step."""
+        return self
+
 
 class AidTable(NamedTuple):
     """The instruments of a filter, one in each row.
@@ -65,6 +69,10 @@ class AidTable(NamedTuple):
     scale_at: IntegerVector
     lever_arm: Matrix
     noise: Matrix
+
+    def __deepcopy__(self, memo: object) -> AidTable:
+        """Itself: it never changes, and an estimator that takes late readings is copied in each step."""
+        return self
 
 
 def aid_table(aids: Sequence[Aid | None], components: Sequence[int], noise: Sequence[Array]) -> AidTable:

@@ -136,6 +136,9 @@ class InertialModel(FlatStateModel):
     delayed: bool = False
     state = ("position", "velocity", "dcm", "bias", "calibration")
     memory = ("numbers",)
+    constant: ClassVar[tuple[str, ...]] = (
+        "instruments", "bias_at", "scale_at", "uncalibrated", "own", "many", "_many_of", "_beyond", "_fused",
+    )  # fmt: skip
     attitude_at = ERROR.attitude
     equations = INERTIAL_FUNCTIONS
     moving = MotionStates(ERROR.position, ERROR.attitude, ERROR.attitude, ERROR.gyroscope_bias)

@@ -257,24 +257,17 @@ class MultipleHypothesis(Solver):
     def reset(self, start: InitialState, instruments: Instruments) -> None:
         """Begin a run; UnsuitableScenario if the model lacks an instrument."""
         instruments = by_source(instruments, self._choice, self.label)
-
-        def made(own: InitialState) -> HypothesisFilter:
-            one = HypothesisFilter(copy.deepcopy(self._choice))
-            one.row, one.reports_all = self.label, self.reports_all
-            one.reset(own, instruments)
-            return one
-
+        self._start, self._instruments = start, instruments
         starts = starts_by_heading(start, NARROW, SPACING)
         wrong = [(uncertain_start(start, attitude=False), WRONG_POSITION)]
         if len(starts) == 1:
             wrong += [(uncertain_start(start), WRONG_START)]
         right = 1.0 - sum(probability for _, probability in wrong)
-        self._bank = [_Hypothesis({}, made(own), log(right * weight)) for own, weight in starts]
+        self._bank = [_Hypothesis({}, self._made(own), log(right * weight)) for own, weight in starts]
         first = self._bank[0].filter
-        self._hypotheses = [*self._bank, *(_Hypothesis({}, made(own), log(weight)) for own, weight in wrong)]
-        # One more than may stay: the last one is begun before it is known which is dropped.
-        self._spare = [made(start) for _ in range(self.filters - 2)]
-        self._anchor, self._sound = (_Hypothesis({}, made(start), 0.0) for _ in range(2))
+        self._hypotheses = [*self._bank, *(_Hypothesis({}, self._made(own), log(weight)) for own, weight in wrong)]
+        self._spare: list[HypothesisFilter] = []  # of hypotheses that were dropped
+        self._anchor, self._sound = (_Hypothesis({}, self._made(start), 0.0) for _ in range(2))
         for anchor in (self._anchor, self._sound):
             anchor.filter.take_over(first)
         self._groups: Mapping[str, tuple[str, ...]] = first.model.groups
@@ -292,6 +285,13 @@ class MultipleHypothesis(Solver):
         self._gross, self._owners = chi_square_limits(GROSS), owners(instruments)
         self._blank = {f"{label}.{name}": nan for name in first.names for label in ("innovation", "nis")}
         self._blank |= {f"since.{name}": nan for names in self._groups.values() for name in names}
+
+    def _made(self, start: InitialState) -> HypothesisFilter:
+        """A filter that begins the run."""
+        one = HypothesisFilter(copy.deepcopy(self._choice))
+        one.row, one.reports_all = self.label, self.reports_all
+        one.reset(start, self._instruments)
+        return one
 
     @property
     def best(self) -> HypothesisFilter:
@@ -416,7 +416,8 @@ class MultipleHypothesis(Solver):
         well : str
             The group of instruments that is well again.
         """
-        anchor, period, own = anchor or self._anchor, period or self._period, self._spare.pop()
+        anchor, period = anchor or self._anchor, period or self._period
+        own = self._spare.pop() if self._spare else self._made(self._start)
         own.take_over(anchor.filter)
         weight = anchor.weight + log(min(prior, 0.5)) - period.taken
         doubts, onsets = dict(anchor.doubts), {0}

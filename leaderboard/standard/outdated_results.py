@@ -14,9 +14,9 @@ from typing import Any, Literal
 
 from simnav.leaderboard.ranking.superseded import version_of
 from simnav.leaderboard.results import store
-from simnav.leaderboard.results.catalogued import catalogued_scenario
 from simnav.leaderboard.results.provenance import BENCHMARK
 from simnav.leaderboard.results.result import Result
+from simnav.scenario import headers
 from simnav.simulation.version import SIMULATOR_VERSION
 
 __all__ = ["Change", "Outdated", "changes", "outdated"]
@@ -104,27 +104,17 @@ def changes(results: Iterable[Result]) -> dict[tuple[str, str], Change]:
 
     The version of an estimator that does not come with simnav is not compared.
     """
-    scenarios: dict[str, bool] = {}
+    there = {header.id for header in headers()}
     versions: dict[str, int | None] = {}
     found: dict[tuple[str, str], Change] = {}
     for result in results:
         scenario, label = result.scenario, result.estimator
-        if scenario not in scenarios:
-            scenarios[scenario] = _is_there(scenario)
         if label not in versions:
             versions[label] = version_of(label.partition("(")[0])
-        if not scenarios[scenario]:
+        if scenario not in there:
             found[scenario, label] = "gone"
         elif result.simulator_version != SIMULATOR_VERSION:
             found[scenario, label] = "simulator"
         elif versions[label] not in (None, result.estimator_version):
             found.setdefault((scenario, label), "row")
     return found
-
-
-def _is_there(scenario: str) -> bool:
-    """Whether the catalogue has a scenario in this version."""
-    try:
-        return catalogued_scenario(scenario).id == scenario
-    except (ValueError, OSError):
-        return False
