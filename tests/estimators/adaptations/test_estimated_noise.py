@@ -117,7 +117,7 @@ def test_each_innovation_has_its_own_prediction():
     for newest in (True, False):
         adaptation = InnovationBased(**window, newest=newest)
         adaptation.reset(GNSS)
-        found[newest] = np.diag([adaptation.estimate(i) for i in given][-1])
+        found[newest] = np.diag([adaptation.choose(i) for i in given][-1])
     variances = [i.predicted[0, 0] for i in given[200:]]
     np.testing.assert_allclose(found[True] - found[False], np.mean(variances) - variances[-1])
     assert np.mean(variances) - variances[-1] > 0.5
