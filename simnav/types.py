@@ -10,7 +10,7 @@ attitude error [rad], the rotation vector of C_est C_true^T resolved in north-ea
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Literal, NamedTuple
 
@@ -159,6 +159,10 @@ class Instruments(Mapping[str, Datasheet]):
         """The instruments but those of the given names; itself if it has none of them."""
         kept = [a for name, a in self._aids.items() if name not in names]
         return self if len(kept) == len(self._aids) else Instruments(kept, self.imu, self.step)
+
+    def changed(self, change: Callable[[Datasheet], Datasheet]) -> Instruments:
+        """The instruments, with another datasheet for each."""
+        return Instruments([change(a) for a in self._aids.values()], self.imu, self.step)
 
     def of_kind(self, *kinds: str) -> list[Datasheet]:
         """The datasheets of the given kinds, in the scenario's order."""

@@ -9,7 +9,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from simnav.compiled import helper, kernel
-from simnav.estimators.algebra.direct_update import normalised_square
+from simnav.estimators.algebra.direct_update import normalised_square, posterior
 from simnav.estimators.models.filtering import Prediction, Readings
 from simnav.kernel_types import Vector
 from simnav.structures import filled, structure
@@ -17,7 +17,8 @@ from simnav.types import Array, Instruments
 
 from .base import Innovation
 from .inflation import inflate_all, inflate_moving
-from .noise import NoiseAdaptation, Posterior
+from .noise import NoiseAdaptation
+from .prediction import limited_inflation
 from .robust import igg3
 from .rules import copied
 
@@ -28,7 +29,7 @@ Factor = Literal["two-segment", "three-segment", "exponential"]
 
 
 @helper
-def two_segment(s: float, c0: float, c1: float = 0.0) -> float:
+def two_segment(s: float, c0: float, c1: float = 0.0, two: float = 2.0) -> float:
     """Eq. 34: 1 up to c0, then ``c0/s``; continuous.
 
     Examples
@@ -97,71 +98,30 @@ def _divide(prediction: Prediction, statistic: float, factor: float, smallest: f
     return factor
 
 
-@kernel(passed=True)
-def whitened_two_segment(
-    settings: Vector, memory: Vector, common: Vector, readings: Readings, k: int, prediction: Prediction
-) -> float:
-    """Divide R by the factor of eq. 34 for the whitened residual; the result is that of `_divide`."""
-    own, statistic = settings.view(SETTINGS)[0], _whitened(prediction)
-    return _divide(prediction, statistic, two_segment(statistic, own.c0, own.c1), float(own.smallest))
+def _rule(name: str, statistic: Callable[[Prediction], float], factor: Callable[..., float]) -> Callable[..., float]:
+    """The rule that divides R by a factor of the residual statistic, under the name that it has here."""
+
+    def divided(
+        settings: Vector, memory: Vector, common: Vector, readings: Readings, k: int, prediction: Prediction
+    ) -> float:
+        """Divide R; the result is that of `_divide`."""
+        own, found = settings.view(SETTINGS)[0], statistic(prediction)
+        return _divide(prediction, found, factor(found, own.c0, own.c1, own.two), float(own.smallest))
+
+    divided.__name__ = divided.__qualname__ = name
+    return kernel(passed=True)(divided)
 
 
-@kernel(passed=True)
-def whitened_three_segment(
-    settings: Vector, memory: Vector, common: Vector, readings: Readings, k: int, prediction: Prediction
-) -> float:
-    """Divide R by the factor of eq. 35 for the whitened residual; the result is that of `_divide`."""
-    own, statistic = settings.view(SETTINGS)[0], _whitened(prediction)
-    return _divide(prediction, statistic, three_segment(statistic, own.c0, own.c1, own.two), float(own.smallest))
-
-
-@kernel(passed=True)
-def whitened_exponential(
-    settings: Vector, memory: Vector, common: Vector, readings: Readings, k: int, prediction: Prediction
-) -> float:
-    """Divide R by the factor of eq. 36 for the whitened residual; the result is that of `_divide`."""
-    own, statistic = settings.view(SETTINGS)[0], _whitened(prediction)
-    return _divide(prediction, statistic, exponential(statistic, own.c0, own.c1, own.two), float(own.smallest))
-
-
-@kernel(passed=True)
-def printed_two_segment(
-    settings: Vector, memory: Vector, common: Vector, readings: Readings, k: int, prediction: Prediction
-) -> float:
-    """Divide R by the factor of eq. 34 for the residual as printed; the result is that of `_divide`."""
-    own, statistic = settings.view(SETTINGS)[0], _printed(prediction)
-    return _divide(prediction, statistic, two_segment(statistic, own.c0, own.c1), float(own.smallest))
-
-
-@kernel(passed=True)
-def printed_three_segment(
-    settings: Vector, memory: Vector, common: Vector, readings: Readings, k: int, prediction: Prediction
-) -> float:
-    """Divide R by the factor of eq. 35 for the residual as printed; the result is that of `_divide`."""
-    own, statistic = settings.view(SETTINGS)[0], _printed(prediction)
-    return _divide(prediction, statistic, three_segment(statistic, own.c0, own.c1, own.two), float(own.smallest))
-
-
-@kernel(passed=True)
-def printed_exponential(
-    settings: Vector, memory: Vector, common: Vector, readings: Readings, k: int, prediction: Prediction
-) -> float:
-    """Divide R by the factor of eq. 36 for the residual as printed; the result is that of `_divide`."""
-    own, statistic = settings.view(SETTINGS)[0], _printed(prediction)
-    return _divide(prediction, statistic, exponential(statistic, own.c0, own.c1, own.two), float(own.smallest))
-
+whitened_two_segment = _rule("whitened_two_segment", _whitened, two_segment)
+whitened_three_segment = _rule("whitened_three_segment", _whitened, three_segment)
+whitened_exponential = _rule("whitened_exponential", _whitened, exponential)
+printed_two_segment = _rule("printed_two_segment", _printed, two_segment)
+printed_three_segment = _rule("printed_three_segment", _printed, three_segment)
+printed_exponential = _rule("printed_exponential", _printed, exponential)
 
 #: The rules of the residual statistic, by its form and by the factor function.
-WHITENED = {
-    "two-segment": whitened_two_segment,
-    "three-segment": whitened_three_segment,
-    "exponential": whitened_exponential,
-}
-PRINTED = {
-    "two-segment": printed_two_segment,
-    "three-segment": printed_three_segment,
-    "exponential": printed_exponential,
-}
+WHITENED = dict(zip(FACTORS, (whitened_two_segment, whitened_three_segment, whitened_exponential), strict=True))
+PRINTED = dict(zip(FACTORS, (printed_two_segment, printed_three_segment, printed_exponential), strict=True))
 
 
 class _Preset(NamedTuple):
@@ -284,25 +244,28 @@ class AdaptiveFactor(NoiseAdaptation):
             noise = innovation.noise / factor
         if factor == 0.0:  # singular: the solver leaves it out
             return innovation.noise
-        if self.target == "P":
-            self.inflation = self.prediction.limited(1.0 / factor, innovation)
+        P = innovation.covariance
+        if self.target == "P" and P is not None:
+            self.inflation = limited_inflation(1.0 / factor, P, self.prediction.tested(len(P)).first)
         self.report_number(innovation.measurement.instrument, factor)
         return innovation.noise if self.target == "P" or factor == 1.0 else noise
 
     def _statistic(self, innovation: Innovation) -> float:
-        m, posterior = len(innovation.residual), Posterior(innovation, innovation.noise)
+        m = len(innovation.residual)
+        residual, predicted = np.empty(m), np.empty((m, m))
+        posterior(innovation.residual, innovation.predicted, innovation.noise, residual, predicted)
         # y = S^-1 v = R^-1 e, and S^-1 H P H' = R^-1 H P+ H'
-        solved = np.linalg.solve(innovation.noise, np.column_stack((posterior.residual, posterior.predicted)))
+        solved = np.linalg.solve(innovation.noise, np.column_stack((residual, predicted)))
         y = solved[:, 0]
         if self.statistic == "discrepancy" and self.as_published:
             if innovation.covariance is None or innovation.cross is None:
                 raise ValueError("the printed discrepancy (eq. 30) needs P and P H' in the innovation")
             return float(np.linalg.norm(innovation.cross @ y) / sqrt(float(np.trace(innovation.covariance))))
         share = min(max(float(np.trace(solved[:, 1:])), 1e-9), m - 1e-9)
-        moved = max(float((innovation.residual - posterior.residual) @ y), 0.0) / share
+        moved = max(float((innovation.residual - residual) @ y), 0.0) / share
         if self.statistic == "discrepancy":
             return sqrt(moved)
-        left = max(float(posterior.residual @ y), 1e-12) / (m - share)
+        left = max(float(residual @ y), 1e-12) / (m - share)
         if self.as_published:
             return moved / left
         name = innovation.measurement.instrument

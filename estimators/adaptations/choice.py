@@ -123,8 +123,6 @@ def choose_noise(choice: Choice, covariance: Matrix, readings: Readings, k: int,
     if tested.tests:
         judged = judge_prediction(innovation, predicted, nominal, i, readings.time[k], tested)
         wrong = judged.wrong
-        if judged.passed:
-            tested.blamed[0] = 0.0
         if judged.disturbed and choice.inflates_disturbed:
             readings.inflation[k] = joint_inflation(innovation, predicted, nominal, covariance, tested)
     readings.wrong[k] = wrong

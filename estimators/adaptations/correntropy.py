@@ -14,7 +14,7 @@ from simnav.kernel_types import Vector
 from simnav.structures import filled, structure
 from simnav.types import Array
 
-from .noise import WeightedNoise
+from .noise import NoiseAdaptation
 
 __all__ = ["MaximumCorrentropy", "from_prediction", "from_update"]
 
@@ -66,7 +66,7 @@ def from_prediction(
     return _iterate(settings, prediction, prediction.innovation.copy())
 
 
-class MaximumCorrentropy(WeightedNoise):
+class MaximumCorrentropy(NoiseAdaptation):
     """Weights ``exp(-e^2 / (2 bandwidth^2))`` of the residuals after the update, by fixed-point iteration.
 
     Chen, Liu, Zhao and Principe (2017), "Maximum correntropy Kalman filter", Automatica 76, algorithm 1. A residual is
@@ -92,6 +92,7 @@ class MaximumCorrentropy(WeightedNoise):
     """
 
     rule = from_update
+    reported = "weight"
 
     def __init__(
         self,

@@ -387,7 +387,7 @@ class InnovationBased(EstimatedNoise):
         """As `EstimatedNoise.begun`: an empty window."""
         return np.concatenate([filled(MEMORY), np.zeros(round(self.longest * longer) * _width(m))])
 
-    def estimate(self, innovation: Innovation) -> Array:
+    def choose(self, innovation: Innovation) -> Array:
         """The bounded estimate of a full matrix, or the nominal noise."""
         name, nominal, noise = innovation.measurement.instrument, innovation.noise, np.empty_like(innovation.noise)
         residuals = self.rule is from_residuals

@@ -1,4 +1,4 @@
-"""Base classes of adaptations that change the noise: report of the sigma in use, bounds of an estimate, posterior."""
+"""Base classes of adaptations that change the noise: report of the sigma in use, bounds of an estimate."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from simnav.compiled import ready
-from simnav.estimators.algebra.direct_update import posterior
 from simnav.estimators.models.filtering import Prediction, Readings, room_for
 from simnav.types import KINDS, Array, Instruments
 
@@ -17,52 +16,12 @@ from .base import Adaptation, Innovation
 from .choice import Choice, choose_noise
 from .noise_report import NoiseReport
 from .prediction import PredictionTest
-from .scaled_noise import bound, scale
+from .scaled_noise import bound
 
-__all__ = ["EstimatedNoise", "NoiseAdaptation", "Posterior", "Scope", "WeightedNoise", "as_prediction", "scaled"]
+__all__ = ["EstimatedNoise", "NoiseAdaptation", "Scope", "as_prediction"]
 
 Scope = Literal["fixes", "all"]
 _NO_COVARIANCE = _NO_CROSS = np.empty((0, 0))
-
-
-class Posterior:
-    """The result of an update with noise R, in the m components of the measurement.
-
-    See `posterior`.
-
-    Parameters
-    ----------
-    innovation : Innovation
-        The innovation, with the covariance of its prediction.
-    noise : (m, m) array
-        Covariance R of the measurement noise in the update.
-
-    Attributes
-    ----------
-    nis : float
-        Normalised innovation squared; -1 if S is singular, and then there is no update.
-    residual : (m,) array
-        Measurement minus its prediction after the update.
-    predicted : (m, m) array
-        H P+ H', the covariance of the prediction after the update.
-    """
-
-    __slots__ = ("nis", "predicted", "residual")
-
-    def __init__(self, innovation: Innovation, noise: Array):
-        d = len(innovation.residual)
-        self.residual, self.predicted = np.empty(d), np.empty((d, d))
-        self.nis: float = posterior(innovation.residual, innovation.predicted, noise, self.residual, self.predicted)
-
-
-def scaled(noise: Array, factors: list[float]) -> Array:
-    """A covariance of up to three components with variance i times ``factors[i]`` and the same correlations."""
-    if min(factors) == max(factors) == 1.0:
-        return noise
-    product: Array = np.empty((len(noise), len(noise)))
-    first, second, third = (*factors, 1.0, 1.0)[:3]
-    scale(noise, first, second, third, product)
-    return product
 
 
 def as_prediction(innovation: Innovation, noise: Array) -> Prediction:
@@ -100,7 +59,7 @@ class NoiseAdaptation(Adaptation):
     def __init_subclass__(cls) -> None:
         super().__init_subclass__()
         own = vars(cls)
-        if own.keys() & {"rule", "adapt", "choose", "estimate"}:
+        if own.keys() & {"rule", "adapt", "choose"}:
             cls.in_its_own_way = "rule" not in own
         if isinstance(rule := own.get("rule"), FunctionType):
             cls.rule = staticmethod(rule)  # a plain function would be a method of the instance
@@ -209,15 +168,8 @@ class NoiseAdaptation(Adaptation):
         return self.report.diagnostics()
 
 
-class WeightedNoise(NoiseAdaptation):
-    """Base of robust rules: the nominal noise divided by weights, of which the smallest is reported."""
-
-    reported = "weight"
-
-
 class EstimatedNoise(NoiseAdaptation):
-    """Base class of adaptations that estimate R and keep it within bounds. A subclass says its rule,
-    or defines `estimate` in Python.
+    """Base class of adaptations that estimate R and keep it within bounds.
 
     An innovation has the covariance ``H P H' + R``. It contains little information on R if the prediction is less
     certain than the measurement: after a start with a poor heading, in an outage, or with positions of centimetre
@@ -257,17 +209,9 @@ class EstimatedNoise(NoiseAdaptation):
         """As `NoiseAdaptation.ruled`; a full matrix is bounded by NumPy."""
         return super().ruled and not self.full
 
-    def estimate(self, innovation: Innovation) -> Array:
-        """The (m, m) estimate of the noise within the bounds, including this innovation; where no rule does it."""
-        raise NotImplementedError(f"{type(self).__name__} has neither a rule nor a method estimate")
-
     def in_scope(self, kind: str) -> bool:
         """Whether the noise of a kind of instrument is estimated, by the scope."""
         return self.scope == "all" or KINDS[kind].role == "fix"
-
-    def choose(self, innovation: Innovation) -> Array:
-        """The estimate."""
-        return self.estimate(innovation)
 
     def bounded(self, estimate: Array, nominal: Array) -> Array:
         """Limit an estimate of R, which may be indefinite, to the bounds; only its diagonal, if not ``full``.

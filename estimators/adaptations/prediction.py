@@ -22,8 +22,6 @@ from simnav.kernel_types import FlagMatrix, FlagVector, IntegerVector, Matrix, V
 from simnav.records import Record
 from simnav.types import Instruments
 
-from .base import Innovation
-
 __all__ = ["Judgement", "PredictionTest", "TestedPrediction", "joint_inflation", "judge_prediction", "standardised"]
 
 
@@ -116,13 +114,10 @@ class Judgement(NamedTuple):
         Whether the prediction is taken as wrong.
     disturbed : bool
         Whether the joint test has found that: the motion is taken as disturbed.
-    passed : bool
-        Whether the innovation has passed its part of the joint test.
     """
 
     wrong: bool
     disturbed: bool
-    passed: bool
 
 
 @helper
@@ -178,15 +173,15 @@ def judge_prediction(
     if i < 0 or (t.group[i] < 0 and not t.persistence[i]):
         for k in range(t.heard.size):
             if time - t.wrong[k] <= t.heard[k]:
-                return Judgement(True, False, False)
-        return Judgement(False, False, False)
+                return Judgement(True, False)
+        return Judgement(False, False)
     u0, u1, u2 = standardised(residual, predicted, noise)
     square, limit = u0 * u0 + u1 * u1 + u2 * u2, t.limits[residual.size]
-    disturbed, passed = False, False
+    disturbed = False
     if t.group[i] >= 0:
         t.tested[i] = time
         if square <= limit:
-            t.failures[i], passed = 0.0, True
+            t.failures[i] = t.blamed[0] = 0.0
         else:
             disturbed = _fails_jointly(i, time, t)
     wrong = disturbed
@@ -194,12 +189,15 @@ def judge_prediction(
         add_innovation(t.courses, i, u0, u1, u2, residual.size, time, square > limit)
         wrong = _persists(i, time, t) or wrong
     t.wrong[i] = time if wrong and t.inertial else -np.inf
-    return Judgement(wrong, disturbed, passed)
+    return Judgement(wrong, disturbed)
 
 
 @kernel
 def limited_inflation(inflation: float, covariance: Matrix, first: Vector) -> float:
-    """Limit an inflation of P (`PredictionTest.limited`)."""
+    """Limit an inflation of P. Without the limit, the variances of unobserved states would grow without bound.
+
+    A single inflation is at most `LARGEST`, and no variance exceeds `TOTAL` times its value before the ``first`` one.
+    """
     if inflation <= 1.0:
         return 1.0
     grown = 0.0
@@ -216,7 +214,10 @@ def limited_inflation(inflation: float, covariance: Matrix, first: Vector) -> fl
 def joint_inflation(
     residual: Vector, predicted: Matrix, noise: Matrix, covariance: Matrix, t: TestedPrediction
 ) -> float:
-    """Count a failure of the prediction, and return the factor on the variances (`PredictionTest.inflation`)."""
+    """Count a failure of the prediction, and return the factor of P: above 1 once for every ``round`` of failures.
+
+    It is the root of the mean squared standardised component, over 2 (eqs. 28 and 34 of Zhan et al. 2026), limited.
+    """
     t.blamed[0] += 1.0
     if int(t.blamed[0] - 1.0) % t.round != 0:
         return 1.0
@@ -234,7 +235,7 @@ class PredictionTest:
 
     *Joint failures.* Zhan et al. (2026) separate the two cases by the chi-square tests of GNSS and DVL: if one of them
     fails, that instrument is wrong; if both fail, the prediction is. Gross errors of both may coincide by chance, so
-    both tests must fail ``together`` times in a row. The motion is then taken as disturbed (`disturbed`).
+    both tests must fail ``together`` times in a row. The motion is then taken as disturbed.
 
     *Persistence.* The noise of an instrument is white, the error of a state is not (`Courses`). The prediction is taken
     as wrong if
@@ -268,36 +269,27 @@ class PredictionTest:
     together : int
         Number of times in a row that both tests must fail before the prediction is taken as wrong; 0: neither test is
         made.
-    probability : float
-        Probability that a good measurement passes its test, and that innovations which are not too large pass theirs.
-
-    Attributes
-    ----------
-    disturbed : bool
-        Whether the last innovation failed jointly with those of another instrument.
-    index : dict of str to int
-        Place of each instrument among those of the run.
     """
 
+    GOOD = 0.999  # probability that a good measurement passes its test, and innovations that are not too large theirs
     RECENT = 5.0  # s; what another instrument did before, or before its last three periods, does not count
     PERSISTENT = 0.99  # probability that the innovations of a white noise are not found correlated
     WHITE = 0.95  # the same for a witness, which must be beyond doubt
     ALONE = 0.9  # probability that failures of a lone log by white noise are not found to have a common direction
 
-    def __init__(self, instruments: Instruments, together: int = 3, probability: float = 0.999):
-        self.together, self.disturbed = together, False
+    def __init__(self, instruments: Instruments, together: int = 3):
         group = fixes_and_logs(instruments) if together else {}
         inertial = instruments.imu is not None
         if not inertial and len(set(group.values())) < 2:
             group = {}
         against = witnesses(instruments) if together and inertial else {}
-        large, persistent, white, alone = map(normal_quantile, (probability, self.PERSISTENT, self.WHITE, self.ALONE))
-        self.index, count = {name: i for i, name in enumerate(instruments)}, len(instruments)
+        large, persistent, white, alone = map(normal_quantile, (self.GOOD, self.PERSISTENT, self.WHITE, self.ALONE))
+        count = len(instruments)
         self._first: dict[int, TestedPrediction] = {}
         self._shared: dict[str, Any] = {
             "tests": bool(group or against), "inertial": inertial, "together": together,
             "round": max(together * len(group), 1), "large": large, "persistent": persistent, "white": white,
-            "alone": alone, "joint_time": self.RECENT, "limits": np.array(chi_square_limits(probability)),
+            "alone": alone, "joint_time": self.RECENT, "limits": np.array(chi_square_limits(self.GOOD)),
             "group": np.array([group.get(n, -1) for n in instruments], np.int64),
             "persistence": np.array([n in against for n in instruments], np.bool_),
             "heard": np.array([max(self.RECENT, 3.0 / sheet.rate) for sheet in instruments.values()], np.float64),
@@ -313,36 +305,3 @@ class PredictionTest:
         if n not in self._first:
             self._first[n] = TestedPrediction(first=np.zeros(n), **self._shared)
         return self._first[n]
-
-    def fails(self, innovation: Innovation) -> bool:
-        """Whether the prediction of this innovation is taken as wrong, by one of the tests."""
-        self.disturbed = False
-        m, residual, predicted, noise, covariance, _ = innovation
-        tests = self.tested(0 if covariance is None else len(covariance))
-        if not tests.tests:
-            return False
-        judged = judge_prediction(residual, predicted, noise, self.index.get(m.instrument, -1), m.time, tests)
-        if judged.passed:
-            tests.blamed[0] = 0.0
-        self.disturbed = judged.disturbed
-        return bool(judged.wrong)
-
-    def inflation(self, innovation: Innovation) -> float:
-        """Factor of P after a failure of the prediction: once for every ``together`` failures.
-
-        The root of the mean squared standardised component, over 2 (eqs. 28 and 34 of Zhan et al. 2026), within
-        `limited`.
-        """
-        _, residual, predicted, noise, covariance, _ = innovation
-        if covariance is None:
-            return 1.0
-        return joint_inflation(residual, predicted, noise, covariance, self.tested(len(covariance)))
-
-    def limited(self, inflation: float, innovation: Innovation) -> float:
-        """Limit an inflation. Without the limit, the variances of unobserved states would grow without bound.
-
-        A single inflation is at most `LARGEST`, and no variance exceeds `TOTAL` times its value before the first one.
-        """
-        if innovation.covariance is None:
-            return 1.0
-        return limited_inflation(inflation, innovation.covariance, self.tested(len(innovation.covariance)).first)

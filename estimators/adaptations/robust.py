@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import partial
-
 from simnav.compiled import helper, kernel
 from simnav.estimators.models.filtering import Prediction, Readings
 from simnav.kernel_types import Vector
 from simnav.structures import filled, structure
 from simnav.types import Array
 
-from .base import Innovation
-from .noise import WeightedNoise, scaled
+from .noise import NoiseAdaptation
 from .prediction import standardised
 from .rules import copied
 from .scaled_noise import scale
@@ -48,14 +44,6 @@ def igg3(u: float, k0: float = 2.5, k1: float = 8.0, two: float = 2.0) -> float:
     if u <= k0:
         return 1.0
     return k0 / u * ((k1 - u) / (k1 - k0)) ** two if u < k1 else 0.0
-
-
-def _with_huber(k: float, u: float) -> float:
-    return huber(u, k)
-
-
-def _with_igg3(k0: float, k1: float, u: float) -> float:
-    return igg3(u, k0, k1)
 
 
 @helper
@@ -98,37 +86,18 @@ def igg3_noise(
     )  # fmt: skip
 
 
-class EquivalentWeights(WeightedNoise):
+class EquivalentWeights(NoiseAdaptation):
     """Divides the variance of each component by the weight of its standardised innovation.
 
     Component i of an innovation v with covariance ``S = H P H' + R`` is standardised as ``u = v_i / sqrt(S_ii)``;
     ``R_ij`` becomes ``R_ij / sqrt(w(u_i) w(u_j))``, which keeps the correlations (the two-factor form of Yang, Song and
     Xu 2002). The innovation is standardised by S and not by R, so that an uncertain filter does not reject good
-    measurements. A weight is at least ``smallest``, so that a filter with a wrong state is still corrected, though
-    slowly.
-
-    Parameters
-    ----------
-    weight : callable
-        Weight in [0, 1] as a function of the standardised innovation; it does not increase with the innovation.
-    smallest : float
-        Smallest weight of a component, in (0, 1].
+    measurements. A weight is at least `SMALLEST`, so that a filter with a wrong state is still corrected, though
+    slowly. The smallest weight is reported.
     """
 
-    def __init__(self, weight: Callable[[float], float], smallest: float = 1e-3):
-        if not 0.0 < smallest <= 1.0:
-            raise ValueError(f"smallest = {smallest:g}: it must lie in (0, 1]")
-        self.weight, self.smallest = weight, smallest
-
-    def choose(self, innovation: Innovation) -> Array:
-        """The noise divided by the weights; the smallest weight is reported."""
-        components = standardised(innovation.residual, innovation.predicted, innovation.noise)
-        least = max(self.weight(max(map(abs, components))), self.smallest)
-        self.report_number(innovation.measurement.instrument, least)
-        if least == 1.0:
-            return innovation.noise
-        weights = [max(self.weight(u), self.smallest) for u in components[: len(innovation.residual)]]
-        return scaled(innovation.noise, [1.0 / w for w in weights])
+    SMALLEST = 1e-3
+    reported = "weight"
 
 
 class HuberWeights(EquivalentWeights):
@@ -147,12 +116,11 @@ class HuberWeights(EquivalentWeights):
     def __init__(self, k: float = 2.0):
         if not k > 0.0:
             raise ValueError(f"k = {k:g}: it must be above 0")
-        super().__init__(partial(_with_huber, k))
         self.k = k
 
     def settings_of(self, longer: float) -> Array:
         """As `NoiseAdaptation.settings_of`."""
-        return filled(HUBER, k=self.k, smallest=self.smallest)
+        return filled(HUBER, k=self.k, smallest=self.SMALLEST)
 
 
 class Igg3Weights(EquivalentWeights):
@@ -169,9 +137,8 @@ class Igg3Weights(EquivalentWeights):
     def __init__(self, k0: float = 2.5, k1: float = 8.0):
         if not 0.0 < k0 < k1:
             raise ValueError(f"k0 = {k0:g} and k1 = {k1:g}: it must be 0 < k0 < k1")
-        super().__init__(partial(_with_igg3, k0, k1))
         self.k0, self.k1 = k0, k1
 
     def settings_of(self, longer: float) -> Array:
         """As `NoiseAdaptation.settings_of`."""
-        return filled(IGG3, k0=self.k0, k1=self.k1, two=2.0, smallest=self.smallest)
+        return filled(IGG3, k0=self.k0, k1=self.k1, two=2.0, smallest=self.SMALLEST)

@@ -97,7 +97,7 @@ class SageHusa(EstimatedNoise):
         """As `EstimatedNoise.begun`."""
         return filled(MEMORY, count=round(self.prior * longer))
 
-    def estimate(self, innovation: Innovation) -> Array:
+    def choose(self, innovation: Innovation) -> Array:
         """The bounded estimate of a full matrix, this innovation included."""
         nominal = innovation.noise
         self.ask(sage_husa_noise, innovation, np.empty_like(nominal))

@@ -12,7 +12,7 @@ from simnav.kernel_types import Matrix, Vector
 from simnav.structures import filled, structure
 from simnav.types import Array
 
-from .noise import WeightedNoise
+from .noise import NoiseAdaptation
 
 __all__ = ["StudentT", "normalised_trace", "student_t_noise", "student_weight"]
 
@@ -96,7 +96,7 @@ def student_t_noise(
     return weight
 
 
-class StudentT(WeightedNoise):
+class StudentT(NoiseAdaptation):
     """The noise of every measurement has Student's t distribution, with the datasheet's covariance R as scale matrix.
 
     A variable with this distribution is Gaussian with the covariance ``R / w``, where w is gamma distributed,
@@ -123,6 +123,7 @@ class StudentT(WeightedNoise):
     """
 
     rule = student_t_noise
+    reported = "weight"
 
     def __init__(self, dof: float = 8.0, turns: int = 5):
         if not dof > 0.0:

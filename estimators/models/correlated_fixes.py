@@ -17,7 +17,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from simnav.types import Array, InitialState, Instruments
+from simnav.types import Array, Datasheet, InitialState, Instruments
 
 from .base import ErrorModel
 from .inertial import InertialModel
@@ -39,41 +39,37 @@ def with_correlated_fixes(instruments: Instruments, slow: float, slow_time: floa
     slow_time : float
         Correlation time of the slow error, if the datasheet gives none [s].
     """
-    sheets = []
-    for sheet in instruments.values():
-        if sheet.role == "fix" and not sheet.processes:
-            stated, least = np.any(sheet.bias_instability), slow * sheet.sigma
-            sheet = replace(
-                sheet,
-                bias_instability=np.maximum(sheet.bias_instability, least),
-                correlation_time=sheet.correlation_time if stated else slow_time,
-            )
-        sheets.append(sheet)
-    return Instruments(sheets, instruments.imu, instruments.step)
+
+    def change(sheet: Datasheet) -> Datasheet:
+        if sheet.role != "fix" or sheet.processes:
+            return sheet
+        return replace(
+            sheet,
+            bias_instability=np.maximum(sheet.bias_instability, slow * sheet.sigma),
+            correlation_time=sheet.correlation_time if np.any(sheet.bias_instability) else slow_time,
+        )
+
+    return instruments.changed(change)
 
 
-class _Inertial(InertialModel):
-    """The inertial model, begun with the datasheets of `with_correlated_fixes`."""
+class _Correlated(ErrorModel):
+    """A model that is begun with the datasheets of `with_correlated_fixes`."""
 
-    def __init__(self, slow: float, slow_time: float):
-        super().__init__()
-        self.slow, self.slow_time = slow, slow_time
-
-    def begin(self, start: InitialState, instruments: Instruments) -> Array:
-        """Set the state; UnsuitableScenario without an IMU."""
-        return super().begin(start, with_correlated_fixes(instruments, self.slow, self.slow_time))
-
-
-class _Ship(ShipModel):
-    """The ship model, likewise."""
-
-    def __init__(self, slow: float, slow_time: float):
-        super().__init__()
-        self.slow, self.slow_time = slow, slow_time
+    slow: float
+    slow_time: float
 
     def begin(self, start: InitialState, instruments: Instruments) -> Array:
-        """Set the state; UnsuitableScenario without a position and a speed."""
-        return super().begin(start, with_correlated_fixes(instruments, self.slow, self.slow_time))
+        """Set the state; UnsuitableScenario where the model lacks an instrument."""
+        own = with_correlated_fixes(instruments, self.slow, self.slow_time)
+        return super().begin(start, own)  # type: ignore[safe-super]
+
+
+class _Inertial(_Correlated, InertialModel):
+    """The inertial model."""
+
+
+class _Ship(_Correlated, ShipModel):
+    """The ship model."""
 
 
 class CorrelatedFixes(Suitable):
@@ -97,5 +93,6 @@ class CorrelatedFixes(Suitable):
 
     def choose(self, instruments: Instruments, name: str) -> ErrorModel:
         """A new model; UnsuitableScenario where neither will do."""
-        model = _Ship if instruments.imu is None else _Inertial
-        return model(self.slow, self.slow_time).choose(instruments, name)
+        model: _Correlated = _Ship() if instruments.imu is None else _Inertial()
+        model.slow, model.slow_time = self.slow, self.slow_time
+        return model.choose(instruments, name)

@@ -222,12 +222,12 @@ class DoubtingModel(ErrorModel):
 
 def _with_biases(instruments: Instruments) -> Instruments:
     """The datasheets, with a bias for every instrument that can be doubted."""
-    sheets = []
-    for sheet in instruments.values():
-        if group_of(sheet) and not (sheet.processes or np.any(sheet.bias_instability) or np.any(sheet.bias)):
-            sheet = replace(sheet, bias=_PLACE * sheet.sigma)
-        sheets.append(sheet)
-    return Instruments(sheets, instruments.imu, instruments.step)
+
+    def change(sheet: Datasheet) -> Datasheet:
+        stated = sheet.processes or np.any(sheet.bias_instability) or np.any(sheet.bias)
+        return sheet if stated or not group_of(sheet) else replace(sheet, bias=_PLACE * sheet.sigma)
+
+    return instruments.changed(change)
 
 
 class _Inertial(DoubtingModel, InertialModel):

@@ -32,7 +32,6 @@ Source: Zhan et al. 2026, PLoS One 21(2) e0342016, eqs. 1-2 and 13-21. Where it 
 
 from __future__ import annotations
 
-from math import cos, sin
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -41,7 +40,8 @@ from simnav import blocks
 from simnav.blocks import StateBlock
 from simnav.estimator import UnsuitableScenario
 from simnav.estimator.needs import IMU, Needs
-from simnav.geometry.earth import ROTATION_RATE, gravity
+from simnav.geometry.earth import earth_rate, gravity
+from simnav.geometry.rotation import skew
 from simnav.kinds import BODY_VELOCITY, POSITION, VELOCITY, kinds_with
 from simnav.types import Array, Datasheet, InitialState, Instruments, Measurement
 
@@ -58,12 +58,6 @@ __all__ = ["DvlCalibrationModel", "DvlErrors"]
 #: Of each component, after the paper's simulation: "diag(0.1, 0.1, 0.1, 5, 5, 5)^2" [m/s], [m].
 _PRINTED = {POSITION: 5.0, VELOCITY: 0.1, BODY_VELOCITY: 0.1}
 _IDENTITY = np.eye(3)
-
-
-def _across(vector: Array) -> Array:
-    """``[vector x]``, without the overhead of stacks."""
-    x, y, z = vector.tolist()
-    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
 
 
 class DvlErrors(NamedTuple):
@@ -165,18 +159,16 @@ class DvlCalibrationModel(InertialModel):
         u, raw, to_body = np.empty(3), np.empty((3, ERROR.accelerometer_bias)), self.dcm.T
         observe.unchecked(Aid(DVL, sheet.lever_arm + dl, -1, -1), np.zeros(3), self._state(), u, raw)
         u *= -1.0  # measured minus predicted
-        latitude = float(self.position[0])
-        earth = np.array([ROTATION_RATE * cos(latitude), 0.0, -ROTATION_RATE * sin(latitude)])
-        turn = _across(self.raw_rate - self.bias[:3] - to_body @ earth)
+        turn = skew(self.raw_rate - self.bias[:3] - to_body @ earth_rate(float(self.position[0])))
         acceleration = self.raw_force - self.bias[3:] + to_body @ self._gravity - turn @ (to_body @ self.velocity)
         u -= acceleration * tau
-        s, across = _across(eta), _across(u)
+        s, across = skew(eta), skew(u)
         turned = _IDENTITY - s + 0.5 * (s @ s)
         matrix = (1.0 + k) * turned
         jacobian = np.zeros((3, self.size))
         behind_position = slice(ERROR.velocity, ERROR.accelerometer_bias)
         jacobian[:, behind_position] = matrix @ raw[:, behind_position]
-        jacobian[:, at.misalignment] = (1.0 + k) * (across - 0.5 * (_across(s @ u) + s @ across))
+        jacobian[:, at.misalignment] = (1.0 + k) * (across - 0.5 * (skew(s @ u) + s @ across))
         jacobian[:, at.lever_arm] = matrix @ turn
         jacobian[:, at.scale] = (turned @ u)[:, None]
         jacobian[:, at.delay] = -(matrix @ acceleration)[:, None]

@@ -45,7 +45,7 @@ class FlatStateModel(ErrorModel):
     equations : ModelFunctions
         Its functions.
     numbers : (s,) array
-        The flat state, of the present run.
+        The flat state, of the present run. The first is the time, unless a subclass says otherwise.
     names : sequence of str
         The instruments of the run that the functions predict.
     """
@@ -57,9 +57,27 @@ class FlatStateModel(ErrorModel):
         """As `ErrorModel.functions`."""
         return self.equations
 
+    @property
+    def time(self) -> float:
+        """Time of the state [s]."""
+        return float(self.numbers[0])
+
+    @time.setter
+    def time(self, time: float) -> None:
+        self.numbers[0] = time
+
+    def _bind(self) -> None:
+        """Name the blocks of the flat state; a hook."""
+
     def __getstate__(self) -> dict[str, Any]:
         """A copy makes the room for its calls itself."""
         return {name: value for name, value in vars(self).items() if name != "_made_room"}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """A copy: the named blocks of its state are views of the flat one."""
+        vars(self).update(state)
+        if "numbers" in state:
+            self._bind()
 
     @property
     def _room(self) -> _Room:

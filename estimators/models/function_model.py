@@ -38,7 +38,7 @@ class FunctionModel(FlatStateModel, MovingModel):
     Attributes
     ----------
     equations, numbers, names
-        As of `FlatStateModel`. The first of the numbers is the time.
+        As of `FlatStateModel`.
     constants : (c,) array
         Figures of the motion.
     """
@@ -49,15 +49,6 @@ class FunctionModel(FlatStateModel, MovingModel):
     @abstractmethod
     def table(self, names: Sequence[str]) -> AidTable:
         """The instruments in the order of their names (`simnav.estimators.models.filtering.aid_table`)."""
-
-    @property
-    def time(self) -> float:
-        """Time of the state [s]."""
-        return float(self.numbers[0])
-
-    @time.setter
-    def time(self, time: float) -> None:
-        self.numbers[0] = time
 
     def dynamics(self, covariance: Array, names: Sequence[str]) -> Dynamics:
         """As `ErrorModel.dynamics`."""

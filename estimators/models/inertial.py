@@ -71,7 +71,7 @@ from .flat_state import FlatStateModel
 from .inertial_errors import ERROR
 from .inertial_functions import INERTIAL_FUNCTIONS
 from .lever_arms import has_measurement_function, with_lever_arms
-from .measurement_functions import MeasurementFunction
+from .measurement_functions import MeasurementFunction, PredictedReading
 from .measurements import (
     HEADING,
     State,
@@ -159,12 +159,6 @@ class InertialModel(FlatStateModel):
     def needs(self) -> Needs:
         """An IMU, and anything to aid it."""
         return (IMU, AID)
-
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        """A copy: the named blocks of its state are views of the flat one."""
-        vars(self).update(state)
-        if "numbers" in state:
-            self._bind()
 
     def _bind(self) -> None:
         """Name the blocks of the flat state."""
@@ -385,11 +379,11 @@ class InertialModel(FlatStateModel):
         name = measurement.instrument
         if name in self.own:
             state = self.state_of_own()
-            found = self._linearise_own(name, measurement.time, measurement.value, state, measurement.side)
+            found = self._compare_own(name, measurement.time, measurement.value, state, measurement.side)
             if found is None:
                 return None
-            noise = self.noise[name] if found[2] is None else self.noise[name] + found[2]
-            return Linearised(*found[:2], noise)
+            noise, more = self.noise[name], self.own[name].spread(found.own, found.point)
+            return Linearised(found.innovation, found.jacobian, noise if more is None else noise + more)
         linearised = super().measure(measurement)
         if linearised is None or name not in self.uncalibrated:
             return linearised
@@ -411,14 +405,12 @@ class InertialModel(FlatStateModel):
     ) -> tuple[Array, Array] | None:
         """As `ErrorModel.observe_own`, at a `State`."""
         assert isinstance(state, State)
-        found = self._linearise_own(name, time, value, state, side)
-        return None if found is None else found[:2]
+        found = self._compare_own(name, time, value, state, side)
+        return None if found is None else (found.innovation, found.jacobian)
 
-    def _linearise_own(
-        self, name: str, time: float, value: Array, state: State, side: Array
-    ) -> tuple[Array, Array, Array | None] | None:
-        own, size = self.own[name], _NAV + len(state.calibration)
-        return own.linearise(own.point(time, state, side), value, state.calibration, size, self.bias_at.get(name, -1))
+    def _compare_own(self, name: str, time: float, value: Array, state: State, side: Array) -> PredictedReading | None:
+        own = self.own[name]
+        return own.compare(own.point(time, state, side), value, state.calibration, _NAV, self.bias_at.get(name, -1))
 
     def nominal_noise(self, measurement: Measurement) -> Array | None:
         """The noise of the datasheet; None if the noise depends on the state."""

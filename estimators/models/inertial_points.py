@@ -312,11 +312,9 @@ class InertialPoints(InertialModel, PointModel):
         """What the instrument should read at the points, minus what it should read at the state."""
         name = measurement.instrument
         if name in self.own:
-            own = self.own[name]
+            own, bias_at = self.own[name], self.bias_at.get(name, -1)
             point = own.point(measurement.time, self.state_of_own(), measurement.side)
-            found = own.differences(point, errors, self.bias_at.get(name, -1), NAVIGATION_STATES)
-            assert found is not None  # `measure` says something of it
-            return found
+            return own.differences(point, self.calibration, errors, NAVIGATION_STATES, bias_at)
         differences = np.empty((len(errors), len(self.noise[name])))
         observe_points.unchecked(self.aid_parameters[name], self._state(), errors, differences)
         return differences

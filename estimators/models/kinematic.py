@@ -13,11 +13,11 @@ from math import atan2, cos, hypot, sin
 
 import numpy as np
 
-from simnav.compiled import helper, kernel
+from simnav.compiled import kernel
 from simnav.estimator import UnsuitableScenario
 from simnav.estimator.needs import Needs
 from simnav.estimators.algebra.joseph import project
-from simnav.geometry.earth import radii_scalar
+from simnav.geometry.earth import horizontal_offset, move_position
 from simnav.kinds import POSITION, VELOCITY, kinds_with
 from simnav.structures import filled, structure
 from simnav.types import Array, Datasheet, Estimate, InitialState, Instruments
@@ -47,15 +47,6 @@ MOTION = structure(acceleration=float)
 A_POSITION, A_VELOCITY = range(2)
 
 
-@helper
-def _displace(position: Array, north: float, east: float, down: float) -> None:
-    """Move a position by metres."""
-    meridian, prime = radii_scalar(sin(position[0]))
-    position[1] += east / ((prime + position[2]) * cos(position[0]))
-    position[0] += north / (meridian + position[2])
-    position[2] -= down
-
-
 @kernel(passed=True)
 def propagate(dynamics: Dynamics, samples: Samples, until: float) -> None:
     """Advance the state and its covariance to a time: ``P = F P F' + Q`` with ``F = [1, dt; 0, 1]``."""
@@ -64,7 +55,7 @@ def propagate(dynamics: Dynamics, samples: Samples, until: float) -> None:
     if dt <= 0.0:
         return
     velocity, q = state.velocity, dynamics.constants.view(MOTION)[0].acceleration
-    _displace(state.position, velocity[0] * dt, velocity[1] * dt, velocity[2] * dt)
+    move_position(state.position, velocity[0] * dt, velocity[1] * dt, velocity[2] * dt)
     state.time = until
     for i in range(3):
         F[i, ERROR.velocity + i] = dt
@@ -93,11 +84,8 @@ def predict(dynamics: Dynamics, readings: Readings, k: int, prediction: Predicti
         if hypot(velocity[0], velocity[1]) > SLOWEST:
             state.heading = atan2(velocity[1], velocity[0])
         c, s = cos(state.heading), sin(state.heading)
-        meridian, prime = radii_scalar(sin(position[0]))
-        east = value[1] - position[1]
-        innovation[0] = (value[0] - position[0]) * (meridian + position[2]) - (c * arm[0] - s * arm[1])
-        innovation[1] = atan2(sin(east), cos(east)) * (prime + position[2]) * cos(position[0])
-        innovation[1] -= s * arm[0] + c * arm[1]
+        north, east = horizontal_offset(position, value[0], value[1])
+        innovation[0], innovation[1] = north - (c * arm[0] - s * arm[1]), east - (s * arm[0] + c * arm[1])
         innovation[2] = position[2] - value[2] - arm[2]
         for i in range(3):
             H[i, i] = 1.0
@@ -112,7 +100,7 @@ def predict(dynamics: Dynamics, readings: Readings, k: int, prediction: Predicti
 def retract(dynamics: Dynamics) -> None:
     """Add the correction to the state."""
     state, dx = dynamics.numbers.view(STATE)[0], dynamics.correction
-    _displace(state.position, dx[ERROR.position], dx[ERROR.position + 1], dx[ERROR.position + 2])
+    move_position(state.position, dx[ERROR.position], dx[ERROR.position + 1], dx[ERROR.position + 2])
     for i in range(3):
         state.velocity[i] += dx[ERROR.velocity + i]
 

@@ -56,11 +56,10 @@ def with_lever_arms(instruments: Instruments, drifting: bool = True) -> Instrume
     drifting : bool
         Whether the drift of a delay is a state (`with_delay`).
     """
-    sheets = [with_delay(sheet, drifting) for sheet in instruments.values()]
-    if not any(_has_states(sheet) or is_delayed(sheet) for sheet in sheets):
+    delayed = instruments.changed(lambda sheet: with_delay(sheet, drifting))
+    if not any(_has_states(sheet) or is_delayed(sheet) for sheet in delayed.values()):
         return instruments
-    sheets = [_with_blocks(sheet) if _has_states(sheet) else sheet for sheet in sheets]
-    return Instruments(sheets, instruments.imu, instruments.step)
+    return delayed.changed(lambda sheet: _with_blocks(sheet) if _has_states(sheet) else sheet)
 
 
 def _with_blocks(sheet: Datasheet) -> Datasheet:

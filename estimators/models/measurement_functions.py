@@ -36,7 +36,7 @@ from .inertial_errors import PART
 from .lever_arms import observation_of
 from .measurements import State
 
-__all__ = ["Kinematics", "MeasurementFunction"]
+__all__ = ["Kinematics", "MeasurementFunction", "PredictedReading"]
 
 #: Number of columns of an observation's Jacobian: position, velocity, attitude.
 _COMPONENTS = PART.navigation.stop
@@ -72,6 +72,27 @@ class Kinematics(NamedTuple):
     def at(self, k: int) -> Kinematics:
         """One of the states."""
         return Kinematics(self.position[k], self.velocity[k], self.dcm[k], self.angular_rate[k])
+
+
+class PredictedReading(NamedTuple):
+    """A reading of d components, compared with what a state predicts.
+
+    Attributes
+    ----------
+    innovation : (d,) array
+        Measured minus predicted, in the units of the kind's errors.
+    jacobian : (d, n) array
+        Derivative of the prediction by the error of the state.
+    own : (d, 9 + b) array
+        That by the navigation state and the b components of blocks, as `MeasurementFunction.predict` gives it.
+    point : NavigationPoint
+        Where the reading is predicted.
+    """
+
+    innovation: Array
+    jacobian: Array
+    own: Array
+    point: NavigationPoint
 
 
 class MeasurementFunction:
@@ -332,15 +353,10 @@ class MeasurementFunction:
             )
         return noise
 
-    def place(self, own: Array, jacobian: Array, offset: int) -> None:
-        """Write the columns of the blocks into a (d, n) Jacobian; ``offset`` is the index of the first value in it."""
-        if len(self._places):
-            jacobian[:, self._places + offset] = own[:, self._stated]
-
-    def linearise(
-        self, point: NavigationPoint, value: Array, calibration: Array, size: int, bias_at: int
-    ) -> tuple[Array, Array, Array | None] | None:
-        """Innovation and Jacobian of a measurement.
+    def compare(
+        self, point: NavigationPoint, value: Array, states: Array, offset: int, bias_at: int
+    ) -> PredictedReading | None:
+        """Compare a reading with what is predicted for it; None where the state has no reading.
 
         Parameters
         ----------
@@ -348,75 +364,68 @@ class MeasurementFunction:
             The state at which the reading is predicted.
         value : (d,) array
             Measured value.
-        calibration : (size - 15,) array
-            Calibration states of the instruments.
-        size : int
-            Number n of components of the error state.
+        states : (m,) array
+            Values of the states from the index ``offset`` of the error state on, as `point` received them.
+        offset : int
+            The index.
         bias_at : int
             Index in the error state of the instrument's first bias; -1 for none.
-
-        Returns
-        -------
-        innovation : (d,) array
-            Measurement minus prediction, in the units of the kind's errors.
-        jacobian : (d, n) array
-            Jacobian of the prediction with respect to the error state.
-        noise : (d, d) array or None
-            Covariance of what is without a state (`spread`).
         """
         predicted = self.predict(point)
         if predicted is None:
             return None
         reading, own = predicted
-        d = len(reading)
-        jacobian = np.zeros((d, size))
-        jacobian[:, :_COMPONENTS] = own[:, :_COMPONENTS]
-        self.place(own, jacobian, size - len(calibration))
+        jacobian, d = self._jacobian(own, states, offset), len(reading)
         if bias_at >= 0:
             jacobian[range(d), range(bias_at, bias_at + d)] = 1.0
-            first = bias_at + len(calibration) - size
-            reading = self.kind.add_error(reading, calibration[first : first + d])
-        return innovation_of(self.kind, self.sheet, value, reading), jacobian, self.spread(own, point)
+            reading = self.kind.add_error(reading, states[bias_at - offset : bias_at - offset + d])
+        return PredictedReading(innovation_of(self.kind, self.sheet, value, reading), jacobian, own, point)
 
-    def differences(self, point: NavigationPoint, errors: Array, bias_at: int, offset: int) -> Array | None:
-        """The predicted readings of the instrument at k states, minus that at one state.
-
-        Parameters
-        ----------
-        point : NavigationPoint
-            The state with which the k states are compared.
-        errors : (k, n) array
-            Differences of the states from the point, as in `simnav.estimators.models.base.ErrorModel.correct`.
-        bias_at : int
-            Index of the instrument's first bias state; negative if it has none.
-        offset : int
-            Index in the error state of the first value that `point` received.
-
-        Returns
-        -------
-        (k, d) array or None
-            Differences of the readings; None if there is no reading at the point. For a state without a reading the
-            Jacobian at the point is used.
-        """
-        predicted = self.predict(point)
-        if predicted is None:
-            return None
-        reading, jacobian = predicted
-        differences = errors[:, :_COMPONENTS] @ jacobian[:, :_COMPONENTS].T
+    def _jacobian(self, own: Array, states: Array, offset: int) -> Array:
+        """The (d, n) derivative by the error state, but for biases, from that by navigation and blocks."""
+        jacobian = np.zeros((len(own), offset + len(states)))
+        self._by_motion(own, states, jacobian)
         if len(self._places):
-            differences += errors[:, self._places + offset] @ jacobian[:, self._stated].T
-        states = Kinematics(
+            jacobian[:, self._places + offset] = own[:, self._stated]
+        return jacobian
+
+    def _by_motion(self, own: Array, states: Array, jacobian: Array) -> None:
+        """Write the derivative by the navigation state into that by the error state; a hook."""
+        jacobian[:, :_COMPONENTS] = own[:, :_COMPONENTS]
+
+    def _near(self, point: NavigationPoint, states: Array, errors: Array) -> Kinematics:
+        """The motion of k states that differ from a point by (k, n) errors; a hook."""
+        return Kinematics(
             position=point.position + errors[:, PART.position] / _metres(point.position),
             velocity=point.velocity + errors[:, PART.velocity],
             dcm=dcm_from_rotation_vector(errors[:, PART.attitude]) @ point.dcm,
             angular_rate=point.angular_rate - errors[:, PART.gyroscope_bias],
         )
+
+    def differences(self, point: NavigationPoint, states: Array, errors: Array, offset: int, bias_at: int) -> Array:
+        """The (k, d) predicted readings of the instrument at k states, minus that at one state.
+
+        Parameters
+        ----------
+        point : NavigationPoint
+            The state with which the k states are compared; it has a reading.
+        states, offset, bias_at
+            As of `compare`.
+        errors : (k, n) array
+            Differences of the states from the point, as in `simnav.estimators.models.base.ErrorModel.correct`. For a
+            state without a reading the Jacobian at the point is used.
+        """
+        predicted = self.predict(point)
+        assert predicted is not None, "`measure` says something of it"
+        reading, own = predicted
+        near = self._near(point, states, errors)
         if self.observations is not None:
-            differences = np.asarray(self.kind.difference(self.read_many(point, states, errors, offset), reading))
+            differences = np.asarray(self.kind.difference(self.read_many(point, near, errors, offset), reading))
         else:
+            differences = errors @ self._jacobian(own, states, offset).T
             for k, error in enumerate(errors):
                 blocks = self._blocks_at(point, error, offset)
-                there = self.read(point._replace(**states.at(k)._asdict(), blocks=blocks))
+                there = self.read(point._replace(**near.at(k)._asdict(), blocks=blocks))
                 if there is not None:
                     differences[k] = self.kind.difference(there, reading)
         if bias_at >= 0:

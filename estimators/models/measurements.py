@@ -25,7 +25,7 @@ from math import atan2, cos, sin, sqrt
 from typing import NamedTuple
 
 from simnav.compiled import helper, kernel
-from simnav.geometry.earth import ECCENTRICITY_SQUARED, ROTATION_RATE, SEMI_MAJOR_AXIS, radii_scalar
+from simnav.geometry.earth import ECCENTRICITY_SQUARED, ROTATION_RATE, SEMI_MAJOR_AXIS, horizontal_offset
 from simnav.geometry.rotation import cross
 from simnav.kernel_types import Matrix, Vector
 from simnav.types import Array
@@ -124,12 +124,9 @@ def _swing(state: State, arm: Array) -> tuple[float, float, float]:
 @helper
 def observe_horizontal_position(arm: Array, value: Array, state: State, innovation: Array, jacobian: Array) -> None:
     """Linearise a terrain fix, and the horizontal part of a GNSS position."""
-    position = state.position
     c0, c1, c2 = _to_navigation_axes(state.dcm, arm[0], arm[1], arm[2])
-    meridian, prime = radii_scalar(sin(position[0]))
-    east = value[1] - position[1]
-    innovation[0] = (value[0] - position[0]) * (meridian + position[2]) - c0
-    innovation[1] = atan2(sin(east), cos(east)) * (prime + position[2]) * cos(position[0]) - c1
+    north, east = horizontal_offset(state.position, value[0], value[1])
+    innovation[0], innovation[1] = north - c0, east - c1
     jacobian[0, ERROR.position], jacobian[1, ERROR.position + 1] = 1.0, 1.0
     _fill(jacobian, 0, ERROR.attitude, (0.0, c2, -c1))
     _fill(jacobian, 1, ERROR.attitude, (-c2, 0.0, c0))

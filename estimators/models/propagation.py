@@ -22,7 +22,14 @@ from simnav.estimators.algebra.products import (
     list_elements,
     sparse_product,
 )
-from simnav.geometry.earth import EQUATORIAL_GRAVITY, ROTATION_RATE, SEMI_MAJOR_AXIS, gravity_scalar, radii_scalar
+from simnav.geometry.earth import (
+    EQUATORIAL_GRAVITY,
+    ROTATION_RATE,
+    SEMI_MAJOR_AXIS,
+    gravity_scalar,
+    move_position,
+    radii_scalar,
+)
 from simnav.geometry.rotation import rotate_left, rotation_coefficients
 from simnav.kernel_types import Matrix, Vector
 from simnav.strapdown import mechanize_step
@@ -530,11 +537,7 @@ def correct_inertial(
     position: Vector, velocity: Vector, dcm: Matrix, bias: Vector, calibration: Vector, dx: Vector
 ) -> None:
     """Add the correction ``dx`` to a state, in place; the attitude is turned by ``exp(r x)`` from the left."""
-    meridian, prime = radii_scalar(sin(position[0]))
-    north, east, down = dx[ERROR.position], dx[ERROR.position + 1], dx[ERROR.position + 2]
-    position[1] += east / ((prime + position[2]) * cos(position[0]))
-    position[0] += north / (meridian + position[2])
-    position[2] -= down
+    move_position(position, dx[ERROR.position], dx[ERROR.position + 1], dx[ERROR.position + 2])
     r0, r1, r2 = dx[ERROR.attitude], dx[ERROR.attitude + 1], dx[ERROR.attitude + 2]
     a, b = rotation_coefficients(r0 * r0 + r1 * r1 + r2 * r2)
     rotate_left(dcm, r0, r1, r2, a, b, dcm)

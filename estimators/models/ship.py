@@ -22,7 +22,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import cos, radians, sin
-from typing import Any
 
 import numpy as np
 
@@ -43,6 +42,7 @@ from .filtering import Aid, AidTable, Dynamics, ModelFunctions, aid_table
 from .flat_state import FlatStateModel
 from .inertial_errors import ERROR
 from .lever_arms import has_measurement_function, with_lever_arms
+from .measurement_functions import PredictedReading
 from .measurements import wrap
 from .moving_chain import MovingModel
 from .named_state import NamedState
@@ -124,24 +124,9 @@ class ShipModel(FlatStateModel, MovingModel):
         self.current, self.current_time = current, current_time
         self.sway = sway
 
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        """A copy: the named blocks of its state are views of the flat one."""
-        vars(self).update(state)
-        if "numbers" in state:
-            self._bind()
-
     def _bind(self) -> None:
         """Name the blocks of the flat state."""
-        self._clock, self.position, self.x = ship_state.function(self.numbers)
-
-    @property
-    def time(self) -> float:
-        """Time of the state [s]."""
-        return float(self._clock[0])
-
-    @time.setter
-    def time(self, time: float) -> None:
-        self._clock[0] = time
+        _, self.position, self.x = ship_state.function(self.numbers)
 
     def functions(self) -> ModelFunctions | None:
         """As `ErrorModel.functions`; None if an instrument has an equation of its own."""
@@ -263,8 +248,8 @@ class ShipModel(FlatStateModel, MovingModel):
             if not self.observes(sheet):
                 continue
             if has_measurement_function(sheet):
-                bias_at, white, places = self.bias_at.get(name, -1), _white(sheet), self.blocks.places(name, 0)
-                self.own[name] = ShipObservation(sheet, places, bias_at, white, self._height_variance, self.sway**2)
+                white, places = _white(sheet), self.blocks.places(name, 0)
+                self.own[name] = ShipObservation(sheet, places, white, self._height_variance, self.sway**2)
             else:
                 code, self._noise[name] = _noise(sheet, self.sway)
                 arm = np.array(sheet.lever_arm, dtype=np.float64)
@@ -284,8 +269,12 @@ class ShipModel(FlatStateModel, MovingModel):
     def measure(self, measurement: Measurement) -> Linearised | None:
         """Linearise one measurement."""
         if measurement.instrument in self.own:
-            own = self.own[measurement.instrument]
-            return own.measure(measurement.time, measurement.value, self.position, self.x, measurement.side)
+            name, state = measurement.instrument, PlacedShip(self.position, self.x)
+            found = self._compare_own(name, measurement.time, measurement.value, state, measurement.side)
+            if found is None:
+                return None
+            noise = self.own[name].noise(found, float(self.x[SHIP.heading]))
+            return Linearised(found.innovation, found.jacobian, noise)
         return super().measure(measurement)
 
     def observe_own(
@@ -293,8 +282,14 @@ class ShipModel(FlatStateModel, MovingModel):
     ) -> tuple[Array, Array] | None:
         """As `ErrorModel.observe_own`, at a `PlacedShip`."""
         assert isinstance(state, PlacedShip)
-        found = self.own[name].observe(time, value, state.position, state.x, side)
+        found = self._compare_own(name, time, value, state, side)
         return None if found is None else (found.innovation, found.jacobian)
+
+    def _compare_own(
+        self, name: str, time: float, value: Array, state: PlacedShip, side: Array
+    ) -> PredictedReading | None:
+        own = self.own[name]
+        return own.compare(own.point(time, state, side), value, state.x, 0, self.bias_at.get(name, -1))
 
     def move_all(self, states: tuple[Array, ...], elapsed: Array, jacobian: Array | None = None) -> None:
         """As `MovingModel.move_all`."""

@@ -22,7 +22,7 @@ from .columns import Columns
 from .filtering import AidTable, aid_of
 from .moving_chain import MovingChain
 from .ship import ShipModel
-from .ship_kernels import VELOCITY, fill_jacobian, residual_of
+from .ship_kernels import VELOCITY, linearise_ship
 from .ship_observation import PlacedShip
 
 __all__ = ["ShipChain"]
@@ -68,13 +68,11 @@ def _linearise_aids(
         k, s = measured.row[i], measured.instrument[i]
         if k < 0:
             continue
-        aid = aid_of(aids, s)
-        a, b = residual_of(aid, position[k], x[k], value[i, 0], value[i, 1])
-        residual[i, 0], residual[i, 1], residual[i, 2] = a, b, 0.0
         for r in range(3):
             for c in range(x.shape[1]):
                 jacobian[i, r, c] = 0.0
-        fill_jacobian(aid, x[k], jacobian[i])
+        a, b = linearise_ship(aid_of(aids, s), position[k], x[k], value[i, 0], value[i, 1], jacobian[i])
+        residual[i, 0], residual[i, 1], residual[i, 2] = a, b, 0.0
 
 
 class ShipChain(MovingChain):

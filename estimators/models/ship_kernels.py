@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from simnav.compiled import helper, kernel
-from simnav.geometry.earth import radii_scalar
+from simnav.geometry.earth import horizontal_offset, move_position
 from simnav.kernel_types import Matrix, Stack, Vector
 from simnav.structures import structure
 from simnav.types import Array
@@ -135,14 +135,6 @@ def sail(x: Array, decay: Array, turning: float, dt: float) -> ShipStep:
 
 
 @helper
-def displace_ship(position: Array, north: float, east: float) -> None:
-    """Move a position by metres, with the radii where it was."""
-    meridian, prime = radii_scalar(sin(position[0]))
-    position[1] += east / ((prime + position[2]) * cos(position[0]))
-    position[0] += north / (meridian + position[2])
-
-
-@helper
 def carry_rows(M: Array, decay: Array, turning: float, dt: float, u: float, c: float, s: float) -> None:
     """``M = F M`` in place, F the transition matrix of `sail`'s step."""
     n = M.shape[1]
@@ -164,7 +156,7 @@ def sail_step(
 ) -> tuple[float, float, float]:
     """Move a state on by a step, and a transition matrix with it; return what `carry_rows` takes."""
     step = sail(x, decay, turning, dt)
-    displace_ship(position, step.north, step.east)
+    move_position(position, step.north, step.east, 0.0)
     carry_rows(transition, decay, turning, dt, step.speed, step.cosine, step.sine)
     return step.speed, step.cosine, step.sine
 
@@ -265,94 +257,70 @@ def sail_ships(position: Matrix, x: Matrix, elapsed: Vector, rate: Vector, turn_
 def differ_ships(position: Matrix, x: Matrix, other: Matrix, other_x: Matrix, difference: Matrix) -> None:
     """Fill in (K, n) by how much K states differ from K others, in metres with the radii of the others."""
     for k in range(x.shape[0]):
-        meridian, prime = radii_scalar(sin(other[k, 0]))
-        east = position[k, 1] - other[k, 1]
-        difference[k, SHIP.north] = (position[k, 0] - other[k, 0]) * (meridian + other[k, 2])
-        difference[k, SHIP.east] = atan2(sin(east), cos(east)) * (prime + other[k, 2]) * cos(other[k, 0])
+        north, east = horizontal_offset(other[k], position[k, 0], position[k, 1])
+        difference[k, SHIP.north], difference[k, SHIP.east] = north, east
         for i in range(SHIP.speed, x.shape[1]):
             difference[k, i] = x[k, i] - other_x[k, i]
 
 
 @helper
-def reading(aid: Aid, x: Array) -> tuple[float, float]:
-    """What an instrument should read, up to two components; a position in metres from that of the state."""
+def reading(aid: Aid, x: Array, jacobian: Array) -> tuple[float, float]:
+    """What an instrument should read, up to two components; a position in metres from that of the state.
+
+    The derivative is written into a matrix of zeros (or of the same instrument's last one).
+    """
     kind, at, scale = aid.code, aid.bias_at, aid.scale_at
-    u, psi, r, lx, ly = x[SHIP.speed], x[SHIP.heading], x[SHIP.turn_rate], aid.lever_arm[0], aid.lever_arm[1]
+    psi, r, lx, ly = x[SHIP.heading], x[SHIP.turn_rate], aid.lever_arm[0], aid.lever_arm[1]
+    ahead, across, c, s = x[SHIP.speed] - r * ly, r * lx, cos(psi), sin(psi)
+    north, east = x[SHIP.current_north], x[SHIP.current_east]
     a, b = 0.0, 0.0
     if kind == HEADING:
-        a = psi
+        a, jacobian[0, SHIP.heading] = psi, 1.0
     elif kind == LOG:
-        a = u - r * ly
+        a, factor = ahead, 1.0
         if scale >= 0:
-            a *= 1.0 + x[scale]
+            factor += x[scale]
+            a, jacobian[0, scale] = a * factor, ahead
+        jacobian[0, SHIP.speed], jacobian[0, SHIP.turn_rate] = factor, -factor * ly
+    elif kind == POSITION:
+        a, b = x[SHIP.north] + c * lx - s * ly, x[SHIP.east] + s * lx + c * ly
+        jacobian[0, SHIP.north], jacobian[1, SHIP.east] = 1.0, 1.0
+        jacobian[0, SHIP.heading], jacobian[1, SHIP.heading] = -s * lx - c * ly, c * lx - s * ly
+    elif kind == VELOCITY:
+        a, b = c * ahead - s * across + north, s * ahead + c * across + east
+        jacobian[0, SHIP.speed], jacobian[1, SHIP.speed] = c, s
+        jacobian[0, SHIP.turn_rate], jacobian[1, SHIP.turn_rate] = -c * ly - s * lx, -s * ly + c * lx
+        jacobian[0, SHIP.heading], jacobian[1, SHIP.heading] = -s * ahead - c * across, c * ahead - s * across
+        jacobian[0, SHIP.current_north], jacobian[1, SHIP.current_east] = 1.0, 1.0
     else:
-        c, s = cos(psi), sin(psi)
-        if kind == POSITION:
-            a, b = x[SHIP.north] + c * lx - s * ly, x[SHIP.east] + s * lx + c * ly
-        else:
-            ahead, across = u - r * ly, r * lx
-            if kind == VELOCITY:
-                a, b = c * ahead - s * across + x[SHIP.current_north], s * ahead + c * across + x[SHIP.current_east]
-            else:
-                a = ahead + c * x[SHIP.current_north] + s * x[SHIP.current_east]
-                b = across - s * x[SHIP.current_north] + c * x[SHIP.current_east]
+        a, b = ahead + c * north + s * east, across - s * north + c * east
+        jacobian[0, SHIP.speed] = 1.0
+        jacobian[0, SHIP.turn_rate], jacobian[1, SHIP.turn_rate] = -ly, lx
+        jacobian[0, SHIP.heading], jacobian[1, SHIP.heading] = c * east - s * north, -c * north - s * east
+        jacobian[0, SHIP.current_north], jacobian[0, SHIP.current_east] = c, s
+        jacobian[1, SHIP.current_north], jacobian[1, SHIP.current_east] = -s, c
     if at >= 0:
-        a += x[at]
+        a, jacobian[0, at] = a + x[at], 1.0
         if kind == POSITION:
-            b += x[at + 1]
+            b, jacobian[1, at + 1] = b + x[at + 1], 1.0
     return a, b
 
 
 @helper
-def fill_jacobian(aid: Aid, x: Array, jacobian: Array) -> None:
-    """The derivative of `reading`, into a matrix of zeros (or of the same instrument's last one)."""
-    kind, at, scale = aid.code, aid.bias_at, aid.scale_at
-    u, psi, r, lx, ly = x[SHIP.speed], x[SHIP.heading], x[SHIP.turn_rate], aid.lever_arm[0], aid.lever_arm[1]
-    if kind == HEADING:
-        jacobian[0, SHIP.heading] = 1.0
-    elif kind == LOG:
-        factor = 1.0
-        if scale >= 0:
-            factor += x[scale]
-            jacobian[0, scale] = u - r * ly
-        jacobian[0, SHIP.speed], jacobian[0, SHIP.turn_rate] = factor, -factor * ly
-    else:
-        c, s = cos(psi), sin(psi)
-        if kind == POSITION:
-            jacobian[0, SHIP.north], jacobian[1, SHIP.east] = 1.0, 1.0
-            jacobian[0, SHIP.heading], jacobian[1, SHIP.heading] = -s * lx - c * ly, c * lx - s * ly
-        elif kind == VELOCITY:
-            ahead, across = u - r * ly, r * lx
-            jacobian[0, SHIP.speed], jacobian[1, SHIP.speed] = c, s
-            jacobian[0, SHIP.turn_rate], jacobian[1, SHIP.turn_rate] = -c * ly - s * lx, -s * ly + c * lx
-            jacobian[0, SHIP.heading], jacobian[1, SHIP.heading] = -s * ahead - c * across, c * ahead - s * across
-            jacobian[0, SHIP.current_north], jacobian[1, SHIP.current_east] = 1.0, 1.0
-        else:
-            jacobian[0, SHIP.speed] = 1.0
-            jacobian[0, SHIP.turn_rate], jacobian[1, SHIP.turn_rate] = -ly, lx
-            jacobian[0, SHIP.heading] = c * x[SHIP.current_east] - s * x[SHIP.current_north]
-            jacobian[1, SHIP.heading] = -c * x[SHIP.current_north] - s * x[SHIP.current_east]
-            jacobian[0, SHIP.current_north], jacobian[0, SHIP.current_east] = c, s
-            jacobian[1, SHIP.current_north], jacobian[1, SHIP.current_east] = -s, c
-    if at >= 0:
-        jacobian[0, at] = 1.0
-        if kind == POSITION:
-            jacobian[1, at + 1] = 1.0
+def linearise_ship(
+    aid: Aid, position: Array, x: Array, first: float, second: float, jacobian: Array
+) -> tuple[float, float]:
+    """Measured minus predicted: metres, radians or metres per second; the second is 0 of a single component.
 
-
-@helper
-def residual_of(aid: Aid, position: Array, x: Array, first: float, second: float) -> tuple[float, float]:
-    """Measured minus predicted: metres, radians or metres per second; the second is 0 of a single component."""
-    a, b = reading(aid, x)
-    if aid.code == POSITION:
-        meridian, prime = radii_scalar(sin(position[0]))
-        east = second - position[1]
-        first = (first - position[0]) * (meridian + position[2])
-        second = atan2(sin(east), cos(east)) * (prime + position[2]) * cos(position[0])
-    elif aid.code == HEADING:
+    The derivative of the prediction is written as by `reading`.
+    """
+    a, b = reading(aid, x, jacobian)
+    if aid.code == HEADING:
         return atan2(sin(first - a), cos(first - a)), 0.0
-    elif aid.code == LOG:
+    if aid.code == LOG:
         return first - a, 0.0
+    if aid.code == POSITION:
+        first, second = horizontal_offset(position, first, second)
     return first - a, second - b
 
 
@@ -390,10 +358,9 @@ def observe_ship(
         Overwritten.
     """
     white = figures.view(SHIP_NOISE)[0]
-    a, b = residual_of(aid, position, x, first, second)
+    a, b = linearise_ship(aid, position, x, first, second, jacobian)
     residual[0] = a
     noise[0, 0] = white.first
-    fill_jacobian(aid, x, jacobian)
     if residual.size == 1:
         return
     residual[1] = b
@@ -405,7 +372,7 @@ def observe_ship(
         noise[1, 0] -= s * c * white.sway
         noise[1, 1] += c * c * white.sway
     elif aid.code == BODY_VELOCITY:
-        v, w = reading(aid, x)
+        v, w = reading(aid, x, jacobian)
         noise[0, 0] += white.scale * v * v + white.misalignment * w * w
         noise[1, 1] += white.scale * w * w + white.misalignment * v * v + white.sway
 
@@ -413,8 +380,9 @@ def observe_ship(
 @kernel
 def read_ships(aid: Aid, states: Matrix, readings: Matrix) -> None:
     """Fill in (k, m) what an instrument should read at (k, n) states; a position in metres."""
+    derivative = np.zeros((2, states.shape[1]))
     for k in range(states.shape[0]):
-        a, b = reading(aid, states[k])
+        a, b = reading(aid, states[k], derivative)
         readings[k, 0] = a
         if readings.shape[1] > 1:
             readings[k, 1] = b
@@ -423,7 +391,7 @@ def read_ships(aid: Aid, states: Matrix, readings: Matrix) -> None:
 @kernel
 def correct_ship(position: Vector, x: Vector, dx: Vector) -> None:
     """Add the correction ``dx`` (n,) to a state, in place."""
-    displace_ship(position, dx[SHIP.north], dx[SHIP.east])
+    move_position(position, dx[SHIP.north], dx[SHIP.east], 0.0)
     for i in range(SHIP.speed, x.size):
         x[i] += dx[i]
 
@@ -454,9 +422,8 @@ def describe_ship(x: Vector, covariance: Matrix, sway: float, velocity: Vector, 
     """
     n = x.size
     aid = Aid(VELOCITY, np.zeros(3), -1, -1)
-    velocity[0], velocity[1] = reading(aid, x)
     G = np.zeros((2, n))
-    fill_jacobian(aid, x, G)
+    velocity[0], velocity[1] = reading(aid, x, G)
     rows = np.zeros((5, n))  # of G P, G being of position, velocity, heading
     for j in range(n):
         rows[0, j], rows[1, j] = covariance[SHIP.north, j], covariance[SHIP.east, j]

@@ -18,15 +18,13 @@ from simnav.geometry.earth import displace
 from simnav.kinds import NavigationPoint
 from simnav.types import NO_SIDE, Array, Datasheet
 
-from .ambiguity import innovation_of
-from .base import Linearised
 from .channel_readings import ChannelReadings
 from .inertial_errors import ERROR, PART
-from .measurement_functions import Kinematics, MeasurementFunction
+from .measurement_functions import Kinematics, MeasurementFunction, PredictedReading
 from .named_state import NamedState
 from .ship_kernels import SHIP
 
-__all__ = ["HEEL", "VERTICAL_SPEED", "PlacedShip", "PredictedReading", "ShipObservation", "ShipReadings"]
+__all__ = ["HEEL", "VERTICAL_SPEED", "PlacedShip", "ShipObservation", "ShipReadings"]
 
 #: Roll and pitch, which the model takes for zero, one sigma [rad].
 HEEL = 0.03
@@ -49,27 +47,6 @@ class PlacedShip(NamedTuple):
     x: Array
 
 
-class PredictedReading(NamedTuple):
-    """A reading of d components, compared with what the state of a ship predicts.
-
-    Attributes
-    ----------
-    innovation : (d,) array
-        Measured minus predicted, in the units of the kind's errors.
-    jacobian : (d, n) array
-        Derivative of the prediction by the state of the ship.
-    own : (d, 9 + b) array
-        That by the navigation state and the b components of blocks, as `MeasurementFunction.predict` gives it.
-    point : NavigationPoint
-        Where the reading is predicted.
-    """
-
-    innovation: Array
-    jacobian: Array
-    own: Array
-    point: NavigationPoint
-
-
 class ShipObservation(MeasurementFunction):
     """The measurement equation of one instrument on a ship.
 
@@ -79,110 +56,38 @@ class ShipObservation(MeasurementFunction):
         Datasheet of the instrument, of a kind with an observation.
     places : mapping of str to int
         Index in the state of the first component of each of the instrument's blocks.
-    bias_at : int
-        Index of the instrument's first bias in the state; -1 if it has none.
     white : (d,) array
         Variance of the white noise of each component, in the units of the kind.
     height, sway : float
         Variance of the height [m^2], and of the sideways velocity [(m/s)^2].
     """
 
-    def __init__(
-        self, sheet: Datasheet, places: Mapping[str, int], bias_at: int, white: Array, height: float, sway: float
-    ):
+    def __init__(self, sheet: Datasheet, places: Mapping[str, int], white: Array, height: float, sway: float):
         super().__init__(sheet, places)
-        self._bias_at, self._white, self._sway = bias_at, np.diag(white), sway
+        self._white, self._sway = np.diag(white), sway
         self._unknown = np.diag([0.0, 0.0, height, 0.0, 0.0, VERTICAL_SPEED**2, HEEL**2, HEEL**2, 0.0])
 
-    def measure(self, time: float, value: Array, position: Array, x: Array, side: Array = NO_SIDE) -> Linearised | None:
-        """Linearise one measurement.
+    def point(self, time: float, state: NamedState, side: Array = NO_SIDE) -> NavigationPoint:
+        """As `MeasurementFunction.point`, at a `PlacedShip`."""
+        assert isinstance(state, PlacedShip)
+        return NavigationPoint(time, state.position, *_kinematics(state.x), self.blocks(state.x), self.channel, side)
 
-        Parameters
-        ----------
-        time : float
-            Time of validity [s].
-        value : (d,) array
-            The measured value.
-        position, x : (3,), (n,) array
-            State of the ship (`simnav.estimators.models.ship_kernels`).
-        side : (s,) array
-            Side information of the reading.
-
-        Returns
-        -------
-        Linearised or None
-            None where the state has no reading.
-        """
-        found = self.observe(time, value, position, x, side)
-        if found is None:
-            return None
+    def noise(self, found: PredictedReading, heading: float) -> Array:
+        """The (d, d) covariance of the noise of a reading, with what the state of a ship lacks."""
         own = found.own[:, PART.navigation]
         by_north, by_east = own[:, ERROR.velocity], own[:, ERROR.velocity + 1]
-        aside = self._sway**0.5 * (by_east * cos(x[SHIP.heading]) - by_north * sin(x[SHIP.heading]))
+        aside = self._sway**0.5 * (by_east * cos(heading) - by_north * sin(heading))
         noise = self._white + own @ self._unknown @ own.T + np.outer(aside, aside)
         more = self.spread(found.own, found.point)
-        return Linearised(found.innovation, found.jacobian, noise if more is None else noise + more)
+        return noise if more is None else noise + more
 
-    def observe(
-        self, time: float, value: Array, position: Array, x: Array, side: Array = NO_SIDE
-    ) -> PredictedReading | None:
-        """As `measure`, without the noise."""
-        point = self._point(time, position, x, side)
-        predicted = self.predict(point)
-        if predicted is None:
-            return None
-        reading, own = predicted
-        jacobian, at, d = own[:, PART.navigation] @ _navigation(x), self._bias_at, len(reading)
-        self.place(own, jacobian, 0)
-        if at >= 0:
-            jacobian[:, at : at + d] = np.eye(d)
-            reading = self.kind.add_error(reading, x[at : at + d])
-        return PredictedReading(innovation_of(self.kind, self.sheet, value, reading), jacobian, own, point)
+    def _by_motion(self, own: Array, states: Array, jacobian: Array) -> None:
+        jacobian[:] = own[:, PART.navigation] @ _navigation(states)
 
-    def differences_at(self, time: float, position: Array, x: Array, errors: Array, side: Array = NO_SIDE) -> Array:
-        """What the instrument should read at k states, minus what it should read at one.
-
-        Parameters
-        ----------
-        time : float
-            Time of validity [s].
-        position, x : (3,), (n,) array
-            The state that the k states are compared with; it has a reading.
-        errors : (k, n) array
-            Differences of the k states from it: metres north and east, then those of ``x``.
-        side : (s,) array
-            Side information of the reading.
-
-        Returns
-        -------
-        (k, d) array
-            A state that has no reading gets the difference by the Jacobian.
-        """
-        point = self._point(time, position, x, side)
-        predicted = self.predict(point)
-        assert predicted is not None, "the model's own state has a reading"
-        reading, own = predicted
+    def _near(self, point: NavigationPoint, states: Array, errors: Array) -> Kinematics:
         north, east = errors[:, SHIP.north], errors[:, SHIP.east]
-        places = displace(position, np.column_stack([north, east, np.zeros(len(errors))]))
-        if self.observations is not None:
-            states = Kinematics(places, *_kinematics(x + errors))
-            differences = np.asarray(self.kind.difference(self.read_many(point, states, errors, 0), reading))
-        else:
-            jacobian = own[:, PART.navigation] @ _navigation(x)
-            self.place(own, jacobian, 0)
-            differences = errors @ jacobian.T
-            for k, error in enumerate(errors):
-                found = self.read(self._point(time, places[k], x + error, side))
-                if found is not None:
-                    differences[k] = self.kind.difference(found, reading)
-        at = self._bias_at
-        if at >= 0:
-            differences += errors[:, at : at + len(reading)]
-        return differences
-
-    def _point(self, time: float, position: Array, x: Array, side: Array) -> NavigationPoint:
-        """The navigation state of a ship."""
-        return NavigationPoint(time, position, *_kinematics(x), self.blocks(x), self.channel, side)
+        places = displace(point.position, np.column_stack([north, east, np.zeros(len(errors))]))
+        return Kinematics(places, *_kinematics(states + errors))
 
 
 class ShipReadings(ChannelReadings):

@@ -22,6 +22,7 @@ from .ship_functions import SHIP_MOTION, retract, ship_state
 from .ship_functions import predict as linearise
 from .ship_functions import propagate as propagate_linearised
 from .ship_kernels import HEADING, move_ships, read_ships
+from .ship_observation import PlacedShip
 
 __all__ = ["ShipPoints"]
 
@@ -122,8 +123,9 @@ class ShipPoints(ShipModel, PointModel):
     def observe_points(self, measurement: Measurement, errors: Array) -> Array:
         """What the instrument should read at the points, minus what it should read at the state."""
         if measurement.instrument in self.own:
-            own = self.own[measurement.instrument]
-            return own.differences_at(measurement.time, self.position, self.x, errors, measurement.side)
+            own, bias_at = self.own[measurement.instrument], self.bias_at.get(measurement.instrument, -1)
+            point = own.point(measurement.time, PlacedShip(self.position, self.x), measurement.side)
+            return own.differences(point, self.x, errors, 0, bias_at)
         aid = self.aids[measurement.instrument]
         differences = np.empty((len(errors), components_of(aid)))
         observe_points(aid, self.x, errors, differences)

@@ -33,11 +33,9 @@ def without_shared_blocks(instruments: Instruments) -> Instruments:
     """
     if not any(block.shared for sheet in instruments.values() for block in sheet.blocks):
         return instruments
-    sheets = [
-        replace(sheet, blocks=tuple(replace(block, shared="") for block in sheet.blocks))
-        for sheet in instruments.values()
-    ]
-    return Instruments(sheets, instruments.imu, instruments.step)
+    return instruments.changed(
+        lambda sheet: replace(sheet, blocks=tuple(replace(block, shared="") for block in sheet.blocks))
+    )
 
 
 class StateBlocks:

@@ -38,7 +38,7 @@ from typing import NamedTuple
 import numpy as np
 
 from simnav.geometry.earth import principal_radii
-from simnav.geometry.rotation import dcm_from_rpy, rotation_vector_from_dcm
+from simnav.geometry.rotation import dcm_from_rpy, rotation_vector_from_dcm, skew
 from simnav.types import (
     Array,
     Datasheet,
@@ -327,8 +327,7 @@ class TruthLinearisedModel(ErrorModel):
             if errors.scale >= 0:
                 jacobian[:, errors.scale] = u
             if errors.misalignment >= 0:
-                at = errors.misalignment
-                jacobian[:, at : at + 3] = [[0.0, -u[2], u[1]], [u[2], 0.0, -u[0]], [-u[1], u[0], 0.0]]
+                jacobian[:, errors.misalignment : errors.misalignment + 3] = skew(u)
         if errors.deviation >= 0:
             heading = np.arctan2(self.nominal.dcm[1, 0], self.nominal.dcm[0, 0])
             jacobian[0, errors.deviation : errors.deviation + 2] = np.sin(heading), np.cos(heading)

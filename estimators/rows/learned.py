@@ -62,9 +62,7 @@ class NetFgo(
     Versions
     --------
     2
-        Where the motion gets less weight, the states of vessel and IMU may change, but not the errors of instruments:
-        a bias of the receiver explained fixes that contradicted a wrong motion. Fixes without a log are asked with a
-        looser motion from test to test until they agree.
+        As version 4 of ``huber-fgo``.
         The network learned anew: before, its target counted a noise step twice.
     """
 

@@ -65,9 +65,7 @@ class GncFgoLoose(
     2
         It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
     3
-        Where the motion gets less weight, the states of vessel and IMU may change, but not the errors of instruments:
-        a bias of the receiver explained fixes that contradicted a wrong motion. Fixes without a log are asked with a
-        looser motion from test to test until they agree.
+        As version 4 of ``huber-fgo``.
     """
 
     version = 3

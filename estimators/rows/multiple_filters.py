@@ -98,9 +98,7 @@ class MidValue(
     4
         The motion is suspected, too, where the weighting has rejected measurements, and where there is no log.
     5
-        Where the motion gets less weight, the states of vessel and IMU may change, but not the errors of instruments:
-        a bias of the receiver explained fixes that contradicted a wrong motion. Fixes without a log are asked with a
-        looser motion from test to test until they agree.
+        As version 4 of ``huber-fgo``.
     """
 
     version = 5

@@ -26,11 +26,7 @@ class _Window(Row, solver=piece(WindowEstimator, defaults={"tolerance": 0.05}, e
 
 
 class _Robust(_Window, isolation=FaultIsolation):
-    """The window that isolates faults, without its weighting.
-
-    Version 2: a log that is the last witness is believed against the motion, and the motion that leads to the node of
-    the first suspect reading is loosened, too.
-    """
+    """The window that isolates faults, without its weighting."""
 
     version = 2
 
@@ -42,14 +38,13 @@ class HuberFgo(_Robust, weighting=piece(TunedMEstimator, weight=huber)):
     It does not notice that it is lost on a ship without an IMU whose instruments are wrong or with an IMU that is
     poorer than stated (``python -m tests.audit silence`` counts such runs).
 
-    Version 2: a log that is the last witness beside the motion is not rejected for good.
-
     Source: P. J. Huber, *Robust Statistics*, 1981.
 
     Versions
     --------
     2
-        It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
+        It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`). A log that is the last
+        witness beside the motion is not rejected for good.
     3
         The motion is suspected, too, where the weighting has rejected measurements, and where there is no log.
     4
@@ -68,8 +63,6 @@ class TukeyFgo(_Robust, weighting=piece(TunedMEstimator, weight=tukey)):
     It does not notice that it is lost on a ship without an IMU whose instruments are wrong or from a start that is
     worse than stated (``python -m tests.audit silence`` counts such runs).
 
-    Version 2: a log that is the last witness beside the motion is not rejected for good.
-
     Beside an IMU that is poorer than its datasheet, 1 of 20 voyages (``training-poor-imu``, seeds 70000 to 70190,
     every tenth) had more than 1.5 times the error of ``sw-fgo``, 8.5 times at most (70160).
 
@@ -78,13 +71,11 @@ class TukeyFgo(_Robust, weighting=piece(TunedMEstimator, weight=tukey)):
     Versions
     --------
     2
-        It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
+        As of ``huber-fgo``.
     3
-        The motion is suspected, too, where the weighting has rejected measurements, and where there is no log.
+        As of ``huber-fgo``.
     4
-        Where the motion gets less weight, the states of vessel and IMU may change, but not the errors of instruments:
-        a bias of the receiver explained fixes that contradicted a wrong motion. Fixes without a log are asked with a
-        looser motion from test to test until they agree.
+        As of ``huber-fgo``.
     """
 
     version = 4
@@ -97,20 +88,16 @@ class CauchyFgo(_Robust, weighting=piece(TunedMEstimator, weight=cauchy)):
     It does not notice that it is lost on a ship without an IMU whose instruments are wrong (``python -m tests.audit
     silence`` counts such runs).
 
-    Version 2: a log that is the last witness beside the motion is not rejected for good.
-
     Source: P. W. Holland and R. E. Welsch, *Robust regression using iteratively reweighted least-squares*, 1977.
 
     Versions
     --------
     2
-        It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
+        As of ``huber-fgo``.
     3
-        The motion is suspected, too, where the weighting has rejected measurements, and where there is no log.
+        As of ``huber-fgo``.
     4
-        Where the motion gets less weight, the states of vessel and IMU may change, but not the errors of instruments:
-        a bias of the receiver explained fixes that contradicted a wrong motion. Fixes without a log are asked with a
-        looser motion from test to test until they agree.
+        As of ``huber-fgo``.
     """
 
     version = 4
@@ -123,8 +110,6 @@ class GmFgo(_Robust, weighting=piece(TunedMEstimator, weight=geman_mcclure)):
     It does not notice that it is lost on a ship without an IMU whose instruments are wrong (``python -m tests.audit
     silence`` counts such runs).
 
-    Version 2: a log that is the last witness beside the motion is not rejected for good.
-
     Beside an IMU that is poorer than its datasheet, 2 of 20 voyages (``training-poor-imu``, seeds 70000 to 70190,
     every tenth) had more than 1.5 times the error of ``sw-fgo``, 7.3 times at most (70160).
 
@@ -133,13 +118,11 @@ class GmFgo(_Robust, weighting=piece(TunedMEstimator, weight=geman_mcclure)):
     Versions
     --------
     2
-        It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
+        As of ``huber-fgo``.
     3
-        The motion is suspected, too, where the weighting has rejected measurements, and where there is no log.
+        As of ``huber-fgo``.
     4
-        Where the motion gets less weight, the states of vessel and IMU may change, but not the errors of instruments:
-        a bias of the receiver explained fixes that contradicted a wrong motion. Fixes without a log are asked with a
-        looser motion from test to test until they agree.
+        As of ``huber-fgo``.
     """
 
     version = 4
@@ -152,8 +135,6 @@ class DcsFgo(_Robust, weighting=DynamicCovarianceScaling):
     It does not notice that it is lost on a ship without an IMU whose instruments are wrong or from a start that is
     worse than stated (``python -m tests.audit silence`` counts such runs).
 
-    Version 2: a log that is the last witness beside the motion is not rejected for good.
-
     Beside an IMU that is poorer than its datasheet, 1 of 20 voyages (``training-poor-imu``, seeds 70000 to 70190,
     every tenth) had more than 1.5 times the error of ``sw-fgo``, 8.2 times at most (70160).
 
@@ -163,13 +144,11 @@ class DcsFgo(_Robust, weighting=DynamicCovarianceScaling):
     Versions
     --------
     2
-        It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
+        As of ``huber-fgo``.
     3
-        The motion is suspected, too, where the weighting has rejected measurements, and where there is no log.
+        As of ``huber-fgo``.
     4
-        Where the motion gets less weight, the states of vessel and IMU may change, but not the errors of instruments:
-        a bias of the receiver explained fixes that contradicted a wrong motion. Fixes without a log are asked with a
-        looser motion from test to test until they agree.
+        As of ``huber-fgo``.
     """
 
     version = 4
@@ -182,8 +161,6 @@ class SwitchableFgo(_Robust, weighting=SwitchableConstraints):
     It does not notice that it is lost on a ship without an IMU whose instruments are wrong (``python -m tests.audit
     silence`` counts such runs).
 
-    Version 2: a log that is the last witness beside the motion is not rejected for good.
-
     Beside an IMU that is poorer than its datasheet, 2 of 20 voyages (``training-poor-imu``, seeds 70000 to 70190,
     every tenth) had more than 1.5 times the error of ``sw-fgo``, 9.2 times at most (70160).
 
@@ -192,13 +169,11 @@ class SwitchableFgo(_Robust, weighting=SwitchableConstraints):
     Versions
     --------
     2
-        It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
+        As of ``huber-fgo``.
     3
-        The motion is suspected, too, where the weighting has rejected measurements, and where there is no log.
+        As of ``huber-fgo``.
     4
-        Where the motion gets less weight, the states of vessel and IMU may change, but not the errors of instruments:
-        a bias of the receiver explained fixes that contradicted a wrong motion. Fixes without a log are asked with a
-        looser motion from test to test until they agree.
+        As of ``huber-fgo``.
     """
 
     version = 4
@@ -236,9 +211,7 @@ class GncFgo(
     5
         The motion is suspected, too, where the weighting has rejected measurements, and where there is no log.
     6
-        Where the motion gets less weight, the states of vessel and IMU may change, but not the errors of instruments:
-        a bias of the receiver explained fixes that contradicted a wrong motion. Fixes without a log are asked with a
-        looser motion from test to test until they agree.
+        As version 4 of ``huber-fgo``.
     """
 
     version = 6
@@ -251,20 +224,16 @@ class MaxMixtureFgo(_Robust, weighting=MaxMixture):
     It does not notice that it is lost on a ship without an IMU whose instruments are wrong (``python -m tests.audit
     silence`` counts such runs).
 
-    Version 2: a log that is the last witness beside the motion is not rejected for good.
-
     Source: E. Olson and P. Agarwal, *Inference on networks of mixtures for robust robot mapping*, IJRR 32(7), 2013.
 
     Versions
     --------
     2
-        It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
+        As of ``huber-fgo``.
     3
-        The motion is suspected, too, where the weighting has rejected measurements, and where there is no log.
+        As of ``huber-fgo``.
     4
-        Where the motion gets less weight, the states of vessel and IMU may change, but not the errors of instruments:
-        a bias of the receiver explained fixes that contradicted a wrong motion. Fixes without a log are asked with a
-        looser motion from test to test until they agree.
+        As of ``huber-fgo``.
     """
 
     version = 4

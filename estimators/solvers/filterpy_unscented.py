@@ -75,8 +75,7 @@ class FilterpyUnscentedEstimator(Solver, FilterpyEstimator):
         """Begin a run; UnsuitableScenario if the model lacks an instrument."""
         self.model.choose(instruments, self.label)
         # It reads compiled equations only: what is not known of lever arms and stamps has no states here.
-        sheets = [replace(s, blocks=(), timing=None) if s.equation else s for s in instruments.values()]
-        super().reset(start, Instruments(sheets, instruments.imu, instruments.step))
+        super().reset(start, instruments.changed(lambda s: replace(s, blocks=(), timing=None) if s.equation else s))
 
     def build(self, start: InitialState, instruments: Instruments) -> Any:
         """The filter at the model's initial state."""

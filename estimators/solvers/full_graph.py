@@ -15,6 +15,7 @@ from simnav.estimators.models.suitable import ModelChoice
 from simnav.estimators.weightings.base import Isolation, Weighting
 from simnav.types import Array, Estimate, InitialState, Instruments, Measurements, NavigationStates
 
+from .looking_back import estimate_of_node
 from .smoother import smoother_gains
 from .window import WindowEstimator
 
@@ -71,25 +72,18 @@ class FullGraph(WindowEstimator):
         """The whole trajectory at the ends of all steps; None before the first."""
         if not self._ends:
             return None
-        chain, front = self.chain, self.chain.front
         self._converge(0)
         covariances = self._smoothed_covariances()
-        now, time = front.snapshot(), front.time
         series = np.full((3, len(self._ends), 3), np.nan)
         self.smoothed_covariance = np.full((len(self._ends), 9, 9), np.nan)
         for row, node in enumerate(self._ends):
-            front.restore([chain.nodes[name][node] for name in front.state])
-            front.time = float(chain.nodes["time"][node])
-            out = front.estimate(covariances[node])
+            out = estimate_of_node(self.chain, node, covariances[node])
             for kind, vector in enumerate((out.position, out.velocity, out.attitude)):
                 if vector is not None:
                     series[kind, row] = vector
             if out.covariance is not None:
                 self.smoothed_covariance[row] = out.covariance
-        times = chain.nodes["time"][self._ends].copy()
-        front.restore(now)
-        front.time = time
-        return NavigationStates(times, *series)
+        return NavigationStates(self.chain.nodes["time"][self._ends].copy(), *series)
 
     def _smoothed_covariances(self) -> Array:
         """Of all nodes, from all measurements (`simnav.estimators.solvers.smoother`)."""

@@ -26,6 +26,7 @@ from simnav.types import Estimate, ImuSamples, InitialState, Instruments, Measur
 
 from .imm import ImmEstimator, mix
 from .kalman import FilterFunctions
+from .step_report import StepReport, note_readings
 
 __all__ = ["FULL", "RARE", "HypothesisFilter", "Step", "lone_fix"]
 
@@ -108,8 +109,8 @@ class HypothesisFilter(ImmEstimator):
     nis, freedom : float
         Sum of the normalised innovations squared of the last step, and of their degrees of freedom, by the noise of the
         datasheets. An instrument of a high rate counts as for the evidence.
-    notes : list of (Measurement, float, float)
-        The measurements used in the last step, with the normalised innovation squared and the norm of the innovation.
+    notes : list of (Measurement, float)
+        The measurements of the last step, with the normalised innovation squared; below 0 where one was not used.
     """
 
     model: DoubtingModel
@@ -123,7 +124,7 @@ class HypothesisFilter(ImmEstimator):
 
     def _clear(self) -> None:
         self.evidence = self.nis = self.freedom = 0.0
-        self.notes: list[tuple[Measurement, float, float]] = []
+        self.notes: list[tuple[Measurement, float]] = []
 
     def functions(self) -> FilterFunctions:
         """The correction is a mixture that reports its evidence."""
@@ -145,6 +146,10 @@ class HypothesisFilter(ImmEstimator):
         self._clear()
         with self.model.saturated(step.saturated):
             self._advance(step.readings, step.until, [])
+
+    def note_last(self, report: StepReport) -> None:
+        """Note the measurements of the last step in a report."""
+        note_readings.unchecked(report, self._arrays.room(0), len(self.notes))
 
     def estimate(self) -> Estimate:
         """The estimate at the end of the step."""
@@ -171,5 +176,4 @@ class HypothesisFilter(ImmEstimator):
         self.evidence += said.density
         self.nis += said.nis
         self.freedom += said.freedom
-        nis, size = readings.nis[:count].tolist(), readings.size[:count].tolist()
-        self.notes += zip(self._measurements, nis, size, strict=True)
+        self.notes += zip(self._measurements, readings.nis[:count].tolist(), strict=True)

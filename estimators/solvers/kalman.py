@@ -28,7 +28,7 @@ from simnav.estimators.adaptations.base import Adaptation, Innovation
 from simnav.estimators.adaptations.choice import Choice, choose_noise, no_choice
 from simnav.estimators.adaptations.inflation import inflate_moving
 from simnav.estimators.adaptations.noise import NoiseAdaptation
-from simnav.estimators.adaptations.noise_report import CHOSEN, NoiseReport
+from simnav.estimators.adaptations.noise_report import NoiseReport
 from simnav.estimators.algebra.joseph import joseph_update, project
 from simnav.estimators.composition import Solver
 from simnav.estimators.models.base import ErrorModel, Linearised
@@ -40,15 +40,14 @@ from simnav.estimators.models.stated_sigmas import with_stated_sigmas
 from simnav.estimators.models.suitable import ModelChoice
 from simnav.steps import Steps
 from simnav.structures import length
-from simnav.types import KINDS, Array, Estimate, InitialState, Instruments, Measurement, Measurements, NavigationStates
+from simnav.types import Array, Estimate, InitialState, Instruments, Measurement, Measurements, NavigationStates
 
 from .admission import Admission, Arrivals, together
 from .filter_step import Filter, correct, filter_step, use_nominal
 from .filter_steps import FLAG, StepStates, filter_steps
-from .innovation_consistency import begun_test
 from .iterated import Iteration, absorb_iterated
 from .smoother import Smoother
-from .step_report import INNOVATION, TESTS, StepReport, end_report, note_readings
+from .step_report import begun_report, end_report, labels_of, note_readings
 from .step_together import step_together
 
 __all__ = ["FilterFunctions", "KalmanEstimator"]
@@ -135,14 +134,14 @@ class KalmanEstimator(Solver):
         self._admission = Admission(instruments, self._names)
         self._owners, self._mean_labels = owners(instruments), dict[str, str]()
         self._blank: dict[str, float | Array] = {}
-        self._labels = [f"{what}.{name}" for name in self._names for what in ("innovation", "nis")] + [*TESTS]
+        self._labels = labels_of(self._names)
         self._linearised: Linearised | None = None
         self._measurements: Sequence[Measurement] = ()
         self._arrays = ReadingsOfSteps({name: self.model.components(instruments[name]) for name in self._names})
         self._filter = self._assembled(instruments)
         self._compiled, self._iterated = self._filter.compiled, False
         self._noise_report = self._reported_noise(instruments)
-        self._report = self._begun_report(instruments)
+        self._report = begun_report(instruments, self._names, self._admission.record.skipped, self._noise_report)
         self._row = np.empty(len(self._labels) + self._report.chosen.size)
         if self.smoother is not None:
             self.smoother.begin(self.model, [instruments[name] for name in self._names])
@@ -258,18 +257,6 @@ class KalmanEstimator(Solver):
         """Where the noise is reported that `choose_noise` chooses; None if it does not choose."""
         own = self.adaptation
         return own.report if isinstance(own, NoiseAdaptation) and self._filter.choose is choose_noise else None
-
-    def _begun_report(self, instruments: Instruments) -> StepReport:
-        """What is reported of the steps of a run, before the first."""
-        names, noise = list(instruments), self._noise_report
-        return StepReport(
-            freedom=np.array([len(KINDS[instruments[name].kind].limits) for name in self._names], np.int64),
-            skipped=self._admission.record.skipped, test=begun_test(),
-            chosen=np.empty((0, length(CHOSEN))) if noise is None else noise.values,
-            index=np.array([-1 if noise is None else names.index(name) for name in self._names], np.int64),
-            with_zero=noise is not None and noise.with_zero,
-            innovations=np.full(length(INNOVATION) * len(self._names), np.nan),
-        )  # fmt: skip
 
     def _dynamics(self) -> Dynamics:
         """What the functions of the model work on; subclasses may override it."""

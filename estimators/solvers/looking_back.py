@@ -27,7 +27,7 @@ from simnav.geometry.earth import displace, relative_position
 from simnav.geometry.rotation import dcm_from_rpy, rpy_from_dcm
 from simnav.types import Array, Estimate
 
-__all__ = ["LooksBack", "StepEnd", "WindowReader", "row_of", "smoothed_rows"]
+__all__ = ["LooksBack", "StepEnd", "WindowReader", "estimate_of_node", "row_of", "smoothed_rows"]
 
 _TOLERANCE = 1e-6  # s
 
@@ -36,6 +36,19 @@ def row_of(estimate: Estimate) -> Array:
     """Position, velocity and attitude of an estimate in one (9,) array, at `PART`; NaN for what it does not hold."""
     vectors = (estimate.position, estimate.velocity, estimate.attitude)
     return np.concatenate([np.full(3, np.nan) if v is None else v for v in vectors])
+
+
+def estimate_of_node(chain: Chain, node: int, covariance: Array) -> Estimate:
+    """The estimate that a node of a window is, with the (n, n) covariance of its error."""
+    front = chain.front
+    kept, time = front.snapshot(), front.time
+    front.restore([chain.nodes[name][node] for name in front.state])
+    front.time = float(chain.nodes["time"][node])
+    try:
+        return front.estimate(covariance)
+    finally:
+        front.restore(kept)
+        front.time = time
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,26 +87,28 @@ class WindowReader:
         self._chain, self.nodes = chain, chain.nodes
         self._ends: deque[StepEnd] = deque()
 
-    def read(self, lags: Sequence[float], estimate: Callable[[], Estimate]) -> Array:
+    def read(self, lags: Sequence[float]) -> Array:
         """The states at these times before the present, (k, 9).
 
         Parameters
         ----------
         lags : sequence of float
             [s].
-        estimate : callable
-            Gives the front of the chain as an estimate.
 
         Raises
         ------
         ValueError
             If a lag is longer than the window.
         """
-        chain = self._chain
+        chain, unknown = self._chain, np.zeros((self._chain.size, self._chain.size))
         times: Array = chain.nodes["time"]
+
+        def at(node: int) -> Array:
+            return row_of(estimate_of_node(chain, node, unknown))
+
         now = chain.time
-        here = row_of(estimate())
-        newest = here if times[-1] >= now - _TOLERANCE else self._node(len(times) - 1, estimate)
+        here = row_of(chain.estimate(unknown))
+        newest = here if times[-1] >= now - _TOLERANCE else at(len(times) - 1)
         self._ends.append(StepEnd(now, float(times[-1]), here, newest))
         while self._ends[0].time < now - max(lags) - _TOLERANCE:
             self._ends.popleft()
@@ -109,20 +124,8 @@ class WindowReader:
                     f"a lag of {lag:g} s is longer than the window, which holds the last {reach:g} s: "
                     f"set 'window' to more epochs"
                 )
-            found[row] = _moved(end, self._node(node, estimate))
+            found[row] = _moved(end, at(node))
         return found
-
-    def _node(self, node: int, estimate: Callable[[], Estimate]) -> Array:
-        """The state of a node, (9,)."""
-        chain, front = self._chain, self._chain.front
-        kept, time = front.snapshot(), front.time
-        front.restore([chain.nodes[name][node] for name in front.state])
-        front.time = float(chain.nodes["time"][node])
-        try:
-            return row_of(estimate())
-        finally:
-            front.restore(kept)
-            front.time = time
 
 
 class LooksBack:
@@ -136,8 +139,7 @@ class LooksBack:
         reader, chain = self._reader, self.chain
         if reader is None or reader.nodes is not chain.nodes:  # a run has begun
             reader = self._reader = WindowReader(chain)
-        unknown = np.zeros((chain.size, chain.size))
-        return reader.read(lags, lambda: chain.estimate(unknown))
+        return reader.read(lags)
 
 
 def _moved(end: StepEnd, node: Array) -> Array:

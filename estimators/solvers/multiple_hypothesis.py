@@ -51,24 +51,22 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from simnav.compiled import kernel
 from simnav.estimators.algebra.chi_square import chi_square_limits
 from simnav.estimators.composition import Solver
 from simnav.estimators.models.channels import owners, summary
 from simnav.estimators.models.coupling import by_source
 from simnav.estimators.models.doubted_instruments import IMU, AttitudeDoubt, BiasDoubt, ImuDoubt
 from simnav.estimators.models.suitable import ModelChoice
-from simnav.kernel_types import Matrix, Vector
 from simnav.types import Array, Estimate, InitialState, Instruments, Measurement, Measurements
 
 from .admission import Admission
 from .heading_bank import first_of_each_heading, starts_by_heading
 from .hypotheses import uncertain_start
 from .hypothesis_filter import HypothesisFilter, Step, lone_fix
-from .innovation_consistency import TEST, add_square, begun_test, end_epoch, is_inconsistent
 from .kalman import KalmanEstimator
 from .saturation import Saturation
 from .state_difference import mean_of
+from .step_report import begun_report, end_report, labels_of
 
 __all__ = ["KINDS", "Kind", "MultipleHypothesis"]
 
@@ -195,18 +193,6 @@ class _Period:
         return next((k for k, x in enumerate(self.excess) if x > 0.0 and x > limit), 0)
 
 
-@kernel
-def judge_innovations(memory: Vector, squares: Matrix) -> bool:
-    """Whether the innovations have been improbable, with those of an epoch.
-
-    ``squares`` (m, 2) has the normalised innovations squared of the epoch and their degrees of freedom.
-    """
-    for k in range(squares.shape[0]):
-        add_square(memory, squares[k, 0], squares[k, 1])
-    end_epoch(memory)
-    return is_inconsistent(memory)
-
-
 def _excess(nis: float, freedom: float) -> float:
     return nis - freedom - SURPRISED * sqrt(2.0 * freedom)
 
@@ -281,10 +267,11 @@ class MultipleHypothesis(Solver):
         self._trusted = self._watch = start.time + TRUST
         self._admission = Admission(instruments, first.names)
         self._saturation = Saturation(instruments.imu, self._trusted)
-        self._test = begun_test()
+        self._labels = labels_of(first.names)
+        self._report = begun_report(instruments, first.names, self._admission.record.skipped, None)
+        self._row = np.empty(len(self._labels))
         self._gross, self._owners = chi_square_limits(GROSS), owners(instruments)
-        self._blank = {f"{label}.{name}": nan for name in first.names for label in ("innovation", "nis")}
-        self._blank |= {f"since.{name}": nan for names in self._groups.values() for name in names}
+        self._blank = {f"since.{name}": nan for names in self._groups.values() for name in names}
 
     def _made(self, start: InitialState) -> HypothesisFilter:
         """A filter that begins the run."""
@@ -316,11 +303,12 @@ class MultipleHypothesis(Solver):
         if self._since_sound is not None and self._since_sound is not self._period:
             self._since_sound.add(step, taken, lead)
         notes = lead.notes
+        lead.note_last(self._report)
         if step.until >= self._next - _SAME_TIME:
             self._next = step.until + self.period
             self._reconsider(step.until)
         estimate = self._mean()
-        self._report(estimate, notes)
+        self._say(estimate, notes)
         return estimate
 
     def _normalise(self) -> float:
@@ -460,18 +448,18 @@ class MultipleHypothesis(Solver):
         weights /= weights.sum()
         return mean_of(estimates, weights)
 
-    def _report(self, estimate: Estimate, notes: list[tuple[Measurement, float, float]]) -> None:
+    def _say(self, estimate: Estimate, notes: list[tuple[Measurement, float]]) -> None:
         """Set diagnostics and flags of an estimate.
 
         Parameters
         ----------
         estimate : Estimate
             The estimate of the step.
-        notes : list of (Measurement, float, float)
-            The measurements that the leading filter used, as of `HypothesisFilter.notes`.
+        notes : list of (Measurement, float)
+            The measurements of the leading filter, as of `HypothesisFilter.notes`.
         """
         diagnostics: dict[str, float | Array] = dict(self._blank)
-        wrong, flagged, squares = set[str](), list[tuple[str, float]](), list[tuple[float, float]]()
+        wrong = set[str]()
         for group, names in self._groups.items():
             doubting = [h for h in self._hypotheses if group in h.doubts]
             probability = sum(exp(h.weight) for h in doubting)
@@ -480,20 +468,14 @@ class MultipleHypothesis(Solver):
                 if probability > 0.5:
                     wrong.add(name)
                     diagnostics[f"since.{name}"] = doubting[0].doubts[group].since
-        for m, nis, size in notes:
-            if nis < 0.0:
-                self._admission.skipped += 1
-                continue
-            freedom = len(m.value)
-            squares.append((nis, freedom))
-            diagnostics[f"innovation.{m.instrument}"], diagnostics[f"nis.{m.instrument}"] = size, nis
-            if m.instrument in wrong or nis > self._gross[freedom]:
-                flagged.append((m.instrument, m.time))
-        inconsistent = judge_innovations.unchecked(self._test, np.array(squares, dtype=np.float64).reshape(-1, 2))
-        diagnostics["variance_factor"] = float(self._test.view(TEST)[0].variance_factor)
-        diagnostics["inconsistent"] = float(inconsistent)
-        diagnostics["skipped"] = float(self._admission.skipped)
+        estimate.flagged = [
+            (m.instrument, m.time)
+            for m, nis in notes
+            if nis >= 0.0 and (m.instrument in wrong or nis > self._gross[len(m.value)])
+        ]
+        end_report.unchecked(self._report, self._row)
+        diagnostics.update(zip(self._labels, self._row.tolist(), strict=True))
         diagnostics["hypotheses"] = float(len(self._hypotheses))
         if self._owners:
             diagnostics.update(summary(diagnostics, self._owners))
-        estimate.diagnostics, estimate.flagged = diagnostics, flagged
+        estimate.diagnostics = diagnostics

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from simnav.compiled import kernel
-from simnav.estimators.adaptations.noise_report import CHOSEN
+from simnav.estimators.adaptations.noise_report import CHOSEN, NoiseReport
 from simnav.estimators.models.filtering import Readings
 from simnav.kernel_types import IntegerVector, Matrix, Vector
 from simnav.records import Record
 from simnav.structures import length, structure
+from simnav.types import KINDS, Array, Instruments
 
-from .innovation_consistency import TEST, add_square, end_epoch, is_inconsistent
+from .innovation_consistency import TEST, add_square, begun_test, end_epoch, is_inconsistent
 
-__all__ = ["INNOVATION", "TESTS", "StepReport", "end_report", "note_readings"]
+__all__ = ["StepReport", "begun_report", "end_report", "labels_of", "note_readings"]
 
 #: Norm and normalised square of the last innovation of an instrument in a step.
 INNOVATION = structure(norm=float, nis=float)
@@ -51,6 +54,25 @@ class StepReport(Record):
     index: IntegerVector
     with_zero: bool
     innovations: Vector
+
+
+def begun_report(
+    instruments: Instruments, names: Sequence[str], skipped: Array, noise: NoiseReport | None
+) -> StepReport:
+    """What is reported of the instruments of these names, before the first step; ``noise`` has what a rule chooses."""
+    of_run = list(instruments)
+    return StepReport(
+        freedom=np.array([len(KINDS[instruments[name].kind].limits) for name in names], np.int64), skipped=skipped,
+        test=begun_test(), chosen=np.empty((0, length(CHOSEN))) if noise is None else noise.values,
+        index=np.array([-1 if noise is None else of_run.index(name) for name in names], np.int64),
+        with_zero=noise is not None and noise.with_zero,
+        innovations=np.full(length(INNOVATION) * len(names), np.nan),
+    )  # fmt: skip
+
+
+def labels_of(names: Sequence[str]) -> list[str]:
+    """What the numbers of a row are, for some instruments, without the chosen noise."""
+    return [f"{what}.{name}" for name in names for what in ("innovation", "nis")] + [*TESTS]
 
 
 @kernel

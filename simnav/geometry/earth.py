@@ -8,7 +8,7 @@ The kernels take and return scalars and are used by other kernels; the plain fun
 
 from __future__ import annotations
 
-from math import cos, sin, sqrt
+from math import atan2, cos, sin, sqrt
 
 import numpy as np
 
@@ -28,6 +28,8 @@ __all__ = [
     "earth_rate",
     "gravity",
     "gravity_scalar",
+    "horizontal_offset",
+    "move_position",
     "principal_radii",
     "radii_scalar",
     "relative_position",
@@ -84,6 +86,24 @@ def displace_scalar(
     meridian = prime_vertical * (1.0 - ECCENTRICITY_SQUARED) / x
     parallel = (prime_vertical + height) * cos(latitude)
     return latitude + north / (meridian + height), longitude + east / parallel, height - down
+
+
+@helper
+def move_position(position: Array, north: float, east: float, down: float) -> None:
+    """Move a (3,) position by metres, in place, as a filter corrects it: with the radii where it was."""
+    meridian, prime_vertical = radii_scalar(sin(position[0]))
+    position[1] += east / ((prime_vertical + position[2]) * cos(position[0]))
+    position[0] += north / (meridian + position[2])
+    position[2] -= down
+
+
+@helper
+def horizontal_offset(position: Array, latitude: float, longitude: float) -> tuple[float, float]:
+    """Metres north and east that lead from a (3,) position to a latitude and longitude, with the radii where it is."""
+    meridian, prime_vertical = radii_scalar(sin(position[0]))
+    east = longitude - position[1]
+    parallel = atan2(sin(east), cos(east)) * (prime_vertical + position[2]) * cos(position[0])
+    return (latitude - position[0]) * (meridian + position[2]), parallel
 
 
 def principal_radii(latitude: Array | float) -> tuple[Array, Array]:

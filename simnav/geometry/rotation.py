@@ -9,25 +9,32 @@ The functions work on stacks of rotations with `numpy`; the kernels work on scal
 
 from __future__ import annotations
 
-from math import cos, sin, sqrt
+from math import atan2, cos, sin, sqrt
+from typing import NamedTuple
 
 import numpy as np
 
 from simnav.compiled import Array, helper
 
 __all__ = [
+    "Quaternion",
     "cross",
     "dcm_from_quaternion",
     "dcm_from_rotation_vector",
     "dcm_from_rpy",
     "left_jacobian",
+    "multiply",
     "quaternion_from_dcm",
+    "quaternion_from_rotation",
+    "quaternion_from_rpy",
     "rotate_left",
     "rotate_right",
     "rotated",
     "rotation_coefficients",
+    "rotation_from_quaternion",
     "rotation_vector_from_dcm",
     "rpy_from_dcm",
+    "rpy_from_quaternion",
     "skew",
     "small_rotation_coefficients",
     "wrap_angle",
@@ -299,3 +306,62 @@ def rotate_right(dcm: Array, r0: float, r1: float, r2: float, a: float, b: float
         dcm[i, 0] = c0 + a * x0 + b * y0
         dcm[i, 1] = c1 + a * x1 + b * y1
         dcm[i, 2] = c2 + a * x2 + b * y2
+
+
+class Quaternion(NamedTuple):
+    """A unit quaternion of scalars, for kernels."""
+
+    w: float
+    x: float
+    y: float
+    z: float
+
+
+@helper
+def multiply(p: Quaternion, q: Quaternion) -> Quaternion:
+    """The rotation q, and then p."""
+    return Quaternion(
+        p.w * q.w - p.x * q.x - p.y * q.y - p.z * q.z,
+        p.w * q.x + p.x * q.w + p.y * q.z - p.z * q.y,
+        p.w * q.y - p.x * q.z + p.y * q.w + p.z * q.x,
+        p.w * q.z + p.x * q.y - p.y * q.x + p.z * q.w,
+    )
+
+
+@helper
+def quaternion_from_rpy(roll: float, pitch: float, yaw: float) -> Quaternion:
+    """The rotation from body to north-east-down."""
+    cr, cp, cy = cos(0.5 * roll), cos(0.5 * pitch), cos(0.5 * yaw)
+    sr, sp, sy = sin(0.5 * roll), sin(0.5 * pitch), sin(0.5 * yaw)
+    return Quaternion(
+        cr * cp * cy + sr * sp * sy,
+        sr * cp * cy - cr * sp * sy,
+        cr * sp * cy + sr * cp * sy,
+        cr * cp * sy - sr * sp * cy,
+    )
+
+
+@helper
+def rpy_from_quaternion(q: Quaternion) -> tuple[float, float, float]:
+    """Roll, pitch and yaw of a rotation from body to north-east-down."""
+    down_x, down_y = 2.0 * (q.x * q.z - q.w * q.y), 2.0 * (q.y * q.z + q.w * q.x)
+    down_z = 1.0 - 2.0 * (q.x * q.x + q.y * q.y)
+    yaw = atan2(2.0 * (q.w * q.z + q.x * q.y), 1.0 - 2.0 * (q.y * q.y + q.z * q.z))
+    return atan2(down_y, down_z), atan2(-down_x, sqrt(down_y * down_y + down_z * down_z)), yaw
+
+
+@helper
+def quaternion_from_rotation(x: float, y: float, z: float) -> Quaternion:
+    """The rotation of a rotation vector."""
+    angle = sqrt(x * x + y * y + z * z)
+    sine = sin(0.5 * angle) / angle if angle > 1e-12 else 0.5
+    return Quaternion(cos(0.5 * angle), sine * x, sine * y, sine * z)
+
+
+@helper
+def rotation_from_quaternion(q: Quaternion) -> tuple[float, float, float]:
+    """The rotation vector, of up to half a turn."""
+    sine = sqrt(q.x * q.x + q.y * q.y + q.z * q.z)
+    half = atan2(sine, abs(q.w))
+    factor = (2.0 if q.w >= 0.0 else -2.0) * (half / sine if sine > 1e-12 else 1.0)
+    return factor * q.x, factor * q.y, factor * q.z

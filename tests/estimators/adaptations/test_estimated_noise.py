@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 
 from simnav.estimators.adaptations.base import Innovation
 from simnav.estimators.adaptations.innovation_based import InnovationBased, adaptive_window
-from simnav.estimators.adaptations.noise import Posterior
 from simnav.estimators.adaptations.sage_husa import SageHusa
 from simnav.estimators.adaptations.variational_bayes import VariationalBayes
+from simnav.estimators.algebra.direct_update import posterior
 from simnav.types import Datasheet, Instruments, Measurement
 
 GNSS = Instruments((Datasheet("gnss", "gnss_position", 1.0, np.array([1.0, 1.0, 2.0])),))
@@ -117,7 +117,7 @@ def test_each_innovation_has_its_own_prediction():
     for newest in (True, False):
         adaptation = InnovationBased(**window, newest=newest)
         adaptation.reset(GNSS)
-        found[newest] = np.diag([adaptation.estimate(i) for i in given][-1])
+        found[newest] = np.diag([adaptation.choose(i) for i in given][-1])
     variances = [i.predicted[0, 0] for i in given[200:]]
     np.testing.assert_allclose(found[True] - found[False], np.mean(variances) - variances[-1])
     assert np.mean(variances) - variances[-1] > 0.5
@@ -174,10 +174,11 @@ def test_variational_bayes_is_algorithm_1():
 def test_posterior_against_the_textbook():
     given = innovations(1, seed=7)[0]
     gain = PREDICTED @ np.linalg.inv(PREDICTED + TRUE)
-    after = Posterior(given, TRUE)
-    np.testing.assert_allclose(after.residual, given.residual - gain @ given.residual)
-    np.testing.assert_allclose(after.predicted, PREDICTED - gain @ PREDICTED, atol=1e-12)
-    assert after.nis == pytest.approx(given.residual @ np.linalg.solve(PREDICTED + TRUE, given.residual))
+    residual, after = np.empty(3), np.empty((3, 3))
+    nis = posterior(given.residual, PREDICTED, TRUE, residual, after)
+    np.testing.assert_allclose(residual, given.residual - gain @ given.residual)
+    np.testing.assert_allclose(after, PREDICTED - gain @ PREDICTED, atol=1e-12)
+    assert nis == pytest.approx(given.residual @ np.linalg.solve(PREDICTED + TRUE, given.residual))
 
 
 @settings(max_examples=60)

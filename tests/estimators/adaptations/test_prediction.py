@@ -8,7 +8,6 @@ import pytest
 from simnav.estimator import make
 from simnav.estimators.adaptations.base import Innovation
 from simnav.estimators.adaptations.innovation_based import FixedWindow, InnovationBased
-from simnav.estimators.adaptations.prediction import PredictionTest
 from simnav.estimators.adaptations.sage_husa import SageHusa
 from simnav.estimators.adaptations.variational_bayes import VariationalBayes
 from simnav.estimators.algebra.chi_square import normal_quantile
@@ -20,6 +19,7 @@ from simnav.source import record
 from simnav.trial import run_trial
 from simnav.types import KINDS as ERRORS
 from simnav.types import Datasheet, ImuDatasheet, Instruments, Measurement, TriadDatasheet
+from tests.cases.judged_predictions import JudgedPredictions
 
 SHEETS = (
     Datasheet("gnss", "gnss_position", 1.0, np.ones(3)),
@@ -86,7 +86,7 @@ NEVER = 10**6  # so many failures in a row there are not: the test of joint fail
 
 def judged(imu: bool, dvl, gnss, dvl_until: float = 100.0, predicted: float = 0.5, together: int = 3) -> list[bool]:
     """The verdicts on 30 fixes of ``gnss(k)``, each after a velocity of ``dvl(k)`` that is heard until a time."""
-    test = PredictionTest(Instruments(SHEETS, IMU if imu else None), together)
+    test = JudgedPredictions(Instruments(SHEETS, IMU if imu else None), together)
     found = []
     for k in range(30):
         if k <= dvl_until:
@@ -133,7 +133,7 @@ def test_without_a_witness_an_error_of_any_size_is_that_of_the_prediction():
 
 def lone_log(says, fixes: bool = False) -> list[bool]:
     """The verdicts on 20 velocities, six seconds after the last fix or with a sound fix after each."""
-    test, rng, found = PredictionTest(Instruments(SHEETS, IMU)), np.random.default_rng(8), []
+    test, rng, found = JudgedPredictions(Instruments(SHEETS, IMU)), np.random.default_rng(8), []
     for k in range(20):
         found.append(test.fails(given(says(k), float(k), "dvl")))
         if fixes:
@@ -156,7 +156,7 @@ def test_a_gross_error_or_a_larger_noise_of_a_lone_log_has_no_direction():
     single = [40.0 * rng.standard_normal(3) if k % 4 == 0 else rng.standard_normal(3) for k in range(20)]
     assert not any(lone_log(lambda k: single[k]))
     noise = 30.0 * np.random.default_rng(10).standard_normal((4000, 3))
-    test = PredictionTest(Instruments(SHEETS, IMU))
+    test = JudgedPredictions(Instruments(SHEETS, IMU))
     found = [test.fails(given(u if k % 8 else 0.0 * u, float(k), "dvl")) for k, u in enumerate(noise)]
     assert 0.05 < np.mean(found) < 0.15  # 1 - PredictionTest.ALONE
 
@@ -176,7 +176,7 @@ def test_the_cosine_of_isotropic_innovations_has_unit_variance_over_their_number
 
 def test_a_compass_is_believed_only_while_another_instrument_finds_the_prediction_wrong():
     sheet = Datasheet("compass", "gyrocompass", 1.0, np.ones(1))
-    test, found, others = PredictionTest(Instruments((*SHEETS, sheet), IMU)), [], [False]
+    test, found, others = JudgedPredictions(Instruments((*SHEETS, sheet), IMU)), [], [False]
     for k in range(60):
         m = Measurement(float(k), "compass", "gyrocompass", np.zeros(1))
         found.append(test.fails(Innovation(m, np.array([9.0]), 0.5 * np.eye(1), np.eye(1))))
@@ -191,7 +191,7 @@ def test_a_compass_is_believed_only_while_another_instrument_finds_the_predictio
 def depth_judged(with_dvl: bool) -> list[bool]:
     """The verdicts on 30 depths that are wrong by five sigma, with or without a sound DVL beside them."""
     sheet = Datasheet("depth", "depth", 1.0, np.ones(1))
-    test = PredictionTest(Instruments((*SHEETS, sheet), IMU))
+    test = JudgedPredictions(Instruments((*SHEETS, sheet), IMU))
     rng, found = np.random.default_rng(6), []
     for k in range(30):
         if with_dvl:

@@ -15,9 +15,9 @@ from simnav.estimators.adaptations.base import Innovation
 from simnav.estimators.adaptations.correntropy import MaximumCorrentropy
 from simnav.estimators.adaptations.fading import FadingMemory
 from simnav.estimators.adaptations.gating import ChiSquareGate
-from simnav.estimators.adaptations.prediction import PredictionTest
-from simnav.estimators.adaptations.robust import EquivalentWeights, huber, igg3
+from simnav.estimators.adaptations.robust import HuberWeights, Igg3Weights, huber, igg3
 from simnav.types import Datasheet, Instruments, Measurement
+from tests.cases.judged_predictions import JudgedPredictions
 
 SHEETS = Instruments(
     (
@@ -75,7 +75,7 @@ def test_factors_as_printed():
 def test_equivalent_weights_divide_the_variances():
     v = np.array([0.1, 30.0, -12.0])
     given = innovation(v)
-    adaptation = EquivalentWeights(huber, smallest=1e-3)
+    adaptation = HuberWeights(1.345)
     adaptation.reset(SHEETS)
     got = adaptation.adapt(given)
     u = np.abs(v) / np.sqrt(np.diag(given.predicted) + np.diag(R))
@@ -153,7 +153,7 @@ def test_a_factor_never_divides_by_nothing():
 
 def test_gnss_and_dvl_that_fail_together_three_times_blame_the_prediction():
     far, near = 50.0 * np.ones(3), np.zeros(3)
-    test = PredictionTest(SHEETS, 3)
+    test = JudgedPredictions(SHEETS, 3)
     outcome = []
     for k in range(5):
         outcome += [test.fails(innovation(far, k, "gnss")), test.fails(innovation(far, k + 0.5, "dvl"))]
@@ -161,9 +161,9 @@ def test_gnss_and_dvl_that_fail_together_three_times_blame_the_prediction():
     assert not test.fails(innovation(near, 6.0, "dvl"))
     assert not test.fails(innovation(far, 6.5, "gnss"))  # alone again
     assert not test.fails(innovation([9.0], 7.0, "compass", np.eye(1), jacobian=H[:1]))
-    alone = PredictionTest(SHEETS, 3)
+    alone = JudgedPredictions(SHEETS, 3)
     assert not any(alone.fails(innovation(far, k)) for k in range(20))
-    late = PredictionTest(SHEETS, 1)
+    late = JudgedPredictions(SHEETS, 1)
     late.fails(innovation(far, 0.0, "dvl"))
     assert late.fails(innovation(far, 1.0))
     assert not late.fails(innovation(far, 60.0))
@@ -171,7 +171,7 @@ def test_gnss_and_dvl_that_fail_together_three_times_blame_the_prediction():
 
 def test_blamed_the_prediction_is_inflated_and_the_noise_stands():
     adaptation = AdaptiveFactor()
-    weights = EquivalentWeights(igg3)
+    weights = Igg3Weights()
     adaptation.reset(SHEETS)
     weights.reset(SHEETS)
     far = 50.0 * np.ones(3)

@@ -133,9 +133,9 @@ def test_an_adaptation_that_chooses_in_its_own_way_is_asked(recording_of, run_ov
     asked = []
 
     class Own(SageHusa):
-        def estimate(self, innovation):
+        def choose(self, innovation):
             asked.append(innovation)
-            return super().estimate(innovation)
+            return super().choose(innovation)
 
     run_over(KalmanEstimator(InertialModel(), Own()), recording_of(2, 5.0))
     assert asked

@@ -11,12 +11,13 @@ import pytest
 
 from simnav.estimator import make
 from simnav.estimators.solvers.mid_value import middle
-from simnav.estimators.solvers.state_difference import difference, displaced
+from simnav.estimators.solvers.state_difference import difference
 from simnav.scenario import Scenario
 from simnav.scoring.navigation_error import errors
 from simnav.source import record
 from simnav.trial import run_trial
 from simnav.types import Estimate
+from tests.cases.displaced import displaced
 
 SHORT = tomllib.loads((Path(__file__).parents[2] / "cases" / "short.toml").read_text(encoding="utf-8"))
 START = Estimate(1.0, np.array([0.8, 0.1, 5.0]), np.array([3.0, 1.0, 0.0]), np.array([0.01, -0.02, 2.0]))

@@ -12,7 +12,7 @@ from simnav.estimators.models.inertial import InertialModel
 from simnav.estimators.solvers.hypotheses import Hypothesis
 from simnav.estimators.solvers.kalman import KalmanEstimator
 from simnav.estimators.solvers.solution_separation import SolutionSeparation
-from simnav.estimators.solvers.state_difference import difference, displaced
+from simnav.estimators.solvers.state_difference import difference
 from simnav.geometry import earth
 from simnav.scenario import load
 from simnav.source import record
@@ -49,15 +49,6 @@ def run(recording, **parameters):
 def without(estimator: SolutionSeparation, name: str) -> Estimate:
     """What the older sub-filter without an instrument says; it is never given out, so it is not public."""
     return estimator._older_filter(name).estimate
-
-
-def test_difference_and_displacement_are_inverse():
-    rng = np.random.default_rng(0)
-    one = Estimate(0.0, np.array([0.9, 0.1, 5.0]), rng.normal(size=3), np.array([0.1, -0.2, 2.0]))
-    error = np.concatenate([10.0 * rng.normal(size=3), rng.normal(size=3), 0.3 * rng.normal(size=3)])
-    other = displaced(one, error, np.eye(9))
-    np.testing.assert_allclose(difference(other, one), error, rtol=1e-5, atol=1e-8)
-    np.testing.assert_array_equal(other.covariance, np.eye(9))
 
 
 @pytest.mark.parametrize("name", ["gnss", "dvl", "compass"])

@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from simnav.estimators.solvers.state_difference import difference, differences, displaced, mean_of
+from simnav.estimators.solvers.state_difference import difference, differences, mean_of
 from simnav.types import Estimate
+from tests.cases.displaced import displaced
 
 OTHER = Estimate(3.0, np.array([0.9, 0.2, 4.0]), np.array([3.0, -1.0, 0.1]), np.array([0.02, -0.01, 2.0]), np.eye(9))
 
