@@ -4,9 +4,9 @@
   spline, whose smoothness generalised cross-validation finds (P. Craven and G. Wahba, "Smoothing noisy data with spline
   functions", Numerische Mathematik 31, 1979). Angles that the reference lacks are those of the plain row.
 - Errors of an instrument that was measured beside a reference: the processes that fit its readings less the reference
-  (`simnav.leaderboard.realism.fit`). They take the place of all its other errors, which are in these differences. The
-  fast error of a speed is split by speed and turn rate (`motion_shares`). With several recordings each run draws sizes
-  between those of the recordings.
+  (`simnav.leaderboard.realism.fit`). They take the place of all its other errors, which are in these differences. A
+  part of the error of a speed that is fixed to the Earth is apart (`earth_fixed`), and its fast error is split by speed
+  and turn rate (`motion_shares`). With several recordings each run draws sizes between those of the recordings.
 - All other errors: as `simnav.leaderboard.identification.report.identify` found them.
 - Faults that are laid over the log stay.
 """
@@ -34,6 +34,7 @@ from simnav.spec import SpecError
 from simnav.trial import run_trial
 from simnav.types import Array
 
+from .earth_fixed import earth_fixed
 from .motion_shares import motion_shares
 from .report import Identification
 
@@ -176,11 +177,14 @@ def _errors(table: dict[str, Any], name: str, scenario: Scenario) -> dict[str, A
 def _processes(series: Sequence[ErrorSeries], name: str, spec: AidSpec) -> dict[str, Any]:
     """The keys of an instrument's errors; the fast error of a speed in parts that grow with the motion."""
     kind = spec.definition
+    key, speed = f"sigma_{kind.components[0].error_unit}", kind.equation in (BODY_VELOCITY, WATER_SPEED)
+    fixed = earth_fixed(series) if speed else None
+    series, slow = (series, []) if fixed is None else (fixed.rest, fixed.processes(key, len(kind.components)))
     found: dict[str, Any] = tomllib.loads(fitted_apart(series).to_toml(name, kind))["instruments"][name]
-    shares = motion_shares(series) if kind.equation in (BODY_VELOCITY, WATER_SPEED) else None
+    shares = motion_shares(series) if speed else None
     if shares is None:
-        return found
-    key, count = f"sigma_{kind.components[0].error_unit}", len(shares)
+        return {**found, "error": [*found.get("error", []), *slow]} if slow else found
+    count = len(shares)
     sizes = np.atleast_1d(found[key])
     white = [{"kind": "white", key: (sizes * row).tolist() if count > 1 else float(sizes[0])} for row in np.eye(count)]
     whole = [table for table in (*white, *found.get("error", [])) if np.any(table[key])]
@@ -190,7 +194,7 @@ def _processes(series: Sequence[ErrorSeries], name: str, spec: AidSpec) -> dict[
         for k, share in enumerate(shares)
         for part in share.split([table for table, own in zip(whole, component, strict=True) if own == k], key)
     ]
-    return {**found, key: (0.0 * sizes).tolist() if count > 1 else 0.0, "error": split}
+    return {**found, key: (0.0 * sizes).tolist() if count > 1 else 0.0, "error": [*split, *slow]}
 
 
 def _drawn(process: dict[str, Any], low: float, high: float) -> dict[str, Any]:
