@@ -68,8 +68,9 @@ def site(request: SiteRequest) -> SiteReport:
     """
     from simnav.leaderboard.papers.page import pages_in
     from simnav.leaderboard.ranking.agreement import rank_correlations
-    from simnav.leaderboard.ranking.ranking import rank as ranked
-    from simnav.leaderboard.ranking.trouble_profile import profiles
+    from simnav.leaderboard.ranking.ranking import rank_tracks
+    from simnav.leaderboard.ranking.track_runs import runs_of_tracks
+    from simnav.leaderboard.ranking.trouble_profile import profiles_of
     from simnav.leaderboard.results.web_addresses import linked_from
     from simnav.leaderboard.site.report import SiteReport
     from simnav.leaderboard.site.site import build
@@ -80,17 +81,16 @@ def site(request: SiteRequest) -> SiteReport:
 
     shown, processes = whole_number("runs_shown", request.runs_shown, 1), whole_number("workers", request.workers, 1)
     found, seeds = attached(results_of(request.results, series=True))
-    own = scenario_files.tracks(request.results)
-    ranking = ranked(found, tracks=own, requested=requested.read(request.results))
+    tracks = list(runs_of_tracks(found, tracks=scenario_files.tracks(request.results)))
+    ranking = rank_tracks(tracks, requested.read(request.results))
     correlations = () if request.against is None else tuple(rank_correlations(ranking, rank(request.against)))
     output = absolute(request.output)
-    by_trouble = profiles(found, tracks=own)
     index = build(
         found, ranking, output, home=linked_from(output, request.docs), progress=request.progress, workers=processes,
         papers=pages_in(Path(request.papers)), runs_shown=shown, figures=request.figures, seeds=seeds,
-        sweeps=[*swept.sweeps_in(Path(request.sweeps)), *stored_sweeps(found)], profiles=by_trouble,
+        sweeps=[*swept.sweeps_in(Path(request.sweeps)), *stored_sweeps(found)], tracks=tracks,
     )  # fmt: skip
-    return SiteReport(index, found, ranking, correlations, by_trouble)
+    return SiteReport(index, found, ranking, correlations, profiles_of(tracks))
 
 
 @dataclass(frozen=True)
@@ -359,7 +359,6 @@ def publish_standard(request: PublishRequest) -> Published:
         If runs are missing or out of date; then nothing is written.
     """
     from simnav.leaderboard.papers.page import pages_in
-    from simnav.leaderboard.ranking.trouble_profile import profiles
     from simnav.leaderboard.results.web_addresses import linked_from
     from simnav.leaderboard.site.site import build
     from simnav.leaderboard.standard.drawn import attached, stored_sweeps
@@ -390,5 +389,5 @@ def publish_standard(request: PublishRequest) -> Published:
         output = absolute(request.site)
         build(found, made.ranking, output, home=linked_from(output), progress=request.progress, workers=request.workers,
               papers=pages_in(Path("reproduced")), editions=pages_of(read(file)), seeds=seeds,
-              sweeps=stored_sweeps(found), profiles=profiles(made.results))  # fmt: skip
+              sweeps=stored_sweeps(found), tracks=made.tracks)  # fmt: skip
     return made

@@ -90,7 +90,17 @@ from .tracks import is_derived
 if TYPE_CHECKING:
     from simnav.leaderboard.results.result import Result
 
-__all__ = ["FAR", "PROVISIONAL", "RANKED_SCORES", "rank", "rank_track", "require_lower", "require_score", "undecided"]
+__all__ = [
+    "FAR",
+    "PROVISIONAL",
+    "RANKED_SCORES",
+    "rank",
+    "rank_track",
+    "rank_tracks",
+    "require_lower",
+    "require_score",
+    "undecided",
+]
 
 Array = NDArray[np.float64]
 
@@ -153,9 +163,14 @@ def rank(
     ValueError
         If an estimator has two results for one run.
     """
+    return rank_tracks(runs_of_tracks(results, score, tracks), requested)
+
+
+def rank_tracks(every: Iterable[TrackRuns], requested: Mapping[str, Sequence[int]] | None = None) -> Ranking:
+    """As `rank`, from the runs of the tracks (`simnav.leaderboard.ranking.track_runs.runs_of_tracks`)."""
     boards: list[TrackRanking] = []
     scenarios: dict[str, ScenarioRanking] = {}
-    for found in runs_of_tracks(results, score, tracks):
+    for found in every:
         boards.append(rank_track(found.by_trouble(), requested))
         if not is_derived(found.track.name):
             scenarios |= {t.name: _scenario(t, found.apart) for t in found.tables}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -23,6 +23,8 @@ from .variants import families, surplus
 if TYPE_CHECKING:
     from simnav.leaderboard.results.result import Result
 
+    from .trouble_profile import TroubleGroup
+
 __all__ = ["TrackRuns", "runs_of_tracks"]
 
 
@@ -38,11 +40,15 @@ class TrackRuns:
         One a scenario.
     apart : mapping of str to sequence of str
         Variants beyond the first few of one row, which have no rank, and their family.
+    groups : dict
+        By scenarios, those of one kind of trouble that were ranked already
+        (`simnav.leaderboard.ranking.trouble_profile.group_of`).
     """
 
     track: Track
     tables: Sequence[ScenarioRuns]
     apart: Mapping[str, Sequence[str]]
+    groups: dict[tuple[ScenarioRuns, ...], TroubleGroup] = field(default_factory=dict)
 
     def only(self, wanted: Callable[[str], bool]) -> TrackRuns:
         """Those of the scenarios whose versioned ids are wanted."""

@@ -29,7 +29,8 @@ if TYPE_CHECKING:
     from .rows import Row
     from .scenario_runs import ScenarioRuns
 
-__all__ = ["BAD", "GroupRow", "TrackProfile", "TroubleGroup", "group_of", "profile_table", "profiles", "ranked_group"]
+__all__ = ["BAD", "GroupRow", "TrackProfile", "TroubleGroup", "group_of", "profile_table", "profiles", "profiles_of",
+           "ranked_group"]  # fmt: skip
 
 #: A run is bad if it fails, is lost, or has an error of more than so many times that of the plain row in the same run.
 BAD = 5.0
@@ -178,7 +179,12 @@ def profiles(
     ValueError
         If an estimator has two results for one run.
     """
-    return tuple(filter(None, map(_profile, runs_of_tracks(results, score, tracks))))
+    return profiles_of(runs_of_tracks(results, score, tracks))
+
+
+def profiles_of(every: Iterable[TrackRuns]) -> tuple[TrackProfile, ...]:
+    """As `profiles`, from the runs of the tracks (`simnav.leaderboard.ranking.track_runs.runs_of_tracks`)."""
+    return tuple(filter(None, map(_profile, every)))
 
 
 def _profile(runs: TrackRuns) -> TrackProfile | None:
@@ -187,9 +193,17 @@ def _profile(runs: TrackRuns) -> TrackProfile | None:
 
 
 def group_of(runs: TrackRuns, trouble: str) -> TroubleGroup | None:
-    """The results on the scenarios with one kind of trouble; None where there is none among the runs."""
+    """The results on the scenarios with one kind of trouble; None where there is none among the runs.
+
+    The same scenarios are ranked once, whoever asks: the profile of the track, or the advice for some instruments.
+    """
     chosen = runs.only(lambda scenario: trouble_of(scenario) == trouble)
-    return ranked_group(chosen, trouble, troubles()[trouble].title) if chosen.tables else None
+    if not chosen.tables:
+        return None
+    key = tuple(chosen.tables)
+    if key not in runs.groups:
+        runs.groups[key] = ranked_group(chosen, trouble, troubles()[trouble].title)
+    return runs.groups[key]
 
 
 def ranked_group(runs: TrackRuns, trouble: str, title: str) -> TroubleGroup:

@@ -174,12 +174,18 @@ def fault_of(result: Result) -> str:
 
 
 def _fault_of_scores(result: Result) -> str:
-    for name in result.scores:
+    why, errors = _names_of_scores(tuple(result.scores))
+    below = (f"{name} = {result.scores[name]:g} is below zero" for name in errors if result.scores[name] < 0.0)
+    return why or next(below, "")
+
+
+@lru_cache(maxsize=256)
+def _names_of_scores(names: tuple[object, ...]) -> tuple[str, tuple[str, ...]]:
+    """What is wrong with the names of scores, and those that are below zero for no result; many results share them."""
+    for name in names:
         if not isinstance(name, str) or len(name) > 200 or not (name.isascii() and name.isprintable()):
-            return f"a score is called {_short(name)}, which is no name of a score"
-        if name.endswith("rmse") and result.scores[name] < 0.0:
-            return f"{name} = {result.scores[name]:g} is below zero"
-    return ""
+            return f"a score is called {_short(name)}, which is no name of a score", ()
+    return "", tuple(str(name) for name in names if str(name).endswith("rmse"))
 
 
 def _fault_of_reference(result: Result) -> str:

@@ -10,12 +10,11 @@ from typing import TYPE_CHECKING, Any
 
 from simnav.leaderboard.ranking.recommendation import recommendations
 from simnav.leaderboard.ranking.similar_scenarios import carried, speaks_for
-from simnav.leaderboard.ranking.track_runs import runs_of_tracks
 from simnav.leaderboard.ranking.tracks import catalogued
 from simnav.leaderboard.ranking.troubles import trouble_of, troubles
 
 if TYPE_CHECKING:
-    from simnav.leaderboard.results.result import Result
+    from simnav.leaderboard.ranking.track_runs import TrackRuns
 
 __all__ = ["KITS", "LIMITS", "advisor"]
 
@@ -37,16 +36,16 @@ KITS: Mapping[str, tuple[str, ...]] = {
 LIMITS = (None, 1.0, 0.5, 0.2, 0.1)
 
 
-def advisor(results: Iterable[Result]) -> dict[str, Any] | None:
+def advisor(every: Iterable[TrackRuns]) -> dict[str, Any] | None:
     """What the boxes offer, and the sentences of each answer; None where there is no evidence for anything.
 
     Parameters
     ----------
-    results : iterable of Result
-        Results of the site.
+    every : iterable of TrackRuns
+        The runs of the site, by track.
     """
     headers = {name: carried(h) for name, h in catalogued().items() if trouble_of(name)}
-    runs = list(runs_of_tracks((r for r in results if r.scenario in headers), "horizontal_rmse"))
+    runs = [r for r in every if r.track.score == "horizontal_rmse"]
     asked = {"": (), **{name: (name,) for name in troubles()}}
     found: dict[str, dict[str, list[list[str]]]] = {}
     for title, mine in KITS.items():

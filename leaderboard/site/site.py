@@ -36,6 +36,7 @@ from simnav.leaderboard.ranking.ranking_figure import ranking_figure
 from simnav.leaderboard.ranking.runs import group
 from simnav.leaderboard.ranking.statistics import FAILURE
 from simnav.leaderboard.ranking.summary import spread
+from simnav.leaderboard.ranking.trouble_profile import profiles_of
 from simnav.leaderboard.ranking.voyages import side_by_side
 from simnav.leaderboard.results.citation import citation
 from simnav.leaderboard.results.errors import RequestError
@@ -65,7 +66,7 @@ from .win_matrix import win_matrix
 
 if TYPE_CHECKING:
     from simnav.leaderboard.ranking.board import Ranking
-    from simnav.leaderboard.ranking.trouble_profile import TrackProfile
+    from simnav.leaderboard.ranking.track_runs import TrackRuns
     from simnav.leaderboard.results.result import Result
 
 __all__ = ["build"]
@@ -91,7 +92,7 @@ def build(
     sweeps: Sequence[SweepFile] = (),
     seeds: Mapping[str, Sequence[int]] | None = None,
     home: Home = NOWHERE,
-    profiles: Sequence[TrackProfile] = (),
+    tracks: Sequence[TrackRuns] = (),
 ) -> Path:
     """Write the site.
 
@@ -123,8 +124,8 @@ def build(
         By scenario, the runs that have series, where not all have.
     home : Home
         Where the repository and the documentation are (`simnav.leaderboard.results.web_addresses.linked_from`).
-    profiles : sequence of TrackProfile, optional
-        The same results by kind of trouble; without them there is no picture on the first page.
+    tracks : sequence of TrackRuns, optional
+        The runs that the ranking is made from; without them there are no picture and no advice on the first page.
 
     Returns
     -------
@@ -144,7 +145,7 @@ def build(
         catalogued.cache_clear()
         report = progress or (lambda *_, **__: None)
         site = _Site(results, ranking, draft, command or reproduce(results), report, workers, papers, editions, home,
-                     profiles)  # fmt: skip
+                     tracks)  # fmt: skip
         site.write(runs_shown, figures, sweeps, seeds or {})
     return output / "index.html"
 
@@ -267,10 +268,11 @@ class _Site:
         papers: Sequence[ExtraPage],
         editions: Sequence[ExtraPage],
         home: Home,
-        profiles: Sequence[TrackProfile],
+        tracks: Sequence[TrackRuns],
     ):
         self.results = sorted(results, key=lambda r: (r.scenario, r.estimator, r.seed))
         self.ranking, self.folder, self.progress, self.workers = ranking, folder, progress, workers
+        self.tracks, profiles = tracks, profiles_of(tracks)
         self.view = first_view(ranking, profiles)
         self.silence = {p.track: p.silence for p in profiles}
         self.runs = group(self.results)
@@ -336,7 +338,7 @@ class _Site:
         if self.plan.figures:
             for track in self.ranking.tracks:
                 save(ranking_figure(track), self.folder / "figures" / f"board-{track.track}", formats=("svg", "png"))
-        index = {"kind": "index", "advisor": advisor(self.results)}
+        index = {"kind": "index", "advisor": advisor(self.tracks)}
         self._page("index.html", "index.html", index, facts=self._counts(),
                    view=None if self.view is None else picture(self.view, self.estimators))  # fmt: skip
         voyages = side_by_side(self.ranking)

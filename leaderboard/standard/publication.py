@@ -19,8 +19,9 @@ from simnav.leaderboard.ranking.board import Ranking
 from simnav.leaderboard.ranking.first_view import first_view
 from simnav.leaderboard.ranking.further import run_further
 from simnav.leaderboard.ranking.next_runs import next_runs
-from simnav.leaderboard.ranking.ranking import rank
-from simnav.leaderboard.ranking.trouble_profile import profiles
+from simnav.leaderboard.ranking.ranking import rank_tracks
+from simnav.leaderboard.ranking.track_runs import TrackRuns, runs_of_tracks
+from simnav.leaderboard.ranking.trouble_profile import profiles_of
 from simnav.leaderboard.results import requested, store
 from simnav.leaderboard.results.errors import RequestError
 from simnav.leaderboard.results.files import write_whole
@@ -51,6 +52,8 @@ class Published:
         Number of the edition; 0 for a preliminary result, which is none.
     results : sequence of Result
         All results of the edition.
+    tracks : sequence of TrackRuns
+        The same results by track.
     ranking : Ranking
         The board that follows from them.
     size : int
@@ -64,6 +67,7 @@ class Published:
     folder: Path
     edition: int
     results: Sequence[Result]
+    tracks: Sequence[TrackRuns]
     ranking: Ranking
     size: int
     readme: Path | None
@@ -228,9 +232,10 @@ def publish(
             f"{sum(lacking.values())} runs of the profile {profile.name} are missing, such as of {first}; "
             "'simnav standard run' continues, and --preliminary publishes what is there"
         )
-    ranking = rank(results, requested=requested.read(working))
+    tracks = list(runs_of_tracks(results))
+    ranking = rank_tracks(tracks, requested.read(working))
     of = len(results) + sum(lacking.values())
-    view = first_view(ranking, profiles(results))
+    view = first_view(ranking, profiles_of(tracks))
     texts = {} if readme is None else {readme: replaced(readme, first_answer(view, results, of))}
     if readme is not None and (page := readme.parent / PAGE).is_file():
         texts[page] = replaced(page, tables(ranking, results, of))  # fails before all is written
@@ -244,7 +249,7 @@ def publish(
     if readme is not None:
         draw(ranking, view, readme.parent)
     size = sum(p.stat().st_size for p in folder.rglob("*") if p.is_file())
-    return Published(folder, edition, results, ranking, size, readme, _remarks(results, without))
+    return Published(folder, edition, results, tracks, ranking, size, readme, _remarks(results, without))
 
 
 def _remarks(results: Sequence[Result], without: Collection[tuple[str, str]]) -> tuple[str, ...]:

@@ -10,12 +10,20 @@ from typing import Any
 import numpy as np
 import pytest
 
-from simnav.leaderboard.ranking import reference
+from simnav.leaderboard.ranking import reference, trouble_profile
 from simnav.leaderboard.ranking.ranking import rank
 from simnav.leaderboard.ranking.recommendation import Recommendation, recommendation
 from simnav.leaderboard.ranking.reports import StandardReport
-from simnav.leaderboard.ranking.track_runs import runs_of_tracks
-from simnav.leaderboard.ranking.trouble_profile import GroupRow, TrackProfile, profile_table, profiles
+from simnav.leaderboard.ranking.track_runs import TrackRuns, runs_of_tracks
+from simnav.leaderboard.ranking.trouble_profile import (
+    GroupRow,
+    TrackProfile,
+    TroubleGroup,
+    profile_table,
+    profiles,
+    profiles_of,
+    ranked_group,
+)
 from simnav.leaderboard.results.result import Result
 from simnav.leaderboard.site.report import SiteReport
 
@@ -193,3 +201,20 @@ def test_the_document_is_plain() -> None:
     assert document["row"]["estimator"] == "robust"
     assert document["groups"][0]["trouble"] == "lying-fixes"
     assert document["sentences"]
+
+
+def test_the_profile_and_the_advice_rank_the_same_scenarios_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    ranked = []
+
+    def counted(runs: TrackRuns, *named: str) -> TroubleGroup:
+        ranked.append(named[0])
+        return ranked_group(runs, *named)
+
+    monkeypatch.setattr(trouble_profile, "ranked_group", counted)
+    runs = list(runs_of_tracks(made(ERRORS), "horizontal_rmse"))
+    groups = [g for p in profiles_of(runs) for g in p.groups]
+    assert sorted(ranked) == sorted(g.trouble for g in groups)
+    advice = recommendation(runs, ["gnss_position", "imu"], lambda s: True, ["outage"])
+    assert any(advice.groups[0] is g for g in groups)
+    part = recommendation(runs, ["gnss_position", "imu"], lambda s: s != "lasting-bias-v1", ["lying-fixes"])
+    assert part.groups[0].scenarios == ("gnss-multipath-v1", "gnss-spoofing-v1")  # other scenarios are another group

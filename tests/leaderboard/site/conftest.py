@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from simnav.leaderboard.ranking.ranking import rank
-from simnav.leaderboard.ranking.trouble_profile import profiles
+from simnav.leaderboard.ranking.ranking import rank_tracks
+from simnav.leaderboard.ranking.track_runs import runs_of_tracks
 from simnav.leaderboard.results.provenance import BENCHMARK, Provenance
 from simnav.leaderboard.results.result import Result
 from simnav.leaderboard.site import background, site
@@ -131,8 +131,7 @@ def folder(results: list[Result], catalogued: str, tmp_path_factory: pytest.Temp
     output = tmp_path_factory.mktemp("board") / "site"
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(background, "BOUND_RUNS", 1)
-        tracks = {catalogued: "fjords"}  # two tracks under one heading
-        index = site.build(results, rank(results, tracks=tracks), output, sweeps=[made_up_sweep(catalogued)],
-                           profiles=profiles(results, tracks=tracks))  # fmt: skip
+        tracks = list(runs_of_tracks(results, tracks={catalogued: "fjords"}))  # two tracks under one heading
+        index = site.build(results, rank_tracks(tracks), output, sweeps=[made_up_sweep(catalogued)], tracks=tracks)
     assert index == output / "index.html"
     return output

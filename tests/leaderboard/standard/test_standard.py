@@ -20,7 +20,7 @@ from simnav.leaderboard.campaign import campaign, resolution
 from simnav.leaderboard.campaign.fingerprint import estimator_source
 from simnav.leaderboard.cli.application import app
 from simnav.leaderboard.ranking.ranking import rank
-from simnav.leaderboard.ranking.trouble_profile import profiles
+from simnav.leaderboard.ranking.trouble_profile import profiles_of
 from simnav.leaderboard.results import store
 from simnav.leaderboard.results.errors import RequestError
 from simnav.leaderboard.results.packing import write_packed
@@ -164,8 +164,8 @@ def test_the_site_of_what_is_published_has_the_results_by_kind_of_trouble(
     built: dict[str, object] = {}
     monkeypatch.setattr("simnav.leaderboard.site.site.build", lambda *_, **options: built.update(options))
     made = publish(home, home / "work", site=tmp_path / "site")
-    assert built["profiles"] == profiles(made.results)
-    assert [p.track for p in profiles(made.results)] == ["generalisation"]
+    assert built["tracks"] is made.tracks
+    assert [p.track for p in profiles_of(made.tracks)] == ["generalisation"]
 
 
 def test_the_audit_repeats_a_sample_and_finds_a_wrong_score(home: Path, tmp_path: Path) -> None:
