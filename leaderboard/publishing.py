@@ -82,15 +82,16 @@ def site(request: SiteRequest) -> SiteReport:
     shown, processes = whole_number("runs_shown", request.runs_shown, 1), whole_number("workers", request.workers, 1)
     found, seeds = attached(results_of(request.results, series=True))
     tracks = list(runs_of_tracks(found, tracks=scenario_files.tracks(request.results)))
-    ranking = rank_tracks(tracks, requested.read(request.results))
+    ranking = rank_tracks(tracks, requested.read(request.results), processes)
     correlations = () if request.against is None else tuple(rank_correlations(ranking, rank(request.against)))
     output = absolute(request.output)
+    by_trouble = profiles_of(tracks, processes)
     index = build(
         found, ranking, output, home=linked_from(output, request.docs), progress=request.progress, workers=processes,
         papers=pages_in(Path(request.papers)), runs_shown=shown, figures=request.figures, seeds=seeds,
         sweeps=[*swept.sweeps_in(Path(request.sweeps)), *stored_sweeps(found)], tracks=tracks,
     )  # fmt: skip
-    return SiteReport(index, found, ranking, correlations, profiles_of(tracks))
+    return SiteReport(index, found, ranking, correlations, by_trouble)
 
 
 @dataclass(frozen=True)
@@ -382,6 +383,7 @@ def publish_standard(request: PublishRequest) -> Published:
             file,
             None if request.readme is None else absolute(request.readme),
             preliminary=request.preliminary,
+            workers=request.workers,
         )
     if request.site is not None:
         # As everybody makes it of the packed results: with the series that come with simnav, and no others.

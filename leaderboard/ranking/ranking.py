@@ -37,6 +37,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from simnav.leaderboard.forks import forked
 from simnav.leaderboard.results.errors import RequestError
 from simnav.scoring import SCORES
 from simnav.scoring.consistency import JUDGED
@@ -166,15 +167,26 @@ def rank(
     return rank_tracks(runs_of_tracks(results, score, tracks), requested)
 
 
-def rank_tracks(every: Iterable[TrackRuns], requested: Mapping[str, Sequence[int]] | None = None) -> Ranking:
-    """As `rank`, from the runs of the tracks (`simnav.leaderboard.ranking.track_runs.runs_of_tracks`)."""
-    boards: list[TrackRanking] = []
-    scenarios: dict[str, ScenarioRanking] = {}
-    for found in every:
-        boards.append(rank_track(found.by_trouble(), requested))
-        if not is_derived(found.track.name):
-            scenarios |= {t.name: _scenario(t, found.apart) for t in found.tables}
-    return Ranking(tuple(boards), tuple(scenarios[name] for name in sorted(scenarios)))
+def rank_tracks(
+    every: Iterable[TrackRuns], requested: Mapping[str, Sequence[int]] | None = None, workers: int = 1
+) -> Ranking:
+    """As `rank`, from the runs of the tracks, in several processes.
+
+    Parameters
+    ----------
+    every : iterable of TrackRuns
+        As from `simnav.leaderboard.ranking.track_runs.runs_of_tracks`.
+    requested : mapping of str to sequence of int, optional
+        As for `rank`.
+    workers : int
+        Number of processes.
+    """
+    tracks = list(every)
+    alone = {t.name: (t, found.apart) for found in tracks if not is_derived(found.track.name) for t in found.tables}
+    with forked(lambda k: rank_track(tracks[k].by_trouble(), requested), range(len(tracks)), workers) as made:
+        boards = tuple(made)
+    with forked(lambda name: _scenario(*alone[name]), sorted(alone), workers) as ranked:
+        return Ranking(boards, tuple(ranked))
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,11 +9,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from simnav.leaderboard.forks import forked
 from simnav.leaderboard.results.plain import as_json
 
 from . import tables
@@ -182,9 +183,23 @@ def profiles(
     return profiles_of(runs_of_tracks(results, score, tracks))
 
 
-def profiles_of(every: Iterable[TrackRuns]) -> tuple[TrackProfile, ...]:
-    """As `profiles`, from the runs of the tracks (`simnav.leaderboard.ranking.track_runs.runs_of_tracks`)."""
-    return tuple(filter(None, map(_profile, every)))
+def profiles_of(every: Iterable[TrackRuns], workers: int = 1) -> tuple[TrackProfile, ...]:
+    """As `profiles`, from the runs of the tracks, in several processes.
+
+    Parameters
+    ----------
+    every : iterable of TrackRuns
+        As from `simnav.leaderboard.ranking.track_runs.runs_of_tracks`.
+    workers : int
+        Number of processes.
+    """
+    tracks = list(every)
+    asked = [(runs, name) for runs in tracks for name in troubles() if _with_trouble(runs, name) not in runs.groups]
+    with forked(lambda k: group_of(*asked[k]), range(len(asked)), workers) as made:
+        for (runs, name), group in zip(asked, made, strict=True):
+            if group is not None:
+                runs.groups[_with_trouble(runs, name)] = group
+    return tuple(filter(None, map(_profile, tracks)))
 
 
 def _profile(runs: TrackRuns) -> TrackProfile | None:
@@ -197,13 +212,15 @@ def group_of(runs: TrackRuns, trouble: str) -> TroubleGroup | None:
 
     The same scenarios are ranked once, whoever asks: the profile of the track, or the advice for some instruments.
     """
-    chosen = runs.only(lambda scenario: trouble_of(scenario) == trouble)
-    if not chosen.tables:
-        return None
-    key = tuple(chosen.tables)
-    if key not in runs.groups:
-        runs.groups[key] = ranked_group(chosen, trouble, troubles()[trouble].title)
-    return runs.groups[key]
+    key = _with_trouble(runs, trouble)
+    if key and key not in runs.groups:
+        runs.groups[key] = ranked_group(replace(runs, tables=key), trouble, troubles()[trouble].title)
+    return runs.groups.get(key)
+
+
+def _with_trouble(runs: TrackRuns, trouble: str) -> tuple[ScenarioRuns, ...]:
+    """The scenarios with one kind of trouble."""
+    return tuple(t for t in runs.tables if trouble_of(t.name) == trouble)
 
 
 def ranked_group(runs: TrackRuns, trouble: str, title: str) -> TroubleGroup:

@@ -1,7 +1,7 @@
 """What a scenario page shows besides results: the recordings of some runs, what happens in them, and the bound.
 
-It follows from the scenario and the code alone, and takes longer than all else, so that it is kept in the user's cache:
-a file for each scenario and choice of seeds, named after a digest of all that decides it.
+It follows from the scenario and the code alone, and takes longer than all else. So that it is kept
+in the user's cache: a file for each scenario and choice of seeds, named after a digest of all that decides it.
 """
 
 from __future__ import annotations
@@ -39,7 +39,6 @@ __all__ = [
     "background_of",
     "faulty_points",
     "fix_points",
-    "prepare",
     "track_of",
     "truth_of",
 ]
@@ -78,11 +77,6 @@ class Background:
     bound: Mapping[str, list[Any]] = field(default_factory=lambda: NO_BOUND)
     runs: dict[str, dict[str, Any]] = field(default_factory=dict)
     sky: dict[str, Any] = field(default_factory=dict)
-
-
-def prepare() -> None:
-    """Digest the code that a background depends on: other processes that are forked after it need not."""
-    _code()
 
 
 def background_of(identity: str, seeds: Sequence[int]) -> Background:

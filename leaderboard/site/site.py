@@ -9,16 +9,13 @@ folder is built beside its place and swapped in at the end: a run that is killed
 from __future__ import annotations
 
 import base64
-import gc
 import json
-import multiprocessing
 import os
 import shutil
 import tempfile
 import time
 import zlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -29,6 +26,7 @@ from typing import TYPE_CHECKING, Any
 from simnav.estimator import names
 from simnav.leaderboard.figures import appearance
 from simnav.leaderboard.figures.style import save
+from simnav.leaderboard.forks import forked
 from simnav.leaderboard.ranking import tables
 from simnav.leaderboard.ranking.first_view import first_view
 from simnav.leaderboard.ranking.lost_runs import LOSS
@@ -46,7 +44,7 @@ from simnav.leaderboard.results.provenance import benchmark_of, distinct
 from simnav.leaderboard.results.web_addresses import NOWHERE, Home
 
 from .advisor import advisor
-from .background import background_of, prepare
+from .background import Background, background_of
 from .columns import glossary
 from .content import ExtraPage, Fact, ScenarioEntry, SiteFacts
 from .curves import BAND_RUNS, Gathered, gather, one_run
@@ -93,6 +91,7 @@ def build(
     seeds: Mapping[str, Sequence[int]] | None = None,
     home: Home = NOWHERE,
     tracks: Sequence[TrackRuns] = (),
+    backgrounds: Mapping[str, Background] | None = None,
 ) -> Path:
     """Write the site.
 
@@ -126,6 +125,8 @@ def build(
         Where the repository and the documentation are (`simnav.leaderboard.results.web_addresses.linked_from`).
     tracks : sequence of TrackRuns, optional
         The runs that the ranking is made from; without them there are no picture and no advice on the first page.
+    backgrounds : mapping of str to Background, optional
+        By scenario, what is known of its recordings; others are made, or are in the user's cache.
 
     Returns
     -------
@@ -146,7 +147,7 @@ def build(
         report = progress or (lambda *_, **__: None)
         site = _Site(results, ranking, draft, command or reproduce(results), report, workers, papers, editions, home,
                      tracks)  # fmt: skip
-        site.write(runs_shown, figures, sweeps, seeds or {})
+        site.write(runs_shown, figures, sweeps, seeds or {}, backgrounds or {})
     return output / "index.html"
 
 
@@ -203,40 +204,14 @@ def _request(result: Result) -> str:
     return name + ":" + ",".join(f"{k}={v}" for k, v in result.parameters.items())
 
 
-@contextmanager
-def _beside(site: _Site, method: str, arguments: Sequence[str]) -> Iterator[Iterator[None]]:
-    """Call a method of a build with each argument in forked processes, which share all that the build has in memory.
-
-    Where there is only one process, the calls are made as the iterator is read.
-    """
-    global _building
-    forks = "fork" in multiprocessing.get_all_start_methods() and len(site.scenarios) >= WORTH_PROCESSES
-    if site.workers < 2 or not forks:
-        yield map(getattr(site, method), arguments)
-        return
-    _building = site
-    gc.freeze()  # so that a collection in another process does not copy the memory that it shares
-    try:
-        context = multiprocessing.get_context("fork")
-        with ProcessPoolExecutor(min(site.workers, len(arguments)), mp_context=context) as pool:
-            yield pool.map(_call, [method] * len(arguments), arguments)
-    finally:
-        gc.unfreeze()
-        _building = None
-
-
-_building: _Site | None = None  # what forked processes write
-
-
-def _call(method: str, argument: str) -> None:
-    getattr(_building, method)(argument)
-
-
 @dataclass(frozen=True)
 class _Plan:
-    """What scenarios' pages show: runs one by one, by scenario; what was read of series; charts for print; sweeps."""
+    """What scenarios' pages show: runs one by one and recordings, by scenario; what was read of series; sweeps; charts
+    for print.
+    """
 
     seeds: Mapping[str, Sequence[int]]
+    backgrounds: Mapping[str, Background]
     gathered: Gathered
     figures: bool
     sweeps: Sequence[SweepFile]
@@ -297,7 +272,12 @@ class _Site:
         )
 
     def write(
-        self, runs_shown: int, figures: bool, sweeps: Sequence[SweepFile], kept: Mapping[str, Sequence[int]]
+        self,
+        runs_shown: int,
+        figures: bool,
+        sweeps: Sequence[SweepFile],
+        kept: Mapping[str, Sequence[int]],
+        backgrounds: Mapping[str, Background],
     ) -> None:
         """Write all pages and data."""
         (self.folder / "data").mkdir()
@@ -308,12 +288,12 @@ class _Site:
             for s, entry in self.scenarios.items()
         }
         ordered = {label: worst_runs(label, self.ranking, self.runs) for label in self.estimators}
-        prepare()
-        with _beside(self, "export", formats("results")) as exported:
+        workers = self.workers if len(self.scenarios) >= WORTH_PROCESSES else 1
+        with forked(self.export, formats("results"), workers) as exported:
             gathered = self._gathered(seeds, [found[0][0] for found in ordered.values() if found])
             worst = {label: _with_series(found, gathered) for label, found in ordered.items()}
-            self.plan = _Plan(seeds, gathered, figures, sweeps)
-            with _beside(self, "scenario", list(self.scenarios)) as written:
+            self.plan = _Plan(seeds, backgrounds, gathered, figures, sweeps)
+            with forked(self.scenario, list(self.scenarios), workers) as written:
                 self._other_pages(worst, {label: found[0] for label, found in ordered.items() if found})
                 steps = len(self.scenarios) + 1
                 self.progress(0, steps)
@@ -389,10 +369,12 @@ class _Site:
     def scenario(self, identity: str) -> None:
         """Write the page of a scenario and its data."""
         entry, runs, plan = self.scenarios[identity], self.runs[identity], self.plan
+        seeds, around = plan.seeds[identity], plan.backgrounds.get(identity)
+        if around is None or list(around.runs) != list(map(str, seeds)):
+            around = background_of(identity, seeds)
         found = scenario_data(
-            entry, self.ranking.scenario(identity), runs, {n: self.estimators[n] for n in runs}, plan.seeds[identity],
-            background_of(identity, plan.seeds[identity]), plan.gathered,
-            [s for s in plan.sweeps if s.scenario == identity],
+            entry, self.ranking.scenario(identity), runs, {n: self.estimators[n] for n in runs}, seeds, around,
+            plan.gathered, [s for s in plan.sweeps if s.scenario == identity],
         )  # fmt: skip
         if plan.figures:
             self._print(entry, found)

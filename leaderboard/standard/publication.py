@@ -210,7 +210,14 @@ def _of_simnav(label: str) -> bool:
 
 
 def publish(
-    working: Path, profile: Profile, folder: Path, history: Path, readme: Path | None, *, preliminary: bool = False
+    working: Path,
+    profile: Profile,
+    folder: Path,
+    history: Path,
+    readme: Path | None,
+    *,
+    preliminary: bool = False,
+    workers: int = 1,
 ) -> Published:
     """Pack results, add an edition, and write tables; see `simnav.leaderboard.publishing.publish_standard`."""
     with warnings.catch_warnings():
@@ -233,9 +240,9 @@ def publish(
             "'simnav standard run' continues, and --preliminary publishes what is there"
         )
     tracks = list(runs_of_tracks(results))
-    ranking = rank_tracks(tracks, requested.read(working))
+    ranking = rank_tracks(tracks, requested.read(working), workers)
     of = len(results) + sum(lacking.values())
-    view = first_view(ranking, profiles_of(tracks))
+    view = first_view(ranking, profiles_of(tracks, workers))
     texts = {} if readme is None else {readme: replaced(readme, first_answer(view, results, of))}
     if readme is not None and (page := readme.parent / PAGE).is_file():
         texts[page] = replaced(page, tables(ranking, results, of))  # fails before all is written

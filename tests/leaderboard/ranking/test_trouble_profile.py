@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from simnav.leaderboard.ranking import reference, trouble_profile
-from simnav.leaderboard.ranking.ranking import rank
+from simnav.leaderboard.ranking.ranking import rank, rank_tracks
 from simnav.leaderboard.ranking.recommendation import Recommendation, recommendation
 from simnav.leaderboard.ranking.reports import StandardReport
 from simnav.leaderboard.ranking.track_runs import TrackRuns, runs_of_tracks
@@ -218,3 +218,11 @@ def test_the_profile_and_the_advice_rank_the_same_scenarios_once(monkeypatch: py
     assert any(advice.groups[0] is g for g in groups)
     part = recommendation(runs, ["gnss_position", "imu"], lambda s: s != "lasting-bias-v1", ["lying-fixes"])
     assert part.groups[0].scenarios == ("gnss-multipath-v1", "gnss-spoofing-v1")  # other scenarios are another group
+
+
+def test_two_processes_rank_as_one() -> None:
+    one, two = (list(runs_of_tracks(made(ERRORS))) for _ in range(2))
+    assert rank_tracks(two, workers=2).to_dict() == rank_tracks(one).to_dict()
+    groups = [[p.to_dict() for p in profiles_of(runs, workers)] for runs, workers in ((one, 1), (two, 2))]
+    assert groups[0] == groups[1]
+    assert len(two[0].groups) == len(one[0].groups) == 2  # what other processes ranked is known here

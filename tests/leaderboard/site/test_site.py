@@ -28,10 +28,11 @@ from simnav.leaderboard.results.export import SCHEMA_VERSION
 from simnav.leaderboard.results.result import Result
 from simnav.leaderboard.results.web_addresses import Home
 from simnav.leaderboard.site import charts, site, sweeps
+from simnav.leaderboard.site.background import Background
 from simnav.leaderboard.site.entries import entries
 from simnav.leaderboard.site.facts import datasheets, estimator_facts
 from simnav.leaderboard.site.overview import bar_scale, track_data
-from simnav.leaderboard.site.scenario_page import ScenarioData
+from simnav.leaderboard.site.scenario_page import ScenarioData, track_from
 from simnav.scenario import load
 from simnav.scoring import SCORES
 from simnav.source import record
@@ -403,6 +404,22 @@ def test_parquet_holds_the_same_rows(folder, results):
     assert set(SCORES) <= set(table.column_names)
     assert not list(folder.glob("*.csv"))
     assert table.column("horizontal_rmse").null_count == sum(r.status != "ok" for r in results)
+
+
+def test_recordings_that_are_known_are_not_made_again(results, catalogued, tmp_path, monkeypatch):
+    def made(*_):
+        raise AssertionError("a recording was made")
+
+    monkeypatch.setattr(site, "background_of", made)
+    monkeypatch.setattr(site, "bundle", lambda: "")
+    mine = [r for r in results if r.scenario == catalogued]
+    run = {"faults": charts.NO_FAULTS, "track": track_from([])}
+    known = Background(bound={"time": [0.0, 300.0], "bound": [0.5, 0.625]}, runs={"0": run})
+    site.build(mine, rank(mine), tmp_path / "site", backgrounds={catalogued: known})
+    (chart,) = (c for c in data_of(tmp_path / "site" / f"{catalogued}.html")["charts"] if c["name"] == "horizontal")
+    assert "0.625" in json.dumps(chart)
+    with pytest.raises(AssertionError, match="a recording was made"):  # another run is shown
+        site.build(mine, rank(mine), tmp_path / "two", backgrounds={catalogued: known}, runs_shown=2)
 
 
 @pytest.mark.usefixtures("no_charts")
