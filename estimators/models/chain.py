@@ -20,20 +20,19 @@ but `observe` are in `simnav.estimators.models.moving_chain` for models whose mo
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import cached_property, singledispatch
-from typing import Any, ClassVar, NamedTuple
+from types import SimpleNamespace
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from simnav.compiled import kernel, ready
+from simnav.compiled import ready
 from simnav.estimator.needs import Needs
 from simnav.estimators.algebra.block_tridiagonal import after_step, whiten
 from simnav.estimators.algebra.factors import AidingFactors, Motions, NewRows, Nodes, Prior, Rows, Window
 from simnav.estimators.algebra.whitening import whitening
-from simnav.kernel_types import Matrix, Stack, Vector
-from simnav.records import Record
 from simnav.types import (
     NO_SIDE,
     Array,
@@ -46,6 +45,7 @@ from simnav.types import (
     Measurement,
 )
 
+from .appended_rows import MotionSinceNode, append_aids, append_between, append_motion
 from .base import ErrorModel, Linearised
 from .channel_readings import ChannelReadings
 from .columns import Columns, Made
@@ -54,63 +54,7 @@ from .intermediate_states import IntermediateStates
 from .marginalisation import Reference, keep_covariance, marginalise, subtract_step
 from .named_state import NamedState, at_row
 
-__all__ = ["Chain", "FactorFunctions", "MotionSinceNode", "attach_one", "begin_motion", "chain_of"]
-
-
-class MotionSinceNode(Record):
-    """The motion from the newest node to the front.
-
-    Attributes
-    ----------
-    transition, noise : (n, n) arrays
-        Transition matrix and process noise.
-    elapsed : (1,) array
-        Its time [s].
-    """
-
-    transition: Matrix
-    noise: Matrix
-    elapsed: Vector
-
-
-@kernel
-def attach_one(noise: Matrix, value: Vector, full: Matrix, whitener: Matrix, values: Vector) -> None:
-    """Extend the (m, m) noise and the value of a measurement to three components, and compute the whitener."""
-    for i in range(3):
-        values[i] = value[i] if i < value.size else 0.0
-        for j in range(3):
-            full[i, j] = noise[i, j] if max(i, j) < noise.shape[0] else 1.0 if i == j else 0.0
-    whitening(full, whitener)
-
-
-@kernel
-def _attach_all(noise: Stack, value: Matrix, full: Stack, whitener: Stack, values: Matrix) -> None:
-    """Apply `attach_one` to k measurements."""
-    for k in range(noise.shape[0]):
-        attach_one(noise[k], value[k], full[k], whitener[k], values[k])
-
-
-@kernel
-def begin_motion(
-    transition: Matrix, noise: Matrix, factor: Matrix, jacobian: Matrix, factor_noise: Matrix, whitener: Matrix
-) -> None:
-    """Copy transition matrix and noise of a motion to its factor, with the whitener; after it there is no motion."""
-    n = transition.shape[0]
-    for i in range(n):
-        for j in range(n):
-            factor[i, j] = jacobian[i, j] = transition[i, j]
-            factor_noise[i, j] = noise[i, j]
-            transition[i, j], noise[i, j] = 1.0 if i == j else 0.0, 0.0
-    whitening(factor_noise, whitener)
-
-
-class FactorFunctions(NamedTuple):
-    """The functions of a step of a window, see `simnav.estimators.solvers.window_step.WindowStep`."""
-
-    advance: Callable[..., None]
-    choose: Callable[..., bool]
-    make_node: Callable[..., NewRows]
-    attach: Callable[..., NewRows]
+__all__ = ["Chain", "chain_of"]
 
 
 class Chain(ABC):
@@ -151,9 +95,9 @@ class Chain(ABC):
         """Further arrays of the model that a node stores, in addition to those of its ``state``."""
         return ()
 
-    #: The functions of a step of a window as kernels; None where a window has to call methods.
-    functions: FactorFunctions | None = None
-    #: What they work on, with what `growing` returns.
+    #: How a step of a window is made, `simnav.estimators.models.new_factors.FactorFunctions`; None: by methods.
+    functions: Any = None
+    #: What the functions work on, with what `growing` returns.
     dynamics: Dynamics
     #: Components of the model's error from this index on are independent and only decay.
     coupled: ClassVar[int] = 10**9
@@ -214,11 +158,14 @@ class Chain(ABC):
     @property
     def rows(self) -> Rows:
         """Where the window is in whole columns."""
-        nodes, aids, between = self.nodes, self.aids, self.between
-        return Rows(
-            nodes.first, nodes.last - nodes.first, self.motions.first, aids.first, aids.last - aids.first,
-            between.first, between.last - between.first, self.base, self.base_between, min(self.coupled, self.size),
-        )  # fmt: skip
+        rows: Rows | None = self._made.rows
+        if rows is None:
+            nodes, aids, between = self.nodes, self.aids, self.between
+            rows = self._made.rows = Rows(
+                nodes.first, nodes.last - nodes.first, self.motions.first, aids.first, aids.last - aids.first,
+                between.first, between.last - between.first, self.base, self.base_between, min(self.coupled, self.size),
+            )  # fmt: skip
+        return rows
 
     @property
     def window(self) -> Window:
@@ -230,6 +177,19 @@ class Chain(ABC):
             nodes=self.nodes.record(Nodes), motions=self.motions.record(Motions),
             aids=self.aids.record(AidingFactors), prior=self.prior,
         )  # fmt: skip
+
+    @property
+    def moves(self) -> Any:
+        """How the window is moved, as `simnav.estimators.models.inertial_chain.Moves`; here by methods."""
+        return SimpleNamespace(
+            reference=self.reference.in_python, linearise=lambda graph, rows, node: self.linearise_from(node),
+            retract=lambda graph, rows, step: self.retract(step), take_step=lambda graph, rows: self.take_step(),
+        )  # fmt: skip
+
+    @property
+    def graph(self) -> Any:
+        """What the functions of `moves` work on, with the ``window``."""
+        return SimpleNamespace(window=self.window)
 
     @property
     def needs(self) -> Needs:
@@ -275,13 +235,8 @@ class Chain(ABC):
 
     def extend(self) -> None:
         """Make the front a node, with the motion since the newest one as its factor."""
-        motions, since = self.motions, self.since_node
-        motions.append(begin_shift=0.0, end_shift=0.0, time=self.front.time, weight=1.0)
-        begin_motion.unchecked(
-            since.transition, since.noise, motions.newest("transition"), motions.newest("jacobian"),
-            motions.newest("noise"), motions.newest("whitener"),
-        )  # fmt: skip
-        since.elapsed[0] = 0.0
+        self.motions.append()
+        append_motion.unchecked(self.window.motions, self.motions.last - 1, self.since_node, self.front.time)
         self._append_node()
 
     def predicted_covariance(self, newest: Array) -> Array:
@@ -305,48 +260,29 @@ class Chain(ABC):
         """As `ErrorModel.nominal_noises`, at the front."""
         return self.front.nominal_noises(measurements)
 
-    def attach(self, measurement: Measurement, noise: Array) -> None:
-        """Add a measurement at the front, with the (m, m) noise, as a factor on the newest node.
+    def attach(self, measurements: Sequence[Measurement], noise: Array) -> None:
+        """Add k measurements of one time and m components, with their (k, m, m) noise, as factors on the newest node.
 
-        The noise of the motion between them is added at the first linearisation.
+        They are predicted at the front.
         """
-        aids, ahead = self.aids, self.ahead > 0.0
-        aids.append(
-            node=self.base + len(self.nodes) - 1, between=self._intermediate() if ahead else -1, bare=ahead, weight=1.0,
-            instrument=self._index[measurement.instrument], components=len(noise), time=measurement.time,
-        )  # fmt: skip
-        attach_one.unchecked(
-            np.ascontiguousarray(noise, dtype=np.float64), np.ascontiguousarray(measurement.value, dtype=np.float64),
-            aids.newest("noise"), aids.newest("whitener"), aids.newest("value"),
-        )  # fmt: skip
-        if self._sides:
-            aids.newest("side")[: len(measurement.side)] = measurement.side
-
-    def attach_together(self, measurements: Sequence[Measurement], noise: Array) -> None:
-        """`attach` for k measurements of one time and m components, with their (k, m, m) noise."""
-        aids, ahead, k = self.aids, self.ahead > 0.0, len(measurements)
-        aids.append_rows(
-            k, node=self.base + len(self.nodes) - 1, between=self._intermediate() if ahead else -1, bare=ahead,
-            weight=1.0,
-            instrument=[self._index[m.instrument] for m in measurements], components=noise.shape[1],
-            time=[m.time for m in measurements],
-        )  # fmt: skip
-        _attach_all.unchecked(
+        aids, k, newest = self.aids, len(measurements), self.base + len(self.nodes) - 1
+        between = self._intermediate(newest) if self.ahead > 0.0 else -1
+        aids.append_rows(k)
+        append_aids.unchecked(
+            self.window.aids, aids.last - k, newest, between,
+            np.array([self._index[m.instrument] for m in measurements], dtype=np.int64),
+            np.array([m.time for m in measurements], dtype=np.float64),
             np.ascontiguousarray(noise, dtype=np.float64), np.array([m.value for m in measurements], dtype=np.float64),
-            aids["noise"][-k:], aids["whitener"][-k:], aids["value"][-k:],
         )  # fmt: skip
         if self._sides and len(measurements[0].side):
             aids["side"][-k:, : len(measurements[0].side)] = [m.side for m in measurements]
 
-    def _intermediate(self) -> int:
-        """The number of the intermediate state at the front's time; a new one, if there is none yet."""
-        front, between, since = self.front, self.between, self.since_node
-        newest = self.base + len(self.nodes) - 1
+    def _intermediate(self, newest: int) -> int:
+        """The number of the intermediate state of a node at the front's time; a new one, if there is none yet."""
+        front, between = self.front, self.between
         if not len(between) or between["node"][-1] != newest or between["time"][-1] != front.time:
-            between.append(
-                node=newest, time=front.time, transition=since.transition, noise=since.noise, shift=0.0,
-                jacobian=since.transition, **{name: getattr(front, name) for name in self._kept},
-            )  # fmt: skip
+            between.append(time=front.time, **{name: getattr(front, name) for name in self._kept})
+            append_between.unchecked(self._states_between, between.last - 1, self.since_node, newest)
         return self.base_between + len(between) - 1
 
     def settle(self, moved: Array) -> None:

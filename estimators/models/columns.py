@@ -16,7 +16,15 @@ Kind = TypeVar("Kind", bound=Record)
 
 
 class Made(dict[Any, Any]):
-    """What is made of whole columns, by any key. A copy is empty, because it would refer to the arrays of the other."""
+    """What is made of whole columns, by any key. A copy is empty, because it would refer to the arrays of the other.
+
+    Attributes
+    ----------
+    rows : object
+        Where the rows are, as long as it is so; else None.
+    """
+
+    rows: Any = None
 
     def __reduce__(self) -> tuple[Any, ...]:
         return Made, ()
@@ -88,6 +96,11 @@ class Columns(dict[str, Any]):
                 memo[id(column)] = made = np.zeros(column.shape, column.dtype)
                 made[self.first : self.last] = column[self.first : self.last]
         return _restored(copy.deepcopy(vars(self), memo))
+
+    def clear(self) -> None:
+        """Forget the views, and where the rows are: their number has changed."""
+        super().clear()
+        self._made.rows = None
 
     def newest(self, name: str) -> Any:
         """A view of the last row's entry in a column."""

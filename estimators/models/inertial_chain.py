@@ -6,7 +6,9 @@ that one call linearises all factors or moves all nodes.
 
 from __future__ import annotations
 
-from functools import cached_property
+from collections.abc import Callable
+from functools import cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,11 +29,11 @@ from .inertial_functions import INERTIAL_FUNCTIONS
 from .intermediate_states import IntermediateStates, add_noise, through_one
 from .marginalisation import Reference
 from .measurements import OWN, State, observe_inertial
-from .new_factors import INERTIAL_FACTORS, Growing, InertialStates
+from .new_factors import Growing, InertialStates, inertial_factors
 from .preintegrated import add_shift, move_shift, relative_shift, turn_covariance
 from .propagation import correct_inertial
 
-__all__ = ["InertialChain"]
+__all__ = ["InertialChain", "InertialWindow", "Moves"]
 
 
 class MovedStates(Record):
@@ -53,6 +55,27 @@ class InertialWindow(Record):
     predicted: InertialStates
     moved: MovedStates
     instruments: AidTable
+
+
+class Moves(Record):
+    """How the nodes of a window are moved (`simnav.estimators.solvers.window_iteration`).
+
+    Attributes
+    ----------
+    reference : Reference
+        How shifts and covariances are referred to another state.
+    linearise : callable
+        Linearises and whitens the factors that have to do with a node or later ones.
+    retract : callable
+        Adds a (K, n) step to the nodes.
+    take_step : callable
+        Adds the step of each node, and keeps the linearisation; the cost.
+    """
+
+    reference: Reference
+    linearise: Callable[[InertialWindow, Rows, int], None]
+    retract: Callable[[InertialWindow, Rows, Matrix], None]
+    take_step: Callable[[InertialWindow, Rows], float]
 
 
 @kernel
@@ -186,7 +209,7 @@ def _refer_to_nodes(w: InertialWindow, rows: Rows, first: int) -> None:
         aids.norm[i] = whiten_one(aids.residual[i], aids.whitener[i], aids.whitened[i])
 
 
-@kernel
+@kernel(passed=True)
 def _linearise(w: InertialWindow, rows: Rows, first: int) -> None:
     """Linearise and whiten the factors that have to do with a node or later ones, all with compiled equations."""
     _linearise_motion(w, rows, first)
@@ -194,7 +217,7 @@ def _linearise(w: InertialWindow, rows: Rows, first: int) -> None:
     _refer_to_nodes(w, rows, first)
 
 
-@kernel
+@kernel(passed=True)
 def _retract(w: InertialWindow, rows: Rows, step: Matrix) -> None:
     """Move the nodes by a step, in place, with the shifts of the motions and of the prior.
 
@@ -229,11 +252,18 @@ def _retract(w: InertialWindow, rows: Rows, step: Matrix) -> None:
     relative_shift(before, step[0], shift)
 
 
-@kernel
+@kernel(passed=True)
 def _take_step(w: InertialWindow, rows: Rows) -> float:
     """Move the nodes by their steps, and keep the linearisation (`after_step`); the cost."""
     _retract(w, rows, w.window.nodes.step[rows.first_node : rows.first_node + rows.nodes])
     return after_step(w.window, rows)
+
+
+@cache
+def _moves() -> Moves:
+    """The functions of this module, which are looked up once."""
+    reference = Reference(turn=turn_covariance, relative_shift=relative_shift)
+    return Moves(reference=reference, linearise=_linearise, retract=_retract, take_step=_take_step)
 
 
 class InertialChain(Chain):
@@ -259,22 +289,22 @@ class InertialChain(Chain):
         front = self.front
         self._instruments = front.table(self.names)
         self._instruments.code[[name in front.own for name in self.names]] = OWN
-        self.functions = INERTIAL_FACTORS if front.functions() is INERTIAL_FUNCTIONS else None
+        self.functions = inertial_factors() if front.functions() is INERTIAL_FUNCTIONS else None
         if self.functions is not None:
             self.dynamics = front.dynamics(covariance, self.names)
         return covariance
 
-    @cached_property
+    @property
     def reference(self) -> Reference:
         """As `Chain.reference`: rotations compose, and turn a covariance."""
-        return Reference(turn=turn_covariance, relative_shift=relative_shift)
+        return _moves().reference
 
     @property
-    def _inertial(self) -> InertialWindow:
+    def graph(self) -> InertialWindow:
         """The window as kernels take it; it holds until a column is replaced."""
-        return self._made.once(InertialWindow, self._make_inertial)
+        return self._made.once(InertialWindow, self._make_graph)
 
-    def _make_inertial(self) -> InertialWindow:
+    def _make_graph(self) -> InertialWindow:
         return InertialWindow(
             window=self.window, states=self.nodes.record(InertialStates), between=self._states_between,
             predicted=self.between.record(InertialStates), moved=self.between.record(MovedStates, "now_"),
@@ -288,11 +318,16 @@ class InertialChain(Chain):
         return self._made.once(Growing, self._make_growing)
 
     def _make_growing(self) -> Growing:
-        w = self._inertial
+        w = self.graph
         return Growing(
             nodes=w.states, motions=w.window.motions, aids=w.window.aids, between=w.between,
             between_states=w.predicted, since_node=self.since_node,
         )  # fmt: skip
+
+    @property
+    def moves(self) -> Any:
+        """As `Chain.moves`: kernels, unless a reading has an equation of its own."""
+        return super().moves if self.front.own else _moves()
 
     def linearise_from(self, node: int = 0) -> None:
         """As `Chain.linearise_from` (equations in the module)."""
@@ -300,18 +335,18 @@ class InertialChain(Chain):
             self.linearise_motion(node)
             self.linearise_aids(node)
         else:
-            _linearise.unchecked(self._inertial, self.rows, node)
+            _linearise.unchecked(self.graph, self.rows, node)
 
     def linearise_motion(self, node: int = 0) -> None:
         """As `Chain.linearise_motion`."""
-        _linearise_motion.unchecked(self._inertial, self.rows, node)
+        _linearise_motion.unchecked(self.graph, self.rows, node)
 
     def linearise_aids(self, node: int = 0) -> None:
         """As `Chain.linearise_aids`."""
-        _linearise_readings.unchecked(self._inertial, self.rows, node)
+        _linearise_readings.unchecked(self.graph, self.rows, node)
         if self.front.own:
             self._observe_own(self.first_aid(node))
-        _refer_to_nodes.unchecked(self._inertial, self.rows, node)
+        _refer_to_nodes.unchecked(self.graph, self.rows, node)
 
     def _observe_own(self, first: int) -> None:
         """The readings from an index on whose kind has a measurement equation of its own."""
@@ -333,11 +368,11 @@ class InertialChain(Chain):
 
     def retract(self, step: Array) -> None:
         """As `Chain.retract`."""
-        _retract.unchecked(self._inertial, self.rows, step)
+        _retract.unchecked(self.graph, self.rows, step)
 
     def take_step(self) -> float:
         """As `Chain.take_step`."""
-        cost: float = _take_step.unchecked(self._inertial, self.rows)
+        cost: float = _take_step.unchecked(self.graph, self.rows)
         return cost
 
     def along_motion(self, step: Array) -> Array:

@@ -6,20 +6,23 @@ noise of a measurement.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import cache
+
 from simnav.compiled import helper, kernel
 from simnav.estimators.algebra.factors import AidingFactors, Motions, NewRows, Rows
 from simnav.kernel_types import Matrix, Stack, Vector
 from simnav.records import Record
 from simnav.types import Array
 
-from .chain import FactorFunctions, MotionSinceNode, attach_one, begin_motion
+from .appended_rows import MotionSinceNode, append_aid, append_between, append_motion
 from .covariance_propagation import carry_errors
 from .filtering import Dynamics, Readings
 from .intermediate_states import IntermediateStates
 from .measurements import HEADING, has_heading
 from .propagation import CLOCK, MOTION_NUMBERS, Motion, Samples, motion_of, propagate_inertial, time_of
 
-__all__ = ["INERTIAL_FACTORS", "Growing", "InertialStates"]
+__all__ = ["FactorFunctions", "Growing", "InertialStates", "inertial_factors"]
 
 
 class InertialStates(Record):
@@ -57,6 +60,27 @@ class Growing(Record):
     between: IntermediateStates
     between_states: InertialStates
     since_node: MotionSinceNode
+
+
+class FactorFunctions(Record):
+    """The functions of a step of a window (`simnav.estimators.solvers.window_step`).
+
+    Attributes
+    ----------
+    advance : callable
+        Propagates the front to a time.
+    choose : callable
+        Chooses the noise of a reading; False if it is not to be used.
+    make_node : callable
+        Makes the front a node, with a motion factor.
+    attach : callable
+        Makes a reading a factor of the newest node.
+    """
+
+    advance: Callable[[Dynamics, Growing, Samples, float], None]
+    choose: Callable[[Dynamics, Readings, int], bool]
+    make_node: Callable[[Dynamics, Growing, Rows, NewRows], NewRows]
+    attach: Callable[[Dynamics, Growing, Rows, NewRows, Readings, int], NewRows]
 
 
 @helper
@@ -100,52 +124,34 @@ def use_nominal(dynamics: Dynamics, readings: Readings, k: int) -> bool:
 @kernel(passed=True)
 def make_node(dynamics: Dynamics, growing: Growing, rows: Rows, new: NewRows) -> NewRows:
     """Make the front a node, with the motion since the newest one as its factor; after it there is no motion."""
-    motions, since, row = growing.motions, growing.since_node, rows.first_motion + rows.nodes - 1 + new.nodes
-    state = motion_of(dynamics.numbers)
-    begin_motion(
-        since.transition, since.noise, motions.transition[row], motions.jacobian[row], motions.noise[row],
-        motions.whitener[row],
-    )  # fmt: skip
-    for i in range(motions.begin_shift.shape[1]):
-        motions.begin_shift[row, i], motions.end_shift[row, i] = 0.0, 0.0
-    motions.time[row], motions.weight[row] = time_of(state), 1.0
-    since.elapsed[0] = 0.0
-    _keep(state, dynamics.numbers[MOTION_NUMBERS:], growing.nodes, rows.first_node + rows.nodes + new.nodes)
+    state, row = motion_of(dynamics.numbers), rows.nodes - 1 + new.nodes
+    append_motion(growing.motions, rows.first_motion + row, growing.since_node, time_of(state))
+    _keep(state, dynamics.numbers[MOTION_NUMBERS:], growing.nodes, rows.first_node + row + 1)
     return NewRows(new.nodes + 1, new.aids, new.between)
-
-
-@helper
-def _append_between(between: IntermediateStates, row: int, since: MotionSinceNode, node: int) -> None:
-    """Make the motion since the newest node that of an intermediate state."""
-    between.node[row] = node
-    for i in range(between.shift.shape[1]):
-        between.shift[row, i] = 0.0
-        for j in range(between.shift.shape[1]):
-            between.transition[row, i, j] = between.jacobian[row, i, j] = since.transition[i, j]
-            between.noise[row, i, j] = since.noise[i, j]
 
 
 @kernel(passed=True)
 def attach(dynamics: Dynamics, growing: Growing, rows: Rows, new: NewRows, readings: Readings, k: int) -> NewRows:
     """Make a reading a factor of the newest node with its nominal noise; an intermediate state, if it is later."""
-    state, since, aids = motion_of(dynamics.numbers), growing.since_node, growing.aids
+    state, since = motion_of(dynamics.numbers), growing.since_node
     s, newest, here, added = readings.instrument[k], rows.base + rows.nodes - 1 + new.nodes, -1, new.between
     d, noise = dynamics.aids.components[s], dynamics.aids.noise[s]
     if since.elapsed[0] > 0.0:
         row = rows.first_between + rows.between + added
         known = rows.between + added > 0 and growing.between.node[row - 1] == newest
         if not known or growing.between_states.time[row - 1] != time_of(state):
-            _append_between(growing.between, row, since, newest)
+            append_between(growing.between, row, since, newest)
             _keep(state, dynamics.numbers[MOTION_NUMBERS:], growing.between_states, row)
             added += 1
         here = rows.base_between + rows.between + added - 1
-    row = rows.first_aid + rows.aids + new.aids
-    aids.node[row], aids.between[row], aids.bare[row], aids.instrument[row] = newest, here, here >= 0, s
-    aids.components[row], aids.time[row], aids.weight[row] = d, readings.time[k], 1.0
-    attach_one(
-        noise[: d * d].reshape((d, d)), readings.value[k, :d], aids.noise[row], aids.whitener[row], aids.value[row]
-    )
+    append_aid(
+        growing.aids, rows.first_aid + rows.aids + new.aids, newest, here, s, readings.time[k],
+        noise[: d * d].reshape((d, d)), readings.value[k, :d],
+    )  # fmt: skip
     return NewRows(new.nodes, new.aids + 1, added)
 
 
-INERTIAL_FACTORS = FactorFunctions(advance, use_nominal, make_node, attach)
+@cache
+def inertial_factors() -> FactorFunctions:
+    """The functions of this module, which are looked up once."""
+    return FactorFunctions(advance=advance, choose=use_nominal, make_node=make_node, attach=attach)

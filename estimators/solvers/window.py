@@ -45,9 +45,9 @@ import contextlib
 from collections import deque
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from math import hypot, inf, isfinite
+from math import hypot, inf
 from types import SimpleNamespace
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -60,6 +60,7 @@ from simnav.estimators.models.chains import Chain, chain_of
 from simnav.estimators.models.channels import owners, summary
 from simnav.estimators.models.coupling import by_source
 from simnav.estimators.models.filtering import Readings, ReadingsOfSteps
+from simnav.estimators.models.inertial_chain import Moves
 from simnav.estimators.models.propagation import Samples
 from simnav.estimators.models.stated_sigmas import with_stated_sigmas
 from simnav.estimators.models.suitable import ModelChoice
@@ -69,14 +70,11 @@ from simnav.types import Array, Estimate, InitialState, Instruments, Measurement
 from .admission import Admission, together
 from .cost_consistency import CostTest
 from .looking_back import LooksBack
-from .window_step import WindowStep, attach_readings
+from .window_iteration import DAMPING_FACTOR, FIRST_DAMPING, Limits, Progress, Weighed, move_nodes
+from .window_step import attach_readings
 
 __all__ = ["WindowEstimator"]
 
-#: For a step that is larger than this the cost is checked [sigma].
-CHECKED_STEP = 1.0
-#: Initial damping after a rejected step, and the factor of its changes.
-FIRST_DAMPING, DAMPING_FACTOR = 1e-2, 10.0
 #: A measurement with a weight up to this is reported as faulty.
 FAULTY_WEIGHT = 0.5
 _NO_TIMES: Array = np.empty(0)
@@ -192,16 +190,14 @@ class WindowEstimator(LooksBack, Solver):
                 what.reset(instruments)
         self._epochs: deque[int] = deque()  # nodes of each epoch in the window
         self._counted = self._eliminated = 0
-        self._contraction = 1.0
+        self._contraction, self._limits = 1.0, Limits(self.tolerance, self.iterations, self.incremental)
         self._factors: Factors | None = None
         nominal = self.adaptation is None and not self._owners and not self.every_sample
         self._compiled = nominal and self.chain.functions is not None
         self._arrays = ReadingsOfSteps(dict.fromkeys(self.chain.names, 0))
-        self._step_record: WindowStep | None = None
         self._by_methods = SimpleNamespace(
-            dynamics=None, growing=SimpleNamespace(since_node=self.chain.since_node), advance=self.advance,
-            choose=self.choose, make_node=self.make_node, attach=self.attach,
-        )  # fmt: skip
+            advance=self.advance, choose=self.choose, make_node=self.make_node, attach=self.attach
+        )
         self._cost_test = CostTest()
         quantities = ["residual", "weight", *(["innovation", "nis"] if self.adaptation else [])]
         names = [*observed, "motion"]
@@ -250,8 +246,11 @@ class WindowEstimator(LooksBack, Solver):
         chain, count, spacing = self.chain, len(admitted), 0.0 if self.every_sample else self.spacing
         new: NewRows
         if self._compiled:
-            step, readings = self._compiled_step(count), self._arrays.fill(admitted)
-            new = attach_readings.unchecked(step, chain.rows, readings, chain.front.samples, count, until, spacing)
+            growing, readings = chain.growing(count), self._arrays.fill(admitted)
+            new = attach_readings.unchecked(
+                chain.functions, chain.dynamics, growing, chain.rows, readings, chain.front.samples, count, until,
+                spacing,
+            )  # fmt: skip
             chain.grow(new)
             self._admission.skipped += count - new.aids
             return new.aids
@@ -259,18 +258,10 @@ class WindowEstimator(LooksBack, Solver):
         readings = self._arrays.fill([group.measurements[0] for group in self._groups])
         count = len(self._groups)
         new = attach_readings.function(
-            self._by_methods, chain.rows, readings, chain.front.samples, count, until, spacing
+            self._by_methods, None, SimpleNamespace(since_node=chain.since_node), chain.rows, readings,
+            chain.front.samples, count, until, spacing,
         )  # fmt: skip
         return new.aids
-
-    def _compiled_step(self, count: int) -> WindowStep:
-        """The functions of a step as kernels, with room for so many measurements."""
-        chain = self.chain
-        growing, functions = chain.growing(count), chain.functions
-        if self._step_record is None or self._step_record.growing is not growing:
-            assert functions is not None
-            self._step_record = WindowStep(dynamics=chain.dynamics, growing=growing, **functions._asdict())
-        return self._step_record
 
     def _grouped(self, admitted: Sequence[Measurement]) -> list[_Group]:
         """The measurements in groups that are attached together, each with its noise, or one by one."""
@@ -290,12 +281,13 @@ class WindowEstimator(LooksBack, Solver):
         """Choose the noise of a measurement, that of the datasheet without an adaptation; False if it is not used."""
         group = self._groups[k]
         (m, *_), chain = group.measurements, self.chain
-        if group.noise is None and self.adaptation is not None:
-            group.noise = self._adapted_noise(m, self.adaptation, self._diagnostics, self._flagged)
-        elif group.noise is None and (noise := chain.nominal_noise(m)) is not None:
-            group.noise = noise
-        elif group.noise is None:
-            self._admission.skipped += 1
+        if group.noise is None:
+            if self.adaptation is None:
+                noise = chain.nominal_noise(m)
+                self._admission.skipped += noise is None
+            else:
+                noise = self._adapted_noise(m, self.adaptation, self._diagnostics, self._flagged)
+            group.noise = None if noise is None else noise[None]
         return group.noise is not None
 
     def make_node(self, dynamics: None, growing: Any, rows: Rows, new: NewRows) -> NewRows:
@@ -310,10 +302,7 @@ class WindowEstimator(LooksBack, Solver):
         """Make a measurement, or the readings of channels at one time, factors of the newest node."""
         measurements, noise = self._groups[k].measurements, self._groups[k].noise
         assert noise is not None
-        if len(measurements) > 1:
-            self.chain.attach_together(measurements, noise)
-        else:
-            self.chain.attach(measurements[0], noise)
+        self.chain.attach(measurements, noise)
         return new._replace(aids=new.aids + len(measurements))
 
     def _advance(self, until: float) -> None:
@@ -361,7 +350,7 @@ class WindowEstimator(LooksBack, Solver):
         done = self._converge(attached)
         attached = done.attached
         chain.settle(done.moved)
-        self._cost_test.add(done.cost, float(chain.aids["weight"] @ chain.aids["components"]))
+        self._cost_test.add(done.cost, float(chain.aids["weight"].dot(chain.aids["components"])))
         diagnostics["iterations"], diagnostics["cost"] = float(done.solved), done.cost
         diagnostics["variance_factor"] = self._cost_test.variance_factor
         if attached:
@@ -376,93 +365,61 @@ class WindowEstimator(LooksBack, Solver):
             diagnostics["residual.motion"] = float(chain.motions.newest("norm"))
             diagnostics["weight.motion"] = float(chain.motions.newest("weight"))
 
-    def _converge(self, attached: int) -> _Progress:
+    def _converge(self, attached: int) -> _Solution:
         """Move the nodes to the minimum of the cost.
 
         Parameters
         ----------
         attached : int
             Number of new aiding factors. They are removed if there is no finite solution with them.
-
-        Returns
-        -------
-        _Progress
-            What was done, at the solution.
         """
-        chain, nodes = self.chain, self.chain.nodes
+        chain, step = self.chain, self.chain.nodes["step"]
         contraction = min(1.0, 2.0 * self._contraction)
-        now = _Progress(np.zeros(chain.size), self._first_new(attached), contraction, attached)
-        self._contraction, self._factors = now.contraction, None
+        now = Progress(self._first_new(attached), contraction, contraction)
+        self._factors, moved, accepted = None, np.zeros(chain.size), True
+        weighed = Weighed(self.weighting is not None, True, len(step))
         chain.linearise_from(now.first)
-        while True:
-            reweighted = len(nodes)
-            if now.accepted and self.weighting is not None:
-                now.settled, reweighted = self._weigh(now.solved)
-            now.first = min(now.first, reweighted)
-            if now.first == len(nodes) and now.settled and now.linear:  # the weights are as they were
-                nodes["step"][:] = 0.0
-                break
-            size, now.attached = self._step(now.damping, now.first, now.attached)
-            now.solved += 1
-            if now.before > 0.0:
-                now.contraction = _ratio(size, now.before, now.damping)
-                if reweighted == len(nodes):  # other weights would have their share in it
-                    self._contraction = now.contraction
-            now.since += size
-            weighed = self.weighting is None or (
-                now.settled and _ratio(size, now.latest, now.damping) * size < self.tolerance
-            )
-            now.linear = now.contraction * now.since < self.tolerance
-            now.latest, now.before = size, 0.0
-            if size > CHECKED_STEP:
-                now.accepted = self._checked_step()
-            else:
-                now.accepted = True
-                now.done = (weighed and now.linear) or now.solved == self.iterations
-                if now.done or (not weighed and now.damping == 0.0 and self.incremental):
-                    now.cost = chain.take_step()
-                    now.moved += nodes.newest("step")
-                    if now.done:
-                        break
-                    now.first = len(nodes)
-                    continue
-                chain.retract(nodes["step"])
-                chain.linearise_from()
-            now.first, now.before, now.since = 0, now.since, 0.0
-            if now.accepted:
-                now.moved += nodes.newest("step")
-                now.damping = now.damping / DAMPING_FACTOR if now.damping > FIRST_DAMPING else 0.0
-            else:
-                now.damping = max(FIRST_DAMPING, DAMPING_FACTOR * now.damping)
-            if now.solved == self.iterations:
-                now.damping = max(now.damping, FIRST_DAMPING)  # linearised since, so what was solved for is not kept
-                break
+        while not now.done:
+            if weighed.asked:
+                weighed = self._weigh(now.solved) if accepted else weighed._replace(first=len(step))
+            now = self._move(now, weighed, moved)
+            if now.lost:
+                now, attached = self._without_new(now, weighed, moved, attached), 0
+            accepted = not now.large or self._checked_step()
+            if now.large:
+                damping = _damping(now, accepted, self.iterations)
+                now = now._replace(first=0, before=now.since, since=0.0, damping=damping)
+                if accepted:
+                    moved += step[-1]
+                if now.solved == self.iterations:
+                    break
+        self._contraction, cost = now.learned, now.cost
         if now.damping > 0.0:  # the covariances and the prior are those without it
             chain.linearise_from()
-            self._solve(0.0)
-            nodes["step"][:] = 0.0
-        if now.damping > 0.0 or not now.done:
-            now.cost = chain.keep()
-        self.covariance = nodes.newest("filtered").copy()
-        self._eliminated = len(nodes)
-        return now
+            self._solve()
+            step[:] = 0.0
+            cost = chain.keep()
+        self.covariance = chain.nodes.newest("filtered").copy()
+        self._eliminated = len(step)
+        return _Solution(cost, now.solved, moved, attached)
 
-    def _step(self, damping: float, first: int, attached: int) -> tuple[float, int]:
-        """Solve for a step; its size, and the new factors left: none if there is no finite step with them."""
-        size, older = self._solve(damping, first)
-        if not older <= CHECKED_STEP:  # too far from where the older nodes were linearised
-            self.chain.linearise_from()
-            size, _ = self._solve(damping)
-        if not isfinite(size):
-            self.chain.detach(attached)
-            self._factors = None
-            self._admission.skipped += attached
-            attached = 0
-            self.chain.linearise_from()
-            size, _ = self._solve(0.0)
-            if not isfinite(size):
-                raise FloatingPointError(f"the window at {self.chain.time:g} s has no finite solution")
-        return size, attached
+    def _move(self, now: Progress, weighed: Weighed, moved: Array) -> Progress:
+        """Iterate until it is done or somebody is to be asked."""
+        chain, moves = self.chain, self.chain.moves
+        move = move_nodes.unchecked if isinstance(moves, Moves) else move_nodes.function
+        further: Progress = move(moves, chain.graph, chain.rows, self._limits, weighed, now, moved)
+        return further
+
+    def _without_new(self, now: Progress, weighed: Weighed, moved: Array, attached: int) -> Progress:
+        """Iterate without the new factors, with which there is no finite step."""
+        self.chain.detach(attached)
+        self._factors = None
+        self._admission.skipped += attached
+        self.chain.linearise_from()
+        now = self._move(now._replace(first=0, damping=0.0), weighed, moved)
+        if now.lost:
+            raise FloatingPointError(f"the window at {self.chain.time:g} s has no finite solution")
+        return now
 
     def _checked_step(self) -> bool:
         """Take a large step, if it does not raise the cost: straight, or else along the motion; linearise anew."""
@@ -486,30 +443,29 @@ class WindowEstimator(LooksBack, Solver):
             return 0
         return min(self._eliminated, int(self.chain.aids["node"][-attached]) - self.chain.base)
 
-    def _weigh(self, iteration: int) -> tuple[bool, int]:
-        """Ask the weighting; whether it has settled, and the first node that has to do with a weight that is new."""
+    def _weigh(self, iteration: int) -> Weighed:
+        """Ask the weighting, and the isolation."""
         assert self.weighting is not None
-        motions, aids = self.chain.motions, self.chain.aids
-        motion_before, before = motions["weight"].copy(), aids["weight"].copy()
+        chain = self.chain
         factors = self._factors = self._factors or self._all_factors()
+        motion_before, before = factors.motion_weight.copy(), factors.weight.copy()
         factors.iteration = iteration
         settled = self.weighting.weigh(factors)
         if self.isolation is not None:
             settled = self.isolation.judge(factors) and settled
-        first = keep_weights.unchecked(self.chain.window, self.chain.rows, motion_before, before, self.tolerance)
-        return settled, first
+        first = keep_weights.unchecked(chain.window, chain.rows, motion_before, before, self.tolerance)
+        return Weighed(True, settled, first)
 
     def _cost(self) -> float:
         """Half the sum of squares of all factors, with the weights that they have."""
         cost: float = half_squares.unchecked(self.chain.window, self.chain.rows)
         return cost
 
-    def _solve(self, damping: float, first: int = 0) -> tuple[float, float]:
-        """One step of all nodes; its largest component in sigmas, of all nodes and of those before ``first``."""
+    def _solve(self) -> None:
+        """Eliminate all nodes, without damping."""
         chain = self.chain
-        prior = chain.prior.covariance if first else chain.turned(chain.prior.covariance, -chain.prior.shift)
-        sizes: tuple[float, float] = solve_chain.unchecked(chain.window, chain.rows, prior, damping, first)
-        return sizes
+        prior = chain.turned(chain.prior.covariance, -chain.prior.shift)
+        solve_chain.unchecked(chain.window, chain.rows, prior, 0.0, 0)
 
     def _all_factors(self) -> Factors:
         """Views of the factors, which hold until their number changes."""
@@ -536,64 +492,36 @@ class WindowEstimator(LooksBack, Solver):
 
 @dataclass(slots=True)
 class _Group:
-    """Measurements that become factors together, and their noise: (m, m) of one, (k, m, m) of several."""
+    """Measurements that become factors together, and their (k, m, m) noise."""
 
     measurements: Sequence[Measurement]
     noise: Array | None = None
 
 
-@dataclass(slots=True)
-class _Progress:
-    """The progress of the iteration in an epoch.
+class _Solution(NamedTuple):
+    """What the iteration of an epoch has found.
 
     Attributes
     ----------
-    moved : (n,) array
-        Shift of the newest node so far.
-    first : int
-        First node that must be eliminated again.
-    contraction : float
-        Ratio of the size of the step after a new linearisation to the size of the steps before it.
-    attached : int
-        Number of new aiding factors that are left.
+    cost : float
+        Half the weighted sum of squares.
     solved : int
         Number of linear systems that were solved.
-    damping : float
-        Damping lambda of the next step.
-    latest : float
-        Size of the last step.
-    since : float
-        Size of the steps since the last linearisation.
-    before : float
-        Size of the steps up to the last linearisation, where the last step led to one; else 0.
-    settled : bool
-        Whether the weights are those that are wanted.
-    linear : bool
-        Whether linearising anew would move no node by more than the tolerance.
-    accepted : bool
-        Whether the last step was taken.
-    done : bool
-        Whether it was the last step.
-    cost : float
-        Half the weighted sum of squares; known once the last step was taken.
+    moved : (n,) array
+        Shift of the newest node.
+    attached : int
+        Number of new aiding factors that are left.
     """
 
+    cost: float
+    solved: int
     moved: Array
-    first: int
-    contraction: float
     attached: int
-    solved: int = 0
-    damping: float = 0.0
-    latest: float = 0.0
-    since: float = 0.0
-    before: float = 0.0
-    settled: bool = True
-    linear: bool = False
-    accepted: bool = True
-    done: bool = False
-    cost: float = 0.0
 
 
-def _ratio(size: float, before: float, damping: float) -> float:
-    """By how much a step, without damping, is smaller than what went before; 1 at most, and where nothing did."""
-    return min(1.0, size / before) if before > 0.0 and damping == 0.0 else 1.0
+def _damping(now: Progress, accepted: bool, iterations: int) -> float:
+    """The damping after a large step; with some at the last one, what was solved for is not kept."""
+    if not accepted:
+        return max(FIRST_DAMPING, DAMPING_FACTOR * now.damping)
+    less = now.damping / DAMPING_FACTOR if now.damping > FIRST_DAMPING else 0.0
+    return max(less, FIRST_DAMPING) if now.solved == iterations else less

@@ -22,14 +22,16 @@ attitude badly, so the motion is loosened little at the first test, and more fro
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
 from simnav.compiled import kernel
 from simnav.estimators.algebra.chi_square import chi_square_limits, normal_quantile
 from simnav.estimators.models.roles import fixes_and_logs
-from simnav.kernel_types import IntegerVector, Vector
-from simnav.types import Instruments
+from simnav.kernel_types import FlagVector, IntegerVector, Vector
+from simnav.types import Flags, Instruments
 
 from .base import Factors
 
@@ -44,14 +46,40 @@ LOOSE = 1e-6
 LOOSE_WITHOUT_LOG, LOOSER = 1e-3, 0.1
 
 
+class _News(NamedTuple):
+    """What the new measurements say: index of the first, number of failed tests, and time of the latest fix or -inf."""
+
+    first: int
+    failing: int
+    fixed: float
+
+
 @kernel
-def _failing(time: Vector, tested: float, norm: Vector, components: IntegerVector, limits: Vector) -> tuple[int, int]:
-    """Index of the first measurement after a time, and the number of failed tests from there on."""
-    first, failing = time.size, 0
+def _news(
+    time: Vector, tested: float, norm: Vector, components: IntegerVector, limits: Vector, instrument: IntegerVector,
+    fixes: FlagVector,
+) -> _News:  # fmt: skip
+    """Test the measurements after a time; ``fixes`` says which instruments give fixes."""
+    first, failing, fixed = time.size, 0, -np.inf
     while first > 0 and time[first - 1] > tested:
         first -= 1
         failing += norm[first] * norm[first] > limits[components[first]]
-    return first, failing
+        if fixes[instrument[first]]:
+            fixed = max(fixed, time[first])
+    return _News(first, failing, fixed)
+
+
+@kernel
+def _mark_rejected(
+    time: Vector, tested: float, weight: Vector, instrument: IntegerVector, rejected: FlagVector
+) -> bool:
+    """Mark the instruments whose newest measurement up to a time has hardly any weight; whether there are some."""
+    for k in range(rejected.size):
+        rejected[k] = False
+    for i in range(time.size):
+        if time[i] <= tested:
+            rejected[instrument[i]] = weight[i] <= REJECTED
+    return bool(np.any(rejected))
 
 
 class FaultIsolation:
@@ -87,7 +115,8 @@ class FaultIsolation:
         self._failures: dict[str, tuple[int, float, float]] = {}  # running; the time of the first and of the latest
         self._blamed: list[tuple[float, float, NDArray[np.bool_]]] = []  # from, to, and which instruments agreed
         self._tested = -np.inf
-        self._rejected: set[int] = set()
+        self._fixes: Flags | None = None  # of each instrument, whether it gives fixes
+        self._any_rejected = False
         self._loose = LOOSE if self._has_logs else LOOSE_WITHOUT_LOG
         self._asking: tuple[float, float] | None = None
         self._weight = self._motion_weight = np.empty(0)
@@ -105,7 +134,8 @@ class FaultIsolation:
             if self._asking is not None:  # the last epoch ended before the result of the test
                 factors.motion_weight[:] = 1.0
             self._fresh, self._asking = True, None
-            self._rejected = self._rejected_before(factors) if self._is_fix else set()
+            if self._is_fix:
+                self._find_rejected(factors)
             return False
         if not self._is_fix:
             return True
@@ -138,35 +168,33 @@ class FaultIsolation:
         factors.motion_weight[first:][factors.motion_time[first:] <= end] = self._loose
         return False
 
-    def _rejected_before(self, factors: Factors) -> set[int]:
-        """The instruments whose newest measurement of the last epoch ended with hardly any weight."""
-        if not (factors.weight <= REJECTED).any():
-            return set()
-        last = {}
-        for i, time, weight in zip(factors.instrument.tolist(), factors.time.tolist(), factors.weight.tolist()):
-            if time <= self._tested:
-                last[i] = weight
-        return {i for i, weight in last.items() if weight <= REJECTED}
+    def _find_rejected(self, factors: Factors) -> None:
+        """Find the instruments whose newest measurement of the last epoch ended with hardly any weight."""
+        if self._fixes is None:
+            self._fixes = np.array([self._is_fix.get(name) is True for name in factors.names], dtype=bool)
+            self._rejected = np.zeros(len(factors.names), dtype=bool)
+        self._any_rejected = _mark_rejected.unchecked(
+            factors.time, self._tested, factors.weight, factors.instrument, self._rejected
+        )
 
     def _suspect(self, factors: Factors) -> tuple[float, float] | None:
         """Test the new measurements at full weight; return the interval of a suspect motion, or None."""
-        first, failing_now = _failing.unchecked(
-            factors.time, self._tested, factors.norm, factors.components, self._limits
+        assert self._fixes is not None
+        first, failing_now, fixed = _news.unchecked(
+            factors.time, self._tested, factors.norm, factors.components, self._limits, factors.instrument, self._fixes
         )
-        new = slice(first, None)
         if first == len(factors.time):
             return None
         self._tested = now = float(factors.time[-1])
-        for i, time in zip(factors.instrument[new].tolist(), factors.time[new].tolist()):
-            if self._is_fix.get(factors.names[i]):
-                self._fixed = time
-        if not (self._failures or failing_now or self._rejected):
+        self._fixed = max(self._fixed, fixed)
+        if not (self._failures or failing_now or self._any_rejected):
             self._loose = LOOSE if self._has_logs else LOOSE_WITHOUT_LOG
             if not self._blamed:
                 return None
+        new = slice(first, None)
         # A new measurement has its full weight, so that an uncertain state may follow it; the weighting decides later.
         failed = factors.norm[new] ** 2 > self._limits[factors.components[new]]
-        failed |= np.isin(factors.instrument[new], list(self._rejected))
+        failed |= self._rejected[factors.instrument[new]]
         for i, time, fails in zip(factors.instrument[new].tolist(), factors.time[new].tolist(), failed.tolist()):
             name = factors.names[i]
             if not fails:

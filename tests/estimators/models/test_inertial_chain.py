@@ -47,7 +47,7 @@ def built(recording: Recording, until: float, first: Array | None = None) -> Ine
         chain.extend()
         for m in packet.aids:
             if m.time >= packet.time - 1e-6:
-                chain.attach(m, np.eye(len(m.value)))
+                chain.attach([m], np.eye(len(m.value))[None])
     return chain
 
 
@@ -221,7 +221,7 @@ def folded(recording: Recording, spread: bool) -> InertialChain:
             chain.propagate(measurement.time)
             if spread and chain.ahead > 0.0:
                 chain.extend()
-            chain.attach(measurement, 0.01 * np.eye(len(measurement.value)))
+            chain.attach([measurement], 0.01 * np.eye(len(measurement.value))[None])
         break
     return chain
 

@@ -94,7 +94,7 @@ def test_a_chain_linearises_them_beside_its_own(recording):
         chain.propagate(packet.time)
         chain.extend()
         for m in packet.aids:
-            chain.attach(m, chain.nominal_noise(m))
+            chain.attach([m], chain.nominal_noise(m)[None])
     chain.linearise_motion()
     chain.linearise_aids()
     assert {chain.names[i] for i in chain.aids["instrument"]} == {"depth", "transponder"}

@@ -56,7 +56,7 @@ def chain() -> ShipChain:
                 if sheet.kind in ("gnss_position", "terrain_fix"):
                     value = np.array([0.9, -np.pi, 0.0])[: len(sheet.sigma)]
                 measurement = Measurement(time, sheet.name, sheet.kind, value)
-                chain.attach(measurement, front.measure(measurement).noise)
+                chain.attach([measurement], front.measure(measurement).noise[None])
     return chain
 
 
@@ -133,7 +133,7 @@ def test_a_folded_measurement_is_one_at_a_node_without_motion_error(recording_of
             chain.propagate(m.time)
             if spread and chain.ahead > 0.0:
                 chain.extend()
-            chain.attach(m, np.eye(chain.front.nominal_noise(m).shape[0]))
+            chain.attach([m], np.eye(chain.front.nominal_noise(m).shape[0])[None])
         found.append(chain)
     nodes, first = found
     n = first.size

@@ -126,7 +126,7 @@ def test_a_chain_linearises_it_beside_its_own(recording):
         chain.propagate(packet.time)
         chain.extend()
         for m in packet.aids:
-            chain.attach(m, chain.nominal_noise(m))
+            chain.attach([m], chain.nominal_noise(m)[None])
     chain.linearise_motion()
     chain.linearise_aids()
     aids = chain.aids
