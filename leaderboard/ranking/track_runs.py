@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -22,8 +22,6 @@ from .variants import families, surplus
 
 if TYPE_CHECKING:
     from simnav.leaderboard.results.result import Result
-
-    from .trouble_profile import TroubleGroup
 
 __all__ = ["TrackRuns", "runs_of_tracks"]
 
@@ -48,7 +46,7 @@ class TrackRuns:
     track: Track
     tables: Sequence[ScenarioRuns]
     apart: Mapping[str, Sequence[str]]
-    groups: dict[tuple[ScenarioRuns, ...], TroubleGroup] = field(default_factory=dict)
+    groups: dict[tuple[ScenarioRuns, ...], Any] = field(default_factory=dict)
 
     def only(self, wanted: Callable[[str], bool]) -> TrackRuns:
         """Those of the scenarios whose versioned ids are wanted."""
