@@ -74,6 +74,7 @@ def site(request: SiteRequest) -> SiteReport:
     from simnav.leaderboard.results.web_addresses import linked_from
     from simnav.leaderboard.site.report import SiteReport
     from simnav.leaderboard.site.site import build
+    from simnav.leaderboard.standard.backgrounds import stored_backgrounds
     from simnav.leaderboard.standard.drawn import attached, stored_sweeps
 
     from .results import requested, scenario_files
@@ -90,6 +91,7 @@ def site(request: SiteRequest) -> SiteReport:
         found, ranking, output, home=linked_from(output, request.docs), progress=request.progress, workers=processes,
         papers=pages_in(Path(request.papers)), runs_shown=shown, figures=request.figures, seeds=seeds,
         sweeps=[*swept.sweeps_in(Path(request.sweeps)), *stored_sweeps(found)], tracks=tracks,
+        backgrounds=stored_backgrounds(found),
     )  # fmt: skip
     return SiteReport(index, found, ranking, correlations, by_trouble)
 
@@ -362,6 +364,7 @@ def publish_standard(request: PublishRequest) -> Published:
     from simnav.leaderboard.papers.page import pages_in
     from simnav.leaderboard.results.web_addresses import linked_from
     from simnav.leaderboard.site.site import build
+    from simnav.leaderboard.standard.backgrounds import stored_backgrounds
     from simnav.leaderboard.standard.drawn import attached, stored_sweeps
     from simnav.leaderboard.standard.editions import pages_of
     from simnav.leaderboard.standard.history import read
@@ -391,5 +394,5 @@ def publish_standard(request: PublishRequest) -> Published:
         output = absolute(request.site)
         build(found, made.ranking, output, home=linked_from(output), progress=request.progress, workers=request.workers,
               papers=pages_in(Path("reproduced")), editions=pages_of(read(file)), seeds=seeds,
-              sweeps=stored_sweeps(found), tracks=made.tracks)  # fmt: skip
+              sweeps=stored_sweeps(found), tracks=made.tracks, backgrounds=stored_backgrounds(found))  # fmt: skip
     return made

@@ -242,6 +242,13 @@ class Kernel(Generic[Parameters, Returned]):
         hints = hints_of(self.function).values()
         return any(isinstance(h, type) and (hasattr(h, "numba_type") or issubclass(h, tuple)) for h in hints)
 
+    @cached_property
+    def _records(self) -> tuple[int, ...]:
+        """Which of its arguments are records."""
+        hints = hints_of(self.function)
+        names = self.function.__code__.co_varnames[: self.function.__code__.co_argcount]
+        return tuple(i for i, name in enumerate(names) if hasattr(hints[name], "numba_fields"))
+
     @property
     def unchecked(self) -> Callable[Parameters, Returned]:
         """The compiled function without the check of its arguments, which takes a microsecond for twenty arrays.
@@ -265,8 +272,9 @@ class Kernel(Generic[Parameters, Returned]):
             if not self.typed:  # a helper is compiled within its callers; alone it would be at the first call,
                 return self.function(*args)  # in every process anew, and a confined one cannot write what it compiles
             if self._takes_records:  # Numba would keep each of them for good where it checks its type
-                for record in (a for a in args if hasattr(type(a), "numba_fields") and not a.compiled):
-                    _ = record._numba_type_  # it says why compiled functions cannot take it
+                for i in self._records:
+                    if not args[i].compiled:
+                        _ = args[i]._numba_type_  # it says why compiled functions cannot take it
                 return self.unchecked(*args)
             return (self._dispatcher or self.compile())(*args)
 

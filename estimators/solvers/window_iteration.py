@@ -156,15 +156,13 @@ def move_nodes(
     Progress
         How far it is now.
     """
-    n, begin, end, window = moved.size, rows.first_node, rows.first_node + rows.nodes, graph.window
+    begin, end, window = rows.first_node, rows.first_node + rows.nodes, graph.window
     step, first, contraction, learned = window.nodes.step, min(now.first, weighed.first), now.contraction, now.learned
     solved, damping, latest, since, before = now.solved, now.damping, now.latest, now.since, now.before
     linear, cost, done, large, lost = now.linear, now.cost, False, False, False
     while True:
         if first == rows.nodes and weighed.settled and linear:  # the weights are as they were
-            for k in range(begin, end):
-                for j in range(n):
-                    step[k, j] = 0.0
+            step[begin:end] = 0.0
             cost, done = half_squares(window, rows), True
             break
         size, older = _solve(moves, window, rows, damping, first)
@@ -196,8 +194,7 @@ def move_nodes(
             moves.linearise(graph, rows, 0)
             first, before, since = 0, since, 0.0
             damping = damping / DAMPING_FACTOR if damping > FIRST_DAMPING else 0.0
-        for j in range(n):
-            moved[j] += step[end - 1, j]
+        moved += step[end - 1]
         if done or weighed.asked:
             break
     return Progress(

@@ -18,9 +18,9 @@ def show(out: Output, request: DrawRequest) -> None:
     with out.progress("starting") as bar:
         made = draw_standard.of(replace(request, progress=campaign_progress(bar)))
     out.document(made.to_dict())
-    kept = f"{made.results} results with series, {made.sweeps} sweeps, {made.size / 2**20:.1f} MiB"
+    kept = f"{made.results} results with series, {made.sweeps} sweeps, {made.backgrounds} recordings"
     out.print(
-        f"drawn:   {made.folder} ({kept})",
+        f"drawn:   {made.folder} ({kept}, {made.size / 2**20:.1f} MiB)",
         f"runs:    {made.computed} computed, {made.left} are left",
         "next:    simnav standard draw" if made.left else "next:    simnav standard publish",
     )

@@ -1,7 +1,8 @@
 """What a scenario page shows besides results: the recordings of some runs, what happens in them, and the bound.
 
-It follows from the scenario and the code alone, and takes longer than all else. So that it is kept
-in the user's cache: a file for each scenario and choice of seeds, named after a digest of all that decides it.
+It follows from the scenario and the code alone, and takes longer than all else. That of the standard result comes with
+simnav (`simnav.leaderboard.standard.backgrounds`). Others are kept in the user's cache: a file for each scenario and
+choice of seeds, named after a digest of all that decides it.
 """
 
 from __future__ import annotations

@@ -16,7 +16,7 @@ import tempfile
 import time
 import zlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from importlib.metadata import version
@@ -41,6 +41,7 @@ from simnav.leaderboard.results.errors import RequestError
 from simnav.leaderboard.results.export import Document
 from simnav.leaderboard.results.formats import formats, write
 from simnav.leaderboard.results.provenance import benchmark_of, distinct
+from simnav.leaderboard.results.stored_series import LostSeriesError
 from simnav.leaderboard.results.web_addresses import NOWHERE, Home
 
 from .advisor import advisor
@@ -220,8 +221,9 @@ class _Plan:
 def _with_series(ordered: Sequence[tuple[Result, float]], gathered: Gathered) -> tuple[Result, float] | None:
     """The first of these runs that has series. They are nearly always those of the first, which are gathered."""
     for pair in ordered:
-        if pair[0] not in gathered.single:
-            gathered.single.update(gather((), [pair[0]]).single)
+        with suppress(LostSeriesError):  # the first pass said so
+            if pair[0] not in gathered.single and pair[0].series:
+                gathered.single.update(gather((), [pair[0]]).single)
         if pair[0] in gathered.single:
             return pair
     return None

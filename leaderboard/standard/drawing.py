@@ -13,12 +13,14 @@ from simnav.leaderboard.campaign.campaign import Progress
 from simnav.leaderboard.profiles import read_profile
 from simnav.leaderboard.ranking.superseded import version_of
 from simnav.leaderboard.results import store
+from simnav.leaderboard.results.catalogued import catalogued_scenario
 from simnav.leaderboard.results.files import write_whole
 from simnav.leaderboard.results.plain import as_json
 from simnav.leaderboard.sweep.report import Sweep
 from simnav.simulation.version import SIMULATOR_VERSION
 
-from . import drawn
+from . import RESULTS, drawn
+from .backgrounds import keep_backgrounds
 from .drawn import AskedSweep
 from .publication import run
 
@@ -35,17 +37,18 @@ class Drawing:
         Folder of what comes with simnav.
     results : int
         Number of results whose series are in it.
-    sweeps : int
-        Number of sweeps in it.
+    sweeps, backgrounds : int
+        Number of sweeps in it, and of scenarios whose recordings and bounds are drawn.
     size : int
         Size of its files [bytes].
     computed, left : int
-        Number of results that were computed, and of those, or of sweeps, that are left.
+        Number of results and recordings that were computed, and of those, or of sweeps, that are left.
     """
 
     folder: Path
     results: int
     sweeps: int
+    backgrounds: int
     size: int
     computed: int
     left: int
@@ -84,15 +87,19 @@ def draw(
             left += 1
             continue
         place = working / f"sweep-{one.scenario}"
-        made = sweep(one.scenario, list(one.dials), list(one.estimators), runs=one.runs, output=place, workers=workers,
+        swept = sweep(one.scenario, list(one.dials), list(one.estimators), runs=one.runs, output=place, workers=workers,
                      progress=progress)  # fmt: skip
-        computed += made.summary.computed
-        content = made.to_dict() | {"results": ""} | _versions(one)
+        computed += swept.summary.computed
+        content = swept.to_dict() | {"results": ""} | _versions(one)
         write_whole(file, json.dumps(as_json(content), indent=1, allow_nan=False) + "\n")
     for file in set(target.glob("*.json")) - {target / f"sweep-{one.scenario}.json" for one in asked}:
         file.unlink()
+    shown = store.described(there[0] if there else RESULTS)["current"]
+    simulated = [name for name in shown if not catalogued_scenario(name).recorded]
+    made, waiting = keep_backgrounds(simulated, folder, end)
     size = sum(p.stat().st_size for p in folder.rglob("*") if p.is_file())
-    return Drawing(folder, kept, len(list(target.glob("*.json"))), size, computed, left)
+    sweeps = len(list(target.glob("*.json")))
+    return Drawing(folder, kept, sweeps, len(simulated) - waiting, size, computed + made, left + waiting)
 
 
 def _versions(one: AskedSweep) -> dict[str, Any]:

@@ -29,6 +29,7 @@ from simnav.leaderboard.results.result import Result
 from simnav.leaderboard.results.web_addresses import Home
 from simnav.leaderboard.site import charts, site, sweeps
 from simnav.leaderboard.site.background import Background
+from simnav.leaderboard.site.curves import gather
 from simnav.leaderboard.site.entries import entries
 from simnav.leaderboard.site.facts import datasheets, estimator_facts
 from simnav.leaderboard.site.overview import bar_scale, track_data
@@ -420,6 +421,15 @@ def test_recordings_that_are_known_are_not_made_again(results, catalogued, tmp_p
     assert "0.625" in json.dumps(chart)
     with pytest.raises(AssertionError, match="a recording was made"):  # another run is shown
         site.build(mine, rank(mine), tmp_path / "two", backgrounds={catalogued: known}, runs_shown=2)
+
+
+@pytest.mark.usefixtures("no_charts")
+def test_runs_without_series_are_not_read_one_by_one(results, tmp_path, monkeypatch):
+    read = []
+    monkeypatch.setattr(site, "gather", lambda *asked: read.append(asked) or gather(*asked))
+    few = [replace(r, series={}) if r.estimator == "ekf" else r for r in results if r.scenario == SCENARIOS[0]]
+    site.build(few, rank(few), tmp_path / "site")
+    assert len(read) == 1
 
 
 @pytest.mark.usefixtures("no_charts")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
@@ -14,10 +14,14 @@ from simnav.leaderboard.results.packing import write_packed
 from simnav.leaderboard.results.provenance import BENCHMARK, Provenance
 from simnav.leaderboard.results.result import Result
 from simnav.leaderboard.results.versions import declared
-from simnav.leaderboard.standard import drawing, drawn
+from simnav.leaderboard.site.background import Background, background
+from simnav.leaderboard.standard import backgrounds, drawing, drawn
+from simnav.leaderboard.standard.backgrounds import keep_backgrounds, stored_backgrounds
 from simnav.leaderboard.standard.drawn import attached, keep, stored_sweeps
 from simnav.simulation.version import SIMULATOR_VERSION
 
+#: A scenario whose recording and bound take little time.
+SHORT = "gnss-noise-step-v1"
 PROFILE = """
 title = "small"
 [[part]]
@@ -90,7 +94,31 @@ def test_what_is_of_another_version_is_dropped_when_it_is_kept_again(home: Path,
     assert {r.estimator for r in store.load(home / "drawn" / "curves")} == {"gnss-only"}
 
 
+def made_up(identity: str, seeds: range) -> Background:
+    """What is known of a recording, without simulating it."""
+    return Background(
+        bound={"time": [0.0, 240.0], "bound": [1.0, float(len(identity))]}, runs={str(s): {} for s in seeds}
+    )
+
+
+def test_recordings_and_bounds_are_made_once_and_are_shown_in_their_versions_only(home: Path, monkeypatch) -> None:
+    monkeypatch.setattr(backgrounds, "background", made_up)
+    asked, results, folder = {"clean-voyages-v1", "open-sea-v1"}, store.load(home / "work"), home / "drawn"
+    assert keep_backgrounds(asked, folder, end=0.0) == (0, 2)
+    assert keep_backgrounds(asked, folder) == (2, 0)
+    assert keep_backgrounds(asked, folder) == (0, 0)
+    assert stored_backgrounds(results, folder) == {"clean-voyages-v1": made_up("clean-voyages-v1", range(1))}
+    assert stored_backgrounds([replace(r, recording="of-a-digest") for r in results], folder) == {}
+    assert keep_backgrounds({"clean-voyages-v1"}, folder) == (0, 0)
+    assert [file.stem for file in (folder / "backgrounds").iterdir()] == ["clean-voyages-v1"]
+    monkeypatch.setattr(backgrounds, "version_of", lambda name: 99)
+    assert stored_backgrounds(results, folder) == {}
+    assert keep_backgrounds({"clean-voyages-v1"}, folder) == (1, 0)
+    assert len(stored_backgrounds(results, folder)) == 1
+
+
 def test_draw_runs_what_is_missing_and_sweeps_that_are_of_other_versions(home: Path, monkeypatch) -> None:
+    monkeypatch.setattr(backgrounds, "background", made_up)
     asked = []
 
     class Swept:
@@ -111,10 +139,10 @@ def test_draw_runs_what_is_missing_and_sweeps_that_are_of_other_versions(home: P
     monkeypatch.setenv("SIMNAV_CONFINEMENT", "none")
 
     def draw() -> drawing.Drawing:
-        return drawing.draw(home / "small.toml", home / "again", home / "none", home / "drawn", sweep=sweep, workers=1)
+        return drawing.draw(home / "small.toml", home / "again", home / "work", home / "drawn", sweep=sweep, workers=1)
 
     made = draw()  # both curves were kept, so that nothing is run for them
-    assert (made.results, made.sweeps, made.computed, made.left) == (4, 1, 12, 0)
+    assert (made.results, made.sweeps, made.backgrounds, made.computed, made.left) == (4, 1, 1, 13, 0)
     assert asked == [("clean-voyages", ["size=0,1"], ["ekf", "gnss-only"])]
     assert draw().computed == 0
     results = store.load(home / "work")
@@ -136,3 +164,22 @@ def test_the_profile_that_comes_with_simnav_names_what_there_is() -> None:
     assert drawing.read_profile(drawn.PROFILE).results < 1200
     for one in drawn.asked_sweeps():
         assert chosen_dials(load(one.scenario), parse_dials(list(one.dials)))
+
+
+def test_what_comes_with_simnav_is_what_the_code_of_today_makes_of_a_recording() -> None:
+    content = json.loads((drawn.DRAWN / "backgrounds" / f"{SHORT}.json").read_bytes())
+    assert_same(content["background"], json.loads(json.dumps(asdict(background(SHORT, range(1))))))
+
+
+def assert_same(stored: object, made: object) -> None:
+    """The same words, and numbers but for what another processor rounds."""
+    if isinstance(stored, dict) and isinstance(made, dict):
+        assert stored.keys() == made.keys()
+        for key, value in stored.items():
+            assert_same(value, made[key])
+    elif isinstance(stored, list) and isinstance(made, list):
+        assert len(stored) == len(made)
+        for one, other in zip(stored, made, strict=True):
+            assert_same(one, other)
+    else:
+        assert stored == (pytest.approx(made, rel=1e-3, abs=1e-3) if isinstance(made, float) else made)

@@ -22,7 +22,9 @@ from simnav.leaderboard.results.result import Result
 from simnav.leaderboard.site.entries import entries
 from simnav.leaderboard.site.headings import headings
 from simnav.leaderboard.site.overview import track_data
+from simnav.leaderboard.site.scenario_page import RUNS_SHOWN
 from simnav.leaderboard.standard import history, readme
+from simnav.leaderboard.standard.backgrounds import stored_backgrounds
 from simnav.leaderboard.standard.outdated_results import outdated
 from simnav.leaderboard.standard.publication import missing
 
@@ -70,6 +72,12 @@ def test_the_readme_the_board_and_the_history_are_made_from_it(results: list[Res
     assert [(x.track, x.row, x.ranks) for x in lines] == [
         (x.track, x.row, x.ranks) for x in history.lines_of(ranking, results, last)
     ]
+
+
+def test_nothing_is_simulated_for_its_site(results: list[Result]) -> None:
+    found = stored_backgrounds(results)
+    assert found.keys() == {s for s in {r.scenario for r in results} if not simnav.load(s).recorded}
+    assert {tuple(b.runs) for b in found.values()} == {tuple(map(str, range(RUNS_SHOWN)))}
 
 
 def test_one_call_has_all_of_it(results: list[Result]) -> None:
