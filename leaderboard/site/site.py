@@ -19,6 +19,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -109,7 +110,7 @@ def build(
     progress : callable, optional
         Called with (done, total, note=...).
     workers : int
-        Processes that write the pages of scenarios, and the results in other formats.
+        Processes that write the pages of scenarios and estimators, and the results in other formats.
     papers : sequence of ExtraPage, optional
         Reproductions of papers (`simnav.leaderboard.papers.page.pages_in`).
     editions : sequence of ExtraPage, optional
@@ -207,12 +208,14 @@ def _request(result: Result) -> str:
 
 @dataclass(frozen=True)
 class _Plan:
-    """What scenarios' pages show: runs one by one and recordings, by scenario; what was read of series; sweeps; charts
-    for print.
+    """What pages show: by scenario, runs one by one, and recordings; by estimator, its runs from the worst on, and the
+    worst that has series; what was read of series; charts for print; sweeps.
     """
 
     seeds: Mapping[str, Sequence[int]]
     backgrounds: Mapping[str, Background]
+    ordered: Mapping[str, Sequence[tuple[Result, float]]]
+    worst: Mapping[str, tuple[Result, float] | None]
     gathered: Gathered
     figures: bool
     sweeps: Sequence[SweepFile]
@@ -294,29 +297,31 @@ class _Site:
         with forked(self.export, formats("results"), workers) as exported:
             gathered = self._gathered(seeds, [found[0][0] for found in ordered.values() if found])
             worst = {label: _with_series(found, gathered) for label, found in ordered.items()}
-            self.plan = _Plan(seeds, backgrounds, gathered, figures, sweeps)
-            with forked(self.scenario, list(self.scenarios), workers) as written:
-                self._other_pages(worst, {label: found[0] for label, found in ordered.items() if found})
-                steps = len(self.scenarios) + 1
+            self.plan = _Plan(seeds, backgrounds, ordered, worst, gathered, figures, sweeps)
+            pages = [*(partial(self.scenario, s) for s in self.scenarios),
+                     *(partial(self.estimator, label) for label in self.estimators)]  # fmt: skip
+            with forked(lambda k: pages[k](), range(len(pages)), workers) as written:
+                self._other_pages()
+                steps = len(pages) + 1
                 self.progress(0, steps)
-                for k, (scenario, _) in enumerate(zip(self.scenarios.values(), written, strict=True)):
-                    self.progress(k + 1, steps, note=scenario.name)
+                for k, (page, _) in enumerate(zip(pages, written, strict=True)):
+                    self.progress(k + 1, steps, note=page.args[0])
             list(exported)
         self.progress(steps, steps)
 
-    def _other_pages(
-        self, worst: Mapping[str, tuple[Result, float] | None], first: Mapping[str, tuple[Result, float]]
-    ) -> None:
-        """The pages of estimators, with the worst runs that have series and the worst of all; those of the board."""
-        for label, entry in self.estimators.items():
-            last = worst[label]
-            shown = None if last is None else one_run(self.plan.gathered.single[last[0]])
-            data = estimator_data(entry, self.ranking, self.runs, self.scenarios, self.estimators, last, shown)
-            if data["worst"] is not None:
-                data["worst"]["of_all"] = last is first[label]
-            parameters = [runs[label].results[0].parameters for runs in self.runs.values() if label in runs]
-            self._page("estimator.html", entry.page, data, estimator=entry, facts=facts_of(label, self.ranking),
-                       data=data, parameters=tables.parameters(parameters[0]) if parameters else "")  # fmt: skip
+    def estimator(self, label: str) -> None:
+        """Write the page of an estimator and its data, with the worst run that has series."""
+        entry, last = self.estimators[label], self.plan.worst[label]
+        shown = None if last is None else one_run(self.plan.gathered.single[last[0]])
+        data = estimator_data(entry, self.ranking, self.runs, self.scenarios, self.estimators, last, shown)
+        if data["worst"] is not None:
+            data["worst"]["of_all"] = last is self.plan.ordered[label][0]
+        parameters = [runs[label].results[0].parameters for runs in self.runs.values() if label in runs]
+        self._page("estimator.html", entry.page, data, estimator=entry, facts=facts_of(label, self.ranking),
+                   data=data, parameters=tables.parameters(parameters[0]) if parameters else "")  # fmt: skip
+
+    def _other_pages(self) -> None:
+        """Write the pages of the board, and all that pages share."""
         if self.plan.figures:
             for track in self.ranking.tracks:
                 save(ranking_figure(track), self.folder / "figures" / f"board-{track.track}", formats=("svg", "png"))
