@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -23,8 +23,6 @@ from .variants import families, surplus
 if TYPE_CHECKING:
     from simnav.leaderboard.results.result import Result
 
-    from .trouble_profile import TroubleGroup
-
 __all__ = ["TrackRuns", "runs_of_tracks"]
 
 
@@ -41,14 +39,14 @@ class TrackRuns:
     apart : mapping of str to sequence of str
         Variants beyond the first few of one row, which have no rank, and their family.
     groups : dict
-        By scenarios, those of one kind of trouble that were ranked already
-        (`simnav.leaderboard.ranking.trouble_profile.group_of`).
+        By scenarios, the results in one kind of trouble that are known already
+        (`simnav.leaderboard.ranking.trouble_profile.TroubleGroup`).
     """
 
     track: Track
     tables: Sequence[ScenarioRuns]
     apart: Mapping[str, Sequence[str]]
-    groups: dict[tuple[ScenarioRuns, ...], TroubleGroup] = field(default_factory=dict)
+    groups: dict[tuple[ScenarioRuns, ...], Any] = field(default_factory=dict)
 
     def only(self, wanted: Callable[[str], bool]) -> TrackRuns:
         """Those of the scenarios whose versioned ids are wanted."""
