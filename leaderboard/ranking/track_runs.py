@@ -39,8 +39,8 @@ class TrackRuns:
     apart : mapping of str to sequence of str
         Variants beyond the first few of one row, which have no rank, and their family.
     groups : dict
-        By scenarios, those of one kind of trouble that were ranked already
-        (`simnav.leaderboard.ranking.trouble_profile.group_of`).
+        By scenarios, the results in one kind of trouble that are known already
+        (`simnav.leaderboard.ranking.trouble_profile.TroubleGroup`).
     """
 
     track: Track
