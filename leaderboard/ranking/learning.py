@@ -47,15 +47,16 @@ def learned_words(learned: Mapping[str, Any]) -> str:
     ('learned from runs of streams 5 to 8, 20', '')
     >>> record = {"voyages": 9, "families": ["a", "b"], "parameters": 50, "seconds_per_epoch": 3.1}
     >>> learned_words({"trained_on": record})
-    'learned from 9 voyages of a, b; 50 parameters; 3.1 s for each pass over them'
+    'learned from 9 voyages of 2 families; 50 parameters; 3.1 s for each pass over them'
     """
     record = learned.get("trained_on")
     record = record if isinstance(record, Mapping) else {}
     ranges = [p for p in _listed(learned.get("learned_from")) if isinstance(p, list) and len(p) == 2]
     streams = ", ".join(f"{a} to {b}" if a != b else f"{a}" for a, b in ranges[:_SHOWN])
     more = f" and {len(ranges) - _SHOWN} more" if len(ranges) > _SHOWN else ""
-    families = ", ".join(map(str, _listed(record.get("families"))))[:200]
-    scenario, voyages = families or str(record.get("scenario") or "")[:100], record.get("voyages")
+    families = _listed(record.get("families"))
+    origin = f"{len(families)} families" if len(families) > 1 else next(iter(families), record.get("scenario") or "")
+    scenario, voyages = str(origin)[:100], record.get("voyages")
     if scenario and isinstance(voyages, int):
         size, epoch = record.get("parameters"), record.get("seconds_per_epoch")
         words = f"learned from {voyages} voyages of {scenario}"

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from simnav.leaderboard.ranking.board import TrackRanking
+from simnav.leaderboard.ranking.tracks import BUDGETS
 
 __all__ = ["PAGES", "Heading", "headings"]
 
@@ -15,7 +16,8 @@ _TRACKS = {
     "Satellites and sound": ("satellites", "acoustic", "terrain", "cooperative"),
     "Long and smoothed": ("long", "post-processing"),
     "Real and unseen": (
-        "recorded", "recordings", "generalisation", "generalisation-no-imu", "robustness", "coloured", "papers",
+        "recorded", "recordings", "generalisation", "generalisation-no-imu", *BUDGETS, "robustness", "coloured",
+        "papers",
     ),
 }  # fmt: skip
 _OTHER = "Other scenarios"
