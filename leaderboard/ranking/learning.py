@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from simnav.leaderboard.results.result import Result
 
-__all__ = ["learned_by", "learned_words", "voyages_of"]
+__all__ = ["learned_by", "learned_words", "training_of", "voyages_of"]
 
 _SHOWN = 3  # ranges of runs
 
@@ -18,6 +18,12 @@ def learned_by(results: Iterable[Result]) -> str:
     """What the estimator of some results learned from, in words; empty where nothing is said."""
     texts = {id(r.learned): r.learned for r in results if r.learned}
     return "; ".join(sorted({words for learned in texts.values() if (words := learned_words(learned))}))
+
+
+def training_of(results: Iterable[Result]) -> Mapping[str, Any]:
+    """The record of the training of the estimator of some results; empty where nothing is said."""
+    records = (r.learned.get("trained_on") for r in results)
+    return next((record for record in records if isinstance(record, Mapping)), {})
 
 
 def voyages_of(results: Iterable[Result]) -> int:

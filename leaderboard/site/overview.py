@@ -18,6 +18,7 @@ from .heatmap import heatmap
 from .honesty import honesty
 from .labels import shifts
 from .rounding import short
+from .training_columns import training_cells, training_columns
 
 if TYPE_CHECKING:
     from simnav.leaderboard.ranking.board import Row, TrackRanking, TrackRow
@@ -281,7 +282,7 @@ def track_data(
         for s in track.scenarios
     ]
     wrong = cells(track)
-    more = [COLUMN, *more] if wrong else more
+    more = [*training_columns(track), *([COLUMN] if wrong else []), *more]
     every = all(r.provisional for r in track.rows if r.ranked)
     rows = [
         board_row(
@@ -289,6 +290,7 @@ def track_data(
         )
         | {f"s:{s}": {"value": short(v), "page": scenarios[s].page} for s, v in row.ratios.items()}
         | ({COLUMN.key: wrong.get(row.estimator)} if wrong else {})
+        | training_cells(row.estimator, track, runs)
         for row, others in _once(track.rows)
     ]
     scored = [r for r in track.rows if r.ranked and math.isfinite(r.score)]

@@ -221,6 +221,22 @@ def test_a_row_far_behind_is_named_below_the_chart_of_costs_and_flattens_none():
     assert "Above the chart: inertial (" in chart["caption"]
 
 
+def test_a_board_says_how_many_voyages_a_row_learned_from_and_how_large_its_network_is():
+    learned = {"trained_on": {"voyages": 900, "parameters": 50, "families": ["a", "b"]}}
+    results = [
+        Result("made-up-one-v1", k, n, {}, False, "ok", "", {"horizontal_rmse": 1.0}, learned=told)
+        for n, told in (("ekf", {}), ("net", learned), ("untold", {"learned_from": [[1, 2]]}))
+        for k in range(6)
+    ]
+    ranking = rank(results)
+    table = track_data(ranking.tracks[0], *entries(group(results), ranking), group(results))["table"]
+    hidden = {c["key"]: c.get("hidden", False) for c in table["columns"]}
+    assert (hidden["voyages"], hidden["parameters"]) == (True, True)  # shown at first where all rows learned
+    cells = {row["name"]["text"]: (row["voyages"], row["parameters"]) for row in table["rows"]}
+    assert cells["net"] == ({"text": "900", "value": 900}, {"text": "50", "value": 50})
+    assert cells["ekf"] == cells["untold"] == (None, None)
+
+
 def test_one_row_far_behind_does_not_decide_the_scale_of_the_bars():
     rows = [TrackRow(estimator=str(k), standing="ranked", score=1.0 + 0.1 * k) for k in range(19)]
     assert bar_scale(rows) == (1.0, 2.8)
