@@ -16,15 +16,13 @@ from __future__ import annotations
 
 from functools import partial
 from math import asinh, exp, log, log1p, sqrt
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from simnav.compiled import helper, kernel
 from simnav.estimators.algebra.direct_update import normalised_square
 from simnav.estimators.models.filtering import Prediction, Readings
-from simnav.estimators.networks.file import Network, shipped
+from simnav.estimators.networks.file import Network, NetworkPiece
 from simnav.estimators.networks.groups import GROUPS, group_of
 from simnav.estimators.networks.recurrent import advance, fitting, flat
 from simnav.kernel_types import Vector
@@ -101,7 +99,7 @@ def learned_noise(
     return set_by_network(settings, memory, common, readings, k, prediction)
 
 
-class LearnedNoise(NoiseAdaptation):
+class LearnedNoise(NetworkPiece, NoiseAdaptation):
     """The noise of each reading from a recurrent network, which sees the innovations (see the module).
 
     Instruments of kinds that the network has not learned from keep their nominal noise.
@@ -129,19 +127,13 @@ class LearnedNoise(NoiseAdaptation):
     def __init__(self, file: str = "", highest: float = 30.0, budget: int = 1000):
         if not highest >= 1.0:
             raise ValueError(f"highest = {highest:g}: it must be at least 1")
-        path = Path(file).expanduser() if file else shipped(RECIPE, budget)
-        self.use(Network.load(path, RECIPE, VERSION, partial(fitting, NUMBER_OF_INPUTS)))
+        self.use(self.chosen(file, budget, RECIPE, VERSION, partial(fitting, NUMBER_OF_INPUTS)))
         self.highest = highest
 
     def use(self, network: Network) -> None:
         """Take a network in place of that of the file."""
         self.network, self._weights = network, flat(network.arrays)
         self._units = len(network.arrays["output_weight"])
-
-    @property
-    def trained_on(self) -> dict[str, Any]:
-        """The record of the training."""
-        return self.network.record
 
     def in_scope(self, kind: str) -> bool:
         """Whether the network has learned from this kind of instrument."""

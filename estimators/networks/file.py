@@ -18,7 +18,7 @@ import numpy as np
 
 from simnav.types import Array
 
-__all__ = ["BUDGETS", "FORMAT", "Network", "NetworkError", "Shapes", "shipped"]
+__all__ = ["BUDGETS", "FORMAT", "Network", "NetworkError", "NetworkPiece", "Shapes", "shipped"]
 
 #: Version of the format; raised when it changes.
 FORMAT = 1
@@ -120,6 +120,37 @@ class Network:
                 raise NetworkError(f"{path}: {name} should hold finite numbers")
         own = {name: np.asarray(arrays[name], dtype=np.float64) for name in expected}
         return cls(recipe, version, own, kinds, record)
+
+
+class NetworkPiece:
+    """A piece of a row with a network.
+
+    Attributes
+    ----------
+    network : Network
+        The network.
+    """
+
+    network: Network
+
+    @property
+    def trained_on(self) -> dict[str, Any]:
+        """The record of the training."""
+        return self.network.record
+
+    @staticmethod
+    def chosen(file: str, budget: int, recipe: str, version: int, shapes: Shapes) -> Network:
+        """The network of a file, or without one that of a budget that comes with simnav.
+
+        Raises
+        ------
+        NetworkError
+            As `Network.load`.
+        ValueError
+            As `shipped`.
+        """
+        path = Path(file).expanduser() if file else shipped(recipe, budget)
+        return Network.load(path, recipe, version, shapes)
 
 
 def shipped(recipe: str, budget: int) -> Path:

@@ -11,15 +11,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from pathlib import Path
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
 from simnav.estimator import UnsuitableScenario
 from simnav.estimator.needs import IMU, Needs
 from simnav.estimators.models.suitable import ModelChoice
-from simnav.estimators.networks.file import Network, shipped
+from simnav.estimators.networks.file import NetworkPiece
 from simnav.estimators.networks.velocity import (
     PERIOD,
     RECIPE,
@@ -37,7 +36,7 @@ from .kalman import KalmanEstimator
 __all__ = ["MissingVelocityEstimator", "PredictedVelocity"]
 
 
-class PredictedVelocity:
+class PredictedVelocity(NetworkPiece):
     """The velocity of a network while the DVL gives none.
 
     Parameters
@@ -60,14 +59,8 @@ class PredictedVelocity:
     def __init__(self, file: str = "", lasting: float = 10.0, budget: int = 1000):
         if not lasting > 0.0:
             raise ValueError(f"lasting = {lasting:g}: it must be positive")
-        path = Path(file).expanduser() if file else shipped(RECIPE, budget)
-        self.network = Network.load(path, RECIPE, VERSION, shapes_of)
+        self.network = self.chosen(file, budget, RECIPE, VERSION, shapes_of)
         self.lasting = lasting
-
-    @property
-    def trained_on(self) -> dict[str, Any]:
-        """The record of the training."""
-        return self.network.record
 
     def begin(self, sheet: Datasheet, start: InitialState, name: str) -> None:
         """Begin a run with a DVL; its predictions have the name of an instrument."""

@@ -15,13 +15,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from math import asinh, log1p, sqrt
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from simnav.compiled import kernel
-from simnav.estimators.networks.file import Network, shipped
+from simnav.estimators.networks.file import NetworkPiece
 from simnav.estimators.networks.groups import GROUPS, group_of
 from simnav.kernel_types import IntegerVector, Matrix, Vector
 from simnav.structures import length, structure
@@ -30,7 +28,7 @@ from simnav.types import Array, Instruments
 from .base import Factors
 from .robust_weighting import RobustWeighting
 
-__all__ = ["INPUTS", "RECIPE", "VERSION", "LearnedWeights", "inputs_of", "shapes_of", "shipped"]
+__all__ = ["INPUTS", "RECIPE", "VERSION", "LearnedWeights", "inputs_of", "shapes_of"]
 
 RECIPE, VERSION = "factor-network", 1
 #: The inputs of the network, in order: components and size of the residual, whitened; size of the instrument's mean
@@ -128,7 +126,7 @@ def inputs_of(factors: Factors, group: Mapping[str, int]) -> Array:
     return inputs
 
 
-class LearnedWeights(RobustWeighting):
+class LearnedWeights(NetworkPiece, RobustWeighting):
     """Weights from a network, which sees the residuals of the whole window (see the module).
 
     Measurements of kinds that the network has not learned from keep the weight 1.
@@ -150,13 +148,7 @@ class LearnedWeights(RobustWeighting):
 
     def __init__(self, file: str = "", smallest: float = 1e-3, budget: int = 1000):
         super().__init__(smallest)
-        path = Path(file).expanduser() if file else shipped(RECIPE, budget)
-        self.network = Network.load(path, RECIPE, VERSION, shapes_of)
-
-    @property
-    def trained_on(self) -> dict[str, Any]:
-        """The record of the training."""
-        return self.network.record
+        self.network = self.chosen(file, budget, RECIPE, VERSION, shapes_of)
 
     def reset(self, instruments: Instruments) -> None:
         """Begin a run."""
