@@ -16,7 +16,6 @@ that the datasheet predicts is larger than half of them by `SIGMAS` standard dev
 
 from __future__ import annotations
 
-from collections import deque
 from functools import cache
 
 import numpy as np
@@ -42,18 +41,22 @@ class Level:
 
     def __init__(self) -> None:
         self.value = 1.0
-        self._seen: deque[tuple[float, float]] = deque(maxlen=self.MEMORY)
+        self._squares, self._predicted = np.empty(self.MEMORY), np.empty(self.MEMORY)
+        self._fixes = 0
 
     def observe(self, innovation: Innovation) -> None:
         """Take the innovation of a fix, with the datasheet's noise; the level counts for the next fix."""
         m = len(innovation.residual)
         information = np.linalg.inv(innovation.noise)
         square = float(innovation.residual @ information @ innovation.residual) / m
-        self._seen.append((square, float(np.trace(information @ innovation.predicted)) / m))
-        n, middle = len(self._seen), _median(m) / m
+        oldest = self._fixes % self.MEMORY
+        self._squares[oldest] = square
+        self._predicted[oldest] = float(np.trace(information @ innovation.predicted)) / m
+        self._fixes += 1
+        n, middle = min(self._fixes, self.MEMORY), _median(m) / m
         if n < self.FEWEST:
             return
-        squares, predicted = np.array(self._seen).T
+        squares, predicted = self._squares[:n], self._predicted[:n]
         above = int((squares > (1.0 + predicted) * middle).sum())
         if above - 0.5 * n <= self.SIGMAS * 0.5 * n**0.5:
             self.value = 1.0

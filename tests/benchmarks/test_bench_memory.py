@@ -169,7 +169,7 @@ def test_peak_memory(benchmark, sea: Sea, peer: Callable[[tuple[int, int]], int]
         pytest.skip("what GTSAM holds is known from glibc only")
     pieces = PIECES[slow] if benchmark.enabled else SHORT
     try:
-        sea.run(make(name), 10)  # libraries, kernels, free lists
+        sea.run(make(name), 10 if benchmark.enabled else SHORT[1])  # libraries, kernels, free lists
     except UnsuitableScenario as error:
         pytest.skip(str(error))
     peaks: dict[int, int] = {}
