@@ -25,7 +25,7 @@ smoothing paper (2022, doi:10.1177/01423312221109880, eqs. 24-25) is the same es
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import ClassVar, NamedTuple
+from typing import ClassVar, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -34,10 +34,10 @@ from simnav.types import Array, Datasheet, NavigationStates
 
 from .looking_back import smoothed_rows
 
-__all__ = ["FilteredIntervals", "SmoothedStop", "Smoother", "scale_of", "smoother_gains"]
+__all__ = ["Entries", "FilteredIntervals", "SmoothedStop", "Smoother", "scale_of", "smoother_gains"]
 
 #: FilteredIntervals are stored, and gains are solved for, this many at a time.
-_BATCH = 512
+_BATCH = 64
 #: Gains in units of sigmas from which on the correlations are looked at, and the smallest eigenvalue of these that is
 #: not rounding.
 _LARGE, _RANK = 1e3, 1e-11
@@ -94,6 +94,16 @@ def _repair(solved: Array, correlation: Array, right: Array, sigma: Array) -> No
         solved[wrong] = np.linalg.pinv(correlation[wrong], rcond=_RANK, hermitian=True) @ right[wrong]
 
 
+Entry = TypeVar("Entry")
+
+
+class Entries(list[Entry]):
+    """A list of what is never changed once it is in it. A copy shares it, so that a copy of a long run takes little."""
+
+    def __deepcopy__(self, memo: object) -> Entries[Entry]:
+        return Entries(self)
+
+
 class FilteredIntervals:
     """What the forward pass leaves of some successive intervals between stops.
 
@@ -113,10 +123,19 @@ class FilteredIntervals:
 
     def __init__(self, size: int):
         self.count = 0
-        self.states: list[list[Array]] = []
+        self.states = Entries[list[Array]]()
         self.covariance = np.empty((_BATCH, size, size))
         self.transition, self.predicted = np.empty_like(self.covariance), np.empty_like(self.covariance)
         self.correction = np.empty((_BATCH, size))
+
+    def __deepcopy__(self, memo: object) -> FilteredIntervals:
+        if self.count == _BATCH:  # it is full, and is not changed any more
+            return self
+        copied = FilteredIntervals.__new__(FilteredIntervals)
+        copied.count, copied.states = self.count, Entries(self.states)
+        copied.covariance, copied.transition = self.covariance.copy(), self.transition.copy()
+        copied.predicted, copied.correction = self.predicted.copy(), self.correction.copy()
+        return copied
 
     def matrices(self) -> tuple[Array, Array, Array]:
         """P, Phi and M of the intervals recorded so far."""
@@ -168,7 +187,7 @@ class Smoother:
         self._intervals = [FilteredIntervals(model.size)]
         self._here = np.zeros(model.size)
         self._identity = np.eye(model.size)
-        self._ends: list[tuple[int, float]] = []
+        self._ends = Entries[tuple[int, float]]()
         self._gains: dict[int, Array] = {}
 
     @property

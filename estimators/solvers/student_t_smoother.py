@@ -38,7 +38,7 @@ from simnav.estimators.models.base import ErrorModel, Linearised
 from simnav.kernel_types import IntegerVector, Matrix, Stack, Vector
 from simnav.types import Array, Datasheet
 
-from .smoother import SmoothedStop, Smoother, smoother_gains
+from .smoother import Entries, SmoothedStop, Smoother, smoother_gains
 
 __all__ = ["StudentTSmoother"]
 
@@ -179,7 +179,7 @@ class StudentTSmoother(Smoother):
     def begin(self, model: ErrorModel, observed: Sequence[Datasheet]) -> None:
         """Begin a run."""
         super().begin(model, observed)
-        self._used: list[_Used] = []
+        self._used = Entries[_Used]()
 
     def use(self, correction: Array, linearised: Linearised | None, noise: Array | None) -> None:
         """Note a measurement with its nominal noise, and the correction that it made."""

@@ -43,14 +43,15 @@ from simnav.estimators.algebra.joseph import joseph_update
 from simnav.estimators.models.base import ErrorModel, Linearised
 from simnav.types import Array, Datasheet
 
-from .smoother import FilteredIntervals, SmoothedStop, Smoother, scale_of
+from .smoother import Entries, FilteredIntervals, SmoothedStop, Smoother, scale_of
 
 __all__ = ["TwoFilterSmoother"]
 
 
 class _Used(NamedTuple):
-    """A measurement that the forward filter used: L^-1 r, L^-1 H, and the correction it made."""
+    """A measurement that the forward filter used: its stop, L^-1 r, L^-1 H, and the correction it made."""
 
+    stop: int
     residual: Array
     jacobian: Array
     correction: Array
@@ -79,7 +80,7 @@ class TwoFilterSmoother(Smoother):
         if exact:
             raise UnsuitableScenario(f"a filter that runs backward needs sigmas above 0; {exact[0]}'s are not")
         super().begin(model, observed)
-        self._seen: dict[int, list[_Used]] = {}
+        self._seen = Entries[_Used]()
 
     def use(self, correction: Array, linearised: Linearised | None, noise: Array | None) -> None:
         """Note a measurement, whitened, and the correction that it made."""
@@ -88,7 +89,7 @@ class TwoFilterSmoother(Smoother):
         assert noise is not None
         residual, jacobian, _ = linearised
         white = np.linalg.solve(np.linalg.cholesky(noise), np.column_stack([jacobian, residual]))
-        self._seen.setdefault(self.stops, []).append(_Used(white[:, -1], white[:, :-1], correction.copy()))
+        self._seen.append(_Used(self.stops, white[:, -1], white[:, :-1], correction.copy()))
 
     def _backward(self, model: ErrorModel, covariance: Array) -> Iterator[SmoothedStop]:
         n, stop = model.size, self.stops
@@ -96,11 +97,12 @@ class TwoFilterSmoother(Smoother):
         if self.seed_backward:
             root, known = _information_root(covariance), np.zeros(n)
         yield SmoothedStop(stop, model.snapshot(), *_combine(covariance, root, known))
-        array = np.zeros((0, 0))
+        array, seen = np.zeros((0, 0)), self._seen.copy()
         for intervals in reversed(self._intervals):
             noise = _noise_roots(intervals)
             for k in range(intervals.count - 1, -1, -1):
-                for used in reversed(self._seen.get(stop, ())):
+                while seen and seen[-1].stop == stop:
+                    used = seen.pop()
                     known = np.concatenate([known + root @ used.correction, used.residual])
                     root = np.vstack([root, used.jacobian])
                 rows = n + len(root)

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from copy import deepcopy
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.linalg import expm
@@ -254,3 +257,27 @@ def test_ship_smoother_bridges_an_outage():
         for e in (errors(trial, recording), smoothed_errors(trial, recording))
     )
     assert smoothed < 0.6 * filtered
+
+
+@pytest.mark.parametrize("name", ["ekf-rts", "student-t-rts", "ekf-two-filter"])
+def test_a_copy_shares_what_is_past_and_goes_its_own_way(name):
+    """A copy is made before each packet where readings come late: it must not take longer as the run does."""
+    recording = simulate(load("auv-survey").model_copy(update={"duration": 120.0}), 2)
+    packets = list(recording.steps())
+    alone, copied = make(name), make(name)
+    parts = {}
+    for estimator in (alone, copied):
+        estimator.reset(recording.start, recording.instruments)
+    for k, packet in enumerate(packets):
+        alone.update(packet)
+        copied.update(packet)
+        if k in (10, 100):
+            parts[k] = {}
+            other = deepcopy(copied, parts[k])
+            for wrong in packets[k + 1 : k + 8]:
+                other.update(replace(wrong, aids=[]))
+            other.smooth()
+    assert len(parts[100]) < 1.2 * len(parts[10])
+    there, here = alone.smooth(), copied.smooth()
+    np.testing.assert_array_equal(there.position, here.position)
+    np.testing.assert_array_equal(alone.solver.smoother.smoothed_covariance, copied.solver.smoother.smoothed_covariance)
