@@ -163,7 +163,7 @@ class Admission:
     def admit(self, measurements: Measurements, since: float) -> list[Measurement]:
         """The measurements of a step to be used by a state of time ``since`` [s], in order of their times."""
         admitted = []
-        begin, end, rows, latest = since - LATE, measurements.time + LATE, self._rows, self.record.latest
+        begin, end, rows, latest = since - LATE, measurements.time + LATE, self._rows, self.record.latest.tolist()
         usable = is_usable.function
         for m in sorted(measurements.aids, key=_time):
             time, name, _, value, channel, _ = m
@@ -178,6 +178,7 @@ class Admission:
                 continue
             latest[row] = time
             admitted.append(m)
+        self.record.latest[:] = latest
         return admitted
 
 

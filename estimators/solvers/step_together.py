@@ -57,6 +57,6 @@ def step_together(
     readings, count, dynamics = arrays.fill(measurements), len(measurements), f.dynamics
     readings.rejected[:count], readings.sigma[:count, 0], readings.reported[:count] = False, np.nan, 0.0
     nis, size = readings.nis[:count], readings.size[:count]
-    joseph_sequence(dynamics.covariance, *predicted, dynamics.correction, nis, size)
+    joseph_sequence.unchecked(dynamics.covariance, *predicted, dynamics.correction, nis, size)
     f.retract(dynamics)
     return readings
