@@ -123,8 +123,13 @@ def fit(residual: Residual) -> Fit:
 
 
 def log_ratios(other: Fit, present: Fit) -> Array:
-    """Logarithms of the likelihood of one reading over that of another, by component; without the penalties."""
-    samples = np.minimum(other.samples, present.samples)
+    """Logarithms of the likelihood of one reading over that of another, by component; without the penalties.
+
+    The number of samples is the smaller one: a residual that changes slowly says little. But if the other reading makes
+    it larger, the number is that of the other reading: what it adds is not slow, and speaks against it.
+    """
+    worse = other.mean_square > present.mean_square
+    samples = np.where(worse, other.samples, np.minimum(other.samples, present.samples))
     prior = _NU * present.size**2
 
     def density(one: Fit) -> Array:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,9 +12,10 @@ import pytest
 
 from simnav.leaderboard.logs import align, inspect_log
 from simnav.log.check import check_log
-from simnav.log.likelihood import effective_samples
+from simnav.log.likelihood import Residual, effective_samples, fit, log_ratios
 from simnav.log.readings import probable_readings
 from simnav.scenario import load, parse
+from tests.audit.readings import readings_of
 from tests.cases.manoeuvring_log import SCENARIO, make_log
 
 DATA = Path(os.environ.get("SIMNAV_DATA") or Path(__file__).parents[4] / "shared" / "data")
@@ -132,6 +134,20 @@ def test_a_course_is_no_heading(log):
 @pytest.mark.skipif(not ALL, reason="SIMNAV_ALL_READINGS=1")
 def test_a_quaternion_that_is_right(log):
     assert not probable_readings(parse(SCENARIO.replace(ANGLES, 'columns = ["qw", "qx", "qy", "qz"]')), "")
+
+
+def test_a_delay_that_only_one_component_likes_is_none():
+    """Its forward part has the swing of a lever arm, and fits late; its vertical part, which was slow, is then fast."""
+    assert readings_of(133) == []
+
+
+def test_what_another_reading_makes_larger_has_the_samples_that_it_has_there():
+    slow = Residual(np.full((200, 1), 0.1), np.array([0.15]), np.zeros((200, 1, 0)), np.zeros(0))
+    noise = np.random.default_rng(1).normal(0.0, 0.3, (200, 1))
+    fast = replace(slow, value=noise)
+    assert fit(slow).samples < 2.0
+    assert log_ratios(fit(fast), fit(slow))[0] < -50.0
+    assert 0.0 < log_ratios(fit(slow), fit(fast))[0] < 3.0
 
 
 def test_two_wrong_readings_are_found_one_after_the_other(log):
