@@ -69,10 +69,10 @@ class NoiseReport:
     def note(self, row: int, sigma: Sequence[float], number: float) -> None:
         """Report what was chosen for an instrument: nothing if the first sigma is NaN."""
         if sigma[0] == sigma[0]:
-            chosen = self.rows[row]
-            chosen.sigma[: len(sigma)] = sigma
+            rows = self.rows
+            rows["sigma"][row, : len(sigma)] = sigma
             if number:
-                chosen.number = number
+                rows["number"][row] = number
 
     def diagnostics(self) -> dict[str, float | Array]:
         """The present values by their labels."""

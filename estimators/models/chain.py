@@ -95,7 +95,8 @@ class Chain(ABC):
         """Further arrays of the model that a node stores, in addition to those of its ``state``."""
         return ()
 
-    #: How a step of a window is made, `simnav.estimators.models.new_factors.FactorFunctions`; None: by methods.
+    #: The compiled functions of a step of a window, `simnav.estimators.models.new_factors.FactorFunctions`; None: the
+    #: step is made by methods.
     functions: Any = None
     #: What the functions work on, with what `growing` returns.
     dynamics: Dynamics

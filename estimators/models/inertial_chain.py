@@ -29,7 +29,7 @@ from .inertial_functions import INERTIAL_FUNCTIONS
 from .intermediate_states import IntermediateStates, add_noise, through_one
 from .marginalisation import Reference
 from .measurements import OWN, State, observe_inertial
-from .new_factors import Growing, InertialStates, inertial_factors
+from .new_factors import INERTIAL_FACTORS, Growing, InertialStates
 from .preintegrated import add_shift, move_shift, relative_shift, turn_covariance
 from .propagation import correct_inertial
 
@@ -289,7 +289,7 @@ class InertialChain(Chain):
         front = self.front
         self._instruments = front.table(self.names)
         self._instruments.code[[name in front.own for name in self.names]] = OWN
-        self.functions = inertial_factors() if front.functions() is INERTIAL_FUNCTIONS else None
+        self.functions = INERTIAL_FACTORS if front.functions() is INERTIAL_FUNCTIONS else None
         if self.functions is not None:
             self.dynamics = front.dynamics(covariance, self.names)
         return covariance

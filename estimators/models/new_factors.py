@@ -1,13 +1,15 @@
 """New nodes and factors of a window over an inertial model, in compiled code.
 
-These are the functions that `simnav.estimators.solvers.window_step` calls where nothing but the datasheet chooses the
-noise of a measurement.
+These are the functions of the model that `simnav.estimators.solvers.window_step` calls. The covariance at the front is
+carried along only where the noise of a measurement is chosen from its innovation.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cache
+from typing import NamedTuple
+
+import numpy as np
 
 from simnav.compiled import helper, kernel
 from simnav.estimators.algebra.factors import AidingFactors, Motions, NewRows, Rows
@@ -16,13 +18,14 @@ from simnav.records import Record
 from simnav.types import Array
 
 from .appended_rows import MotionSinceNode, append_aid, append_between, append_motion
-from .covariance_propagation import carry_errors
-from .filtering import Dynamics, Readings
+from .covariance_propagation import carry_errors, propagate_covariance
+from .filtering import Dynamics, Prediction, Readings
+from .inertial_functions import predict
 from .intermediate_states import IntermediateStates
 from .measurements import HEADING, has_heading
 from .propagation import CLOCK, MOTION_NUMBERS, Motion, Samples, motion_of, propagate_inertial, time_of
 
-__all__ = ["FactorFunctions", "Growing", "InertialStates", "inertial_factors"]
+__all__ = ["INERTIAL_FACTORS", "FactorFunctions", "Growing", "InertialStates"]
 
 
 class InertialStates(Record):
@@ -62,25 +65,27 @@ class Growing(Record):
     since_node: MotionSinceNode
 
 
-class FactorFunctions(Record):
-    """The functions of a step of a window (`simnav.estimators.solvers.window_step`).
+class FactorFunctions(NamedTuple):
+    """The functions of a model in a step of a window (`simnav.estimators.solvers.window_step.WindowStep`).
 
     Attributes
     ----------
-    advance : callable
-        Propagates the front to a time.
-    choose : callable
-        Chooses the noise of a reading; False if it is not to be used.
-    make_node : callable
-        Makes the front a node, with a motion factor.
-    attach : callable
+    advance, advance_covariance : Kernel
+        Propagates the front to a time, without its covariance or with it.
+    predict_noise, predict : Kernel
+        Predicts the noise of a reading, or all of it; the second needs the covariance.
+    make_node : Kernel
+        Makes the front a node.
+    attach : Kernel
         Makes a reading a factor of the newest node.
     """
 
-    advance: Callable[[Dynamics, Growing, Samples, float], None]
-    choose: Callable[[Dynamics, Readings, int], bool]
-    make_node: Callable[[Dynamics, Growing, Rows, NewRows], NewRows]
-    attach: Callable[[Dynamics, Growing, Rows, NewRows, Readings, int], NewRows]
+    advance: Callable[..., None]
+    advance_covariance: Callable[..., None]
+    predict_noise: Callable[..., bool]
+    predict: Callable[..., bool]
+    make_node: Callable[..., NewRows]
+    attach: Callable[..., NewRows]
 
 
 @helper
@@ -115,10 +120,25 @@ def advance(dynamics: Dynamics, growing: Growing, samples: Samples, until: float
 
 
 @kernel(passed=True)
-def use_nominal(dynamics: Dynamics, readings: Readings, k: int) -> bool:
-    """The noise is that of the datasheet; False for a heading of a body that points up or down."""
-    code = dynamics.aids.code[readings.instrument[k]]
-    return code != HEADING or has_heading(motion_of(dynamics.numbers).dcm)
+def advance_covariance(dynamics: Dynamics, growing: Growing, samples: Samples, until: float) -> None:
+    """Propagate the front with its covariance, and the motion since the newest node."""
+    elapsed = until - time_of(motion_of(dynamics.numbers))
+    advance(dynamics, growing, samples, until)
+    if elapsed > 0.0:
+        propagate_covariance(
+            dynamics.covariance, dynamics.transition, dynamics.process_noise, np.zeros(dynamics.decay.size),
+            dynamics.decay, dynamics.density, elapsed,
+        )  # fmt: skip
+
+
+@kernel(passed=True)
+def predict_noise(dynamics: Dynamics, readings: Readings, k: int, prediction: Prediction) -> bool:
+    """The noise of the datasheet, and no more; False for a heading of a body that points up or down."""
+    row, aids, d = readings.instrument[k], dynamics.aids, prediction.nominal.shape[0]
+    for a in range(d):
+        for b in range(d):
+            prediction.nominal[a, b] = aids.noise[row, a * d + b]
+    return aids.code[row] != HEADING or has_heading(motion_of(dynamics.numbers).dcm)
 
 
 @kernel(passed=True)
@@ -131,11 +151,13 @@ def make_node(dynamics: Dynamics, growing: Growing, rows: Rows, new: NewRows) ->
 
 
 @kernel(passed=True)
-def attach(dynamics: Dynamics, growing: Growing, rows: Rows, new: NewRows, readings: Readings, k: int) -> NewRows:
-    """Make a reading a factor of the newest node with its nominal noise; an intermediate state, if it is later."""
+def attach(
+    dynamics: Dynamics, growing: Growing, rows: Rows, new: NewRows, readings: Readings, k: int, prediction: Prediction
+) -> NewRows:
+    """Make a reading a factor of the newest node, with the noise that was chosen; an intermediate state, if later."""
     state, since = motion_of(dynamics.numbers), growing.since_node
     s, newest, here, added = readings.instrument[k], rows.base + rows.nodes - 1 + new.nodes, -1, new.between
-    d, noise = dynamics.aids.components[s], dynamics.aids.noise[s]
+    noise = prediction.noise
     if since.elapsed[0] > 0.0:
         row = rows.first_between + rows.between + added
         known = rows.between + added > 0 and growing.between.node[row - 1] == newest
@@ -145,13 +167,10 @@ def attach(dynamics: Dynamics, growing: Growing, rows: Rows, new: NewRows, readi
             added += 1
         here = rows.base_between + rows.between + added - 1
     append_aid(
-        growing.aids, rows.first_aid + rows.aids + new.aids, newest, here, s, readings.time[k],
-        noise[: d * d].reshape((d, d)), readings.value[k, :d],
+        growing.aids, rows.first_aid + rows.aids + new.aids, newest, here, s, readings.time[k], noise,
+        readings.value[k, : noise.shape[0]],
     )  # fmt: skip
     return NewRows(new.nodes, new.aids + 1, added)
 
 
-@cache
-def inertial_factors() -> FactorFunctions:
-    """The functions of this module, which are looked up once."""
-    return FactorFunctions(advance=advance, choose=use_nominal, make_node=make_node, attach=attach)
+INERTIAL_FACTORS = FactorFunctions(advance, advance_covariance, predict_noise, predict, make_node, attach)

@@ -52,6 +52,8 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from simnav.estimators.adaptations.base import Adaptation, Innovation
+from simnav.estimators.adaptations.choice import no_choice
+from simnav.estimators.adaptations.noise import NoiseAdaptation
 from simnav.estimators.algebra.block_tridiagonal import half_squares, keep_weights, solve_chain
 from simnav.estimators.algebra.factors import NewRows, Rows
 from simnav.estimators.composition import Solver
@@ -59,7 +61,7 @@ from simnav.estimators.models.base import ErrorModel
 from simnav.estimators.models.chains import Chain, chain_of
 from simnav.estimators.models.channels import owners, summary
 from simnav.estimators.models.coupling import by_source
-from simnav.estimators.models.filtering import Readings, ReadingsOfSteps
+from simnav.estimators.models.filtering import Prediction, Readings, ReadingsOfSteps
 from simnav.estimators.models.inertial_chain import Moves
 from simnav.estimators.models.propagation import Samples
 from simnav.estimators.models.stated_sigmas import with_stated_sigmas
@@ -69,15 +71,17 @@ from simnav.types import Array, Estimate, InitialState, Instruments, Measurement
 
 from .admission import Admission, together
 from .cost_consistency import CostTest
+from .filter_step import use_nominal
 from .looking_back import LooksBack
 from .window_iteration import DAMPING_FACTOR, FIRST_DAMPING, Limits, Progress, Weighed, move_nodes
-from .window_step import attach_readings
+from .window_step import WindowStep, attach_readings, choose_and_test
 
 __all__ = ["WindowEstimator"]
 
 #: A measurement with a weight up to this is reported as faulty.
 FAULTY_WEIGHT = 0.5
 _NO_TIMES: Array = np.empty(0)
+_NO_COVARIANCE: Array = np.empty((0, 0))
 
 
 class WindowEstimator(LooksBack, Solver):
@@ -192,18 +196,38 @@ class WindowEstimator(LooksBack, Solver):
         self._counted = self._eliminated = 0
         self._contraction, self._limits = 1.0, Limits(self.tolerance, self.iterations, self.incremental)
         self._factors: Factors | None = None
-        nominal = self.adaptation is None and not self._owners and not self.every_sample
-        self._compiled = nominal and self.chain.functions is not None
-        self._arrays = ReadingsOfSteps(dict.fromkeys(self.chain.names, 0))
+        self._step = self._step_of_kernels()
+        components = [0] * len(self.chain.names) if self._step is None else self.chain.dynamics.aids.components.tolist()
+        self._arrays = ReadingsOfSteps(dict(zip(self.chain.names, components, strict=True)))
         self._by_methods = SimpleNamespace(
-            advance=self.advance, choose=self.choose, make_node=self.make_node, attach=self.attach
-        )
+            dynamics=SimpleNamespace(covariance=_NO_COVARIANCE), choice=None, advance=self.advance,
+            predict=self.predict, choose=self.choose, make_node=self.make_node, attach=self.attach,
+        )  # fmt: skip
         self._cost_test = CostTest()
         quantities = ["residual", "weight", *(["innovation", "nis"] if self.adaptation else [])]
         names = [*observed, "motion"]
         self._blank = {f"{q}.{n}": np.nan for q in quantities for n in names if n != "motion" or q in quantities[:2]}
         self._labels = [(f"residual.{name}", f"weight.{name}") for name in self.chain.names]
         self._blank |= {"iterations": 0.0, "cost": np.nan, "variance_factor": np.nan, "inconsistent": 0.0}
+
+    def _step_of_kernels(self) -> WindowStep | None:
+        """The step of a window where all that it does is compiled; None: it is made by methods."""
+        chain, own = self.chain, self.adaptation
+        f = chain.functions
+        if f is None or self._owners or self.every_sample:
+            return None
+        if own is None:
+            return WindowStep(
+                dynamics=chain.dynamics, choice=no_choice(), advance=f.advance, predict=f.predict_noise,
+                choose=use_nominal, make_node=f.make_node, attach=f.attach,
+            )  # fmt: skip
+        if not (isinstance(own, NoiseAdaptation) and own.ruled):
+            return None
+        step = WindowStep(
+            dynamics=chain.dynamics, choice=own.choice(chain.names, chain.size), advance=f.advance_covariance,
+            predict=f.predict, choose=choose_and_test, make_node=f.make_node, attach=f.attach,
+        )  # fmt: skip
+        return step if step.compiled else None
 
     def update(self, measurements: Measurements) -> Estimate:
         """Take one step's measurements, each at its own time."""
@@ -245,23 +269,45 @@ class WindowEstimator(LooksBack, Solver):
         """Make the measurements of a step factors; their number."""
         chain, count, spacing = self.chain, len(admitted), 0.0 if self.every_sample else self.spacing
         new: NewRows
-        if self._compiled:
+        if self._step is not None:
+            if self.adaptation is not None:
+                chain.dynamics.covariance[...] = chain.predicted_covariance(self.covariance)
             growing, readings = chain.growing(count), self._arrays.fill(admitted)
             new = attach_readings.unchecked(
-                chain.functions, chain.dynamics, growing, chain.rows, readings, chain.front.samples, count, until,
-                spacing,
-            )  # fmt: skip
+                self._step, growing, chain.rows, readings, chain.front.samples, count, until, spacing
+            )
             chain.grow(new)
             self._admission.skipped += count - new.aids
+            if self.adaptation is not None:
+                self._note(readings, count, diagnostics, flagged)
             return new.aids
         self._groups, self._diagnostics, self._flagged = self._grouped(admitted), diagnostics, flagged
         readings = self._arrays.fill([group.measurements[0] for group in self._groups])
-        count = len(self._groups)
+        count, growing = len(self._groups), SimpleNamespace(since_node=chain.since_node)
         new = attach_readings.function(
-            self._by_methods, None, SimpleNamespace(since_node=chain.since_node), chain.rows, readings,
-            chain.front.samples, count, until, spacing,
-        )  # fmt: skip
+            self._by_methods, growing, chain.rows, readings, chain.front.samples, count, until, spacing
+        )
         return new.aids
+
+    def _note(
+        self, readings: Readings, count: int, diagnostics: dict[str, float | Array], flagged: list[tuple[str, float]]
+    ) -> None:
+        """Note what an adaptation has chosen in compiled code."""
+        assert isinstance(self.adaptation, NoiseAdaptation)
+        sigma, reported, size, nis, rejected = (
+            readings.sigma.tolist(), readings.reported.tolist(), readings.size.tolist(), readings.nis.tolist(),
+            readings.rejected.tolist(),
+        )  # fmt: skip
+        for k, row in enumerate(readings.instrument[:count].tolist()):
+            if size[k] < 0.0:
+                continue
+            name = self.chain.names[row]
+            diagnostics[f"innovation.{name}"], diagnostics[f"nis.{name}"] = size[k], nis[k]
+            if rejected[k]:
+                self._admission.skipped -= 1
+                flagged.append((name, float(readings.time[k])))
+            else:
+                self.adaptation.report.note(row, sigma[k], reported[k])
 
     def _grouped(self, admitted: Sequence[Measurement]) -> list[_Group]:
         """The measurements in groups that are attached together, each with its noise, or one by one."""
@@ -273,24 +319,48 @@ class WindowEstimator(LooksBack, Solver):
             groups += [_Group([m]) for m in group] if noise is None else [_Group(group, noise)]
         return groups
 
-    def advance(self, dynamics: None, growing: Any, samples: Samples, until: float) -> None:
+    def advance(self, dynamics: Any, growing: Any, samples: Samples, until: float) -> None:
         """Advance the front, leaving a node at each sample on the way if there is to be one."""
         self._advance(until)
 
-    def choose(self, dynamics: None, readings: Readings, k: int) -> bool:
-        """Choose the noise of a measurement, that of the datasheet without an adaptation; False if it is not used."""
+    def predict(self, dynamics: Any, readings: Readings, k: int, prediction: Prediction) -> bool:
+        """Predict a measurement, at least its nominal noise; False if it cannot be used."""
         group = self._groups[k]
+        if group.noise is not None:
+            return True
         (m, *_), chain = group.measurements, self.chain
-        if group.noise is None:
-            if self.adaptation is None:
-                noise = chain.nominal_noise(m)
-                self._admission.skipped += noise is None
-            else:
-                noise = self._adapted_noise(m, self.adaptation, self._diagnostics, self._flagged)
+        if self.adaptation is None:
+            noise = chain.nominal_noise(m)
             group.noise = None if noise is None else noise[None]
-        return group.noise is not None
+            usable = noise is not None
+        else:
+            self._linearised = chain.linearise(m)
+            usable = self._linearised is not None
+        self._admission.skipped += not usable
+        return usable
 
-    def make_node(self, dynamics: None, growing: Any, rows: Rows, new: NewRows) -> NewRows:
+    def choose(self, choice: None, covariance: Array, readings: Readings, k: int, prediction: Prediction) -> None:
+        """Ask the adaptation for the noise of a measurement; without one it is that of the datasheet."""
+        if self.adaptation is None:
+            return
+        assert self._linearised is not None
+        group, (residual, jacobian, noise) = self._groups[k], self._linearised
+        (m, *_) = group.measurements
+        covariance = self.chain.predicted_covariance(self.covariance)
+        cross = covariance @ jacobian.T
+        predicted = jacobian @ cross
+        chosen = self.adaptation.adapt(Innovation(m, residual, predicted, noise, covariance, cross))
+        self._diagnostics[f"innovation.{m.instrument}"] = hypot(*residual.tolist())
+        with contextlib.suppress(np.linalg.LinAlgError):
+            white = np.linalg.solve(predicted + (noise if chosen is None else chosen), residual)
+            self._diagnostics[f"nis.{m.instrument}"] = float(residual @ white)
+        if chosen is None:
+            readings.rejected[k] = True
+            self._flagged.append((m.instrument, m.time))
+        else:
+            group.noise = chosen[None]
+
+    def make_node(self, dynamics: Any, growing: Any, rows: Rows, new: NewRows) -> NewRows:
         """Make the front a node for a measurement."""
         if self.adaptation is None:
             self.chain.extend()  # the measurement is going to change the covariance, and nothing asks for it before
@@ -298,7 +368,16 @@ class WindowEstimator(LooksBack, Solver):
             self._extend()
         return new
 
-    def attach(self, dynamics: None, growing: Any, rows: Rows, new: NewRows, readings: Readings, k: int) -> NewRows:
+    def attach(
+        self,
+        dynamics: Any,
+        growing: Any,
+        rows: Rows,
+        new: NewRows,
+        readings: Readings,
+        k: int,
+        prediction: Prediction,
+    ) -> NewRows:
         """Make a measurement, or the readings of channels at one time, factors of the newest node."""
         measurements, noise = self._groups[k].measurements, self._groups[k].noise
         assert noise is not None
@@ -318,31 +397,6 @@ class WindowEstimator(LooksBack, Solver):
         """Make the front the newest node."""
         self.covariance = self.chain.predicted_covariance(self.covariance)
         self.chain.extend()
-
-    def _adapted_noise(
-        self,
-        m: Measurement,
-        adaptation: Adaptation,
-        diagnostics: dict[str, float | Array],
-        flagged: list[tuple[str, float]],
-    ) -> Array | None:
-        """The noise that the adaptation chooses; None for a measurement that is not to be used."""
-        linearised = self.chain.linearise(m)
-        if linearised is None:
-            self._admission.skipped += 1
-            return None
-        residual, jacobian, noise = linearised
-        covariance = self.chain.predicted_covariance(self.covariance)
-        cross = covariance @ jacobian.T
-        predicted = jacobian @ cross
-        chosen = adaptation.adapt(Innovation(m, residual, predicted, noise, covariance, cross))
-        diagnostics[f"innovation.{m.instrument}"] = hypot(*residual.tolist())
-        with contextlib.suppress(np.linalg.LinAlgError):
-            white = np.linalg.solve(predicted + (noise if chosen is None else chosen), residual)
-            diagnostics[f"nis.{m.instrument}"] = float(residual @ white)
-        if chosen is None:
-            flagged.append((m.instrument, m.time))
-        return chosen
 
     def _optimise(self, attached: int, diagnostics: dict[str, float | Array], flagged: list[tuple[str, float]]) -> None:
         """Estimate all nodes, the newest of which hold new factors, and report."""
