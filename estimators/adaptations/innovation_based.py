@@ -44,22 +44,22 @@ def adaptive_window(variance: float, nominal: float, low: float, high: float, sh
 
 
 class _Epoch(NamedTuple):
-    """What a window keeps of an innovation of m components, or its sums over some of them.
+    """What a window keeps of an innovation of m components, or its sums over some of them; matrices row by row.
 
     Attributes
     ----------
     innovation : (m,) array
         The innovation v.
-    square, residual : (m, m) array
+    square, residual : (m m,) array
         v v', and e e' of the residual e.
-    predicted : (m, m) array
+    predicted : (m m,) array
         H P H', or minus H P+ H'.
     """
 
     innovation: Vector
-    square: Matrix
-    residual: Matrix
-    predicted: Matrix
+    square: Vector
+    residual: Vector
+    predicted: Vector
 
 
 @helper
@@ -72,9 +72,7 @@ def _width(m: int) -> int:
 def _epoch(row: Vector, m: int) -> _Epoch:
     """The parts of a row of a window, or of the sums over its rows; views."""
     first, second, third = m, m + m * m, m + 2 * m * m
-    return _Epoch(
-        row[:first], row[first:second].reshape((m, m)), row[second:third].reshape((m, m)), row[third:].reshape((m, m))
-    )
+    return _Epoch(row[:first], row[first:second], row[second:third], row[third:])
 
 
 @helper
@@ -85,9 +83,9 @@ def _push(rows: Matrix, count: int, innovation: Vector, residual: Vector, sign: 
     for i in range(m):
         epoch.innovation[i] = innovation[i]
         for j in range(m):
-            epoch.square[i, j] = innovation[i] * innovation[j]
-            epoch.residual[i, j] = residual[i] * residual[j]
-            epoch.predicted[i, j] = sign * predicted[i, j]
+            epoch.square[i * m + j] = innovation[i] * innovation[j]
+            epoch.residual[i * m + j] = residual[i] * residual[j]
+            epoch.predicted[i * m + j] = sign * predicted[i, j]
 
 
 @helper
@@ -124,8 +122,9 @@ SETTINGS = structure(
     shortest=int, longest=int, low=float, high=float, forgetting=float, lowest=float, highest=float,
     of_shortest=length(LIMITS), of_middle=length(LIMITS), of_longest=length(LIMITS),
 )  # fmt: skip
-#: Number of rows so far, whether there is an estimate, and its elements. In the memory the rows of `_push` follow.
-MEMORY = structure(count=int, begun=int, estimate=9)
+#: Number of rows so far, whether there is an estimate, whether it contradicts the datasheet, and its elements. In the
+#: memory the rows of `_push` follow.
+MEMORY = structure(count=int, begun=int, contradicts=int, estimate=9)
 _HEAD = length(MEMORY)
 
 
@@ -145,16 +144,16 @@ class _Window(NamedTuple):
         Length of the window.
     rows : int
         Number of rows in it; less than the length until it is full.
-    squares : (m, m) array
-        Sum of v v', or of e e'.
-    prior : (m, m) array
+    squares : (m m,) array
+        Sum of v v', or of e e', row by row.
+    prior : (m m,) array
         Sum of the H P H' that is subtracted, or of minus H P+ H'.
     """
 
     length: int
     rows: int
-    squares: Matrix
-    prior: Matrix
+    squares: Vector
+    prior: Vector
 
 
 @kernel
@@ -171,7 +170,7 @@ def _window(settings: Vector, memory: Vector, prediction: Prediction) -> _Window
         variance, trace = 0.0, 0.0
         for i in range(m):
             mean = total.innovation[i] / n
-            variance += total.square[i, i] / n - mean * mean
+            variance += total.square[i * (m + 1)] / n - mean * mean
             trace += nominal[i, i] + predicted[i, i]
         length = adaptive_window(variance, trace, own.low, own.high, shortest, longest)
     if n != min(length, count):
@@ -198,7 +197,7 @@ def _estimate(settings: Vector, memory: Vector, prediction: Prediction, window: 
     Returns
     -------
     float
-        Length of the window; its negative if the nominal noise is contradicted.
+        Length of the window.
     """
     nominal = prediction.nominal
     own, kept, m, n = settings.view(SETTINGS)[0], memory[:_HEAD].view(MEMORY)[0], nominal.shape[0], window.length
@@ -208,15 +207,18 @@ def _estimate(settings: Vector, memory: Vector, prediction: Prediction, window: 
     estimate = kept.estimate[: m * m].reshape((m, m))
     for i in range(m):
         for j in range(m):
-            mean = (window.squares[i, j] - window.prior[i, j] + (n - window.rows) * nominal[i, j]) / n
+            at = i * m + j
+            mean = (window.squares[at] - window.prior[at] + (n - window.rows) * nominal[i, j]) / n
             estimate[i, j] += forgetting * (mean - estimate[i, j])
     limits = own.of_shortest if n == own.shortest else own.of_longest if n == own.longest else own.of_middle
-    allowed = limits[:].view(LIMITS)[0]
+    allowed, kept.contradicts = limits[:].view(LIMITS)[0], 0
     for i in range(m):
         if not allowed.lower <= 1.0 + (estimate[i, i] - nominal[i, i]) / variance[i] <= allowed.upper:
-            bound(estimate, nominal, own.lowest, own.highest, prediction.noise)
-            return -float(n)
-    copied(nominal, prediction.noise)
+            kept.contradicts = 1
+    if kept.contradicts:
+        bound(estimate, nominal, own.lowest, own.highest, prediction.noise)
+    else:
+        copied(nominal, prediction.noise)
     return float(n)
 
 
@@ -266,9 +268,10 @@ def from_innovations_as_printed(
     """Estimate the noise from innovations, all with the newest H P H'; the result is that of `_estimate`."""
     _add_innovation(settings, memory, prediction)
     window = _window(settings, memory, prediction)
-    for i in range(prediction.innovation.size):
-        for j in range(prediction.innovation.size):
-            window.prior[i, j] = window.rows * prediction.predicted[i, j]
+    m = prediction.innovation.size
+    for i in range(m):
+        for j in range(m):
+            window.prior[i * m + j] = window.rows * prediction.predicted[i, j]
     return _estimate(settings, memory, prediction, window, _of_innovations(prediction))
 
 
@@ -394,16 +397,12 @@ class InnovationBased(EstimatedNoise):
         found = self.ask(_from_earlier_residuals if residuals else self.rule, innovation, noise)
         self.report_number(name, found)
         settings, memory = self.memory_of(name)
-        if found < 0.0:
-            elements = memory[:_HEAD].view(MEMORY)[0].estimate[: nominal.size]
-            noise = self.bounded(elements.reshape(nominal.shape), nominal)
+        kept = memory[:_HEAD].view(MEMORY)[0]
+        if kept.contradicts:
+            noise = self.bounded(kept.estimate[: nominal.size].reshape(nominal.shape), nominal)
         if residuals:
             _add_residual(settings, memory, as_prediction(innovation, noise))
         return noise
-
-    def said(self, numbers: Array) -> Array:
-        """The length of the window; the number has a sign."""
-        return np.floor(np.abs(numbers))
 
 
 class FixedWindow(InnovationBased):

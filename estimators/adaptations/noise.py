@@ -67,7 +67,7 @@ class NoiseAdaptation(Adaptation):
     def reset(self, instruments: Instruments) -> None:
         """Begin a run."""
         self.prediction = PredictionTest(instruments, self.together)
-        self.report = NoiseReport(instruments, list(instruments), self.reported, self.said)
+        self.report = NoiseReport(instruments, list(instruments), self.reported)
         self.instruments, self.index = instruments, {name: i for i, name in enumerate(instruments)}
         self.longer = {name: max(sheet.rate, 1.0) for name, sheet in instruments.items()}
         self.rule_settings = np.array([self.settings_of(longer) for longer in self.longer.values()], dtype=np.float64)
@@ -154,10 +154,6 @@ class NoiseAdaptation(Adaptation):
     def choose(self, innovation: Innovation) -> Array | None:
         """The (m, m) noise to use, or None to reject the measurement; for an adaptation without a rule."""
         raise NotImplementedError(f"{type(self).__name__} has neither a rule nor a method choose")
-
-    def said(self, numbers: Array) -> Array:
-        """The numbers that a rule returns, as they are reported."""
-        return numbers
 
     def report_number(self, name: str, number: float) -> None:
         """Report a number of an instrument. It stays until the next one."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -28,8 +28,6 @@ class NoiseReport:
         Those of which is reported.
     number : str
         What the further number is reported as, once it is not 0; empty if it is not.
-    said : callable, optional
-        The numbers as they are reported.
     with_zero : bool
         Whether a number of 0 is reported, too.
 
@@ -48,10 +46,9 @@ class NoiseReport:
         instruments: Instruments,
         names: Sequence[str],
         number: str = "",
-        said: Callable[[Array], Array] | None = None,
         with_zero: bool = False,
     ):
-        self.values, self._said, self.with_zero = np.full((len(instruments), length(CHOSEN)), np.nan), said, with_zero
+        self.values, self.with_zero = np.full((len(instruments), length(CHOSEN)), np.nan), with_zero
         self.sigmas: list[tuple[str, int, int]] = []
         self.numbers: list[tuple[str, int]] = []
         rows = self.rows
@@ -80,8 +77,10 @@ class NoiseReport:
         sigma = rows["sigma"].tolist()
         found: dict[str, float | Array] = {label: sigma[row][a] for label, row, a in self.sigmas}
         if self.numbers:
-            numbers = self.said(rows["number"]).tolist()
-            found |= {label: numbers[row] for label, row in self.numbers if numbers[row] == numbers[row]}
+            numbers = rows["number"].tolist()
+            for label, row in self.numbers:
+                if numbers[row] == numbers[row]:
+                    found[label] = numbers[row]
         return found
 
     def table(self, values: Array) -> dict[str, Array]:
@@ -91,9 +90,5 @@ class NoiseReport:
         for label, row in self.numbers:
             numbers = rows["number"][:, row]
             if numbers[-1] == numbers[-1]:
-                found[label] = self.said(numbers)
+                found[label] = numbers
         return found
-
-    def said(self, numbers: Array) -> Array:
-        """Numbers as they are reported."""
-        return numbers if self._said is None else self._said(numbers)

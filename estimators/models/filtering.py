@@ -285,8 +285,9 @@ class ReadingsOfSteps:
 
     def fill(self, measurements: Sequence[Measurement]) -> Readings:
         """The measurements as arrays; those of the call before are overwritten."""
-        into = self.room(len(measurements))
+        into, known = self.room(len(measurements)), self._row
+        instrument, components, time, value = into.instrument, into.components, into.time, into.value
         for k, m in enumerate(measurements):
-            (into.instrument[k], into.components[k]), into.time[k] = self._row[m.instrument], m.time
-            into.value[k, : len(m.value)] = m.value
+            (instrument[k], components[k]), time[k] = known[m.instrument], m.time
+            value[k, : len(m.value)] = m.value
         return into

@@ -306,8 +306,9 @@ class KalmanEstimator(Solver):
         else:
             filter_step.function(self._filter.in_python, readings, samples, count, until)
         self._note(readings, count)
-        if readings.rejected[:count].any():
-            flagged += [(m.instrument, m.time) for m, bad in zip(measurements, readings.rejected.tolist()) if bad]
+        rejected = readings.rejected[:count].tolist()
+        if True in rejected:
+            flagged += [(m.instrument, m.time) for m, bad in zip(measurements, rejected) if bad]
 
     def propagate(self, dynamics: Dynamics, samples: Samples, until: float) -> None:
         """Advance the state and its covariance to a time, and record the motion for a smoother."""
