@@ -236,8 +236,8 @@ class Row(Estimator):
         super().__init_subclass__()
         if not pieces:
             return
-        given = {name: p if isinstance(p, Piece) else Piece(p) for name, p in pieces.items()}
-        cls.recipe = {**cls.recipe, **given}
+        wrapped = {name: p if isinstance(p, Piece) else Piece(p) for name, p in pieces.items()}
+        cls.recipe = {**cls.recipe, **wrapped}
         solver = cls.recipe["solver"]
         taken: tuple[str, ...] = getattr(solver.make, "pieces", ())
         for name in cls.recipe:
@@ -253,7 +253,7 @@ class Row(Estimator):
                 setattr(cls, flag, getattr(solver.make, flag, False))
         if "real_time_as" not in vars(cls):  # a smoother alone changes nothing in real time
             parent = cls.__mro__[1]
-            only = set(given) == {"smoother"} and "smoother" not in getattr(parent, "recipe", {})
+            only = set(wrapped) == {"smoother"} and "smoother" not in getattr(parent, "recipe", {})
             cls.real_time_as = getattr(parent, "name", "") if only else ""
         _equip(cls)
 
@@ -399,19 +399,19 @@ def _equip(cls: type[Row]) -> None:
 
     def __init__(self: Row, **values: Any) -> None:  # noqa: N807 (it becomes the class's)
         values = under_present_names(former_names(type(self)), values, type(self).__name__)
-        given: dict[str, dict[str, Any]] = {keyword: {} for keyword in recipe}
+        settings: dict[str, dict[str, Any]] = {keyword: {} for keyword in recipe}
         for name, value in values.items():
             if name not in place:
                 raise TypeError(f"{cls.__name__} has no parameter {name!r}; it has {', '.join(place) or 'none'}")
             keyword, each = place[name]
-            given[keyword][each] = value
-        parts = {name: p.build(given[name]) for name, p in recipe.items() if name != "solver"}
+            settings[keyword][each] = value
+        parts = {name: p.build(settings[name]) for name, p in recipe.items() if name != "solver"}
         for name, part in parts.items():
             if part is not None and not isinstance(recipe[name].make, type):  # a function has made it
                 _require_fit(type(self), name, type(part))
         for name in lacking:
             raise TypeError(f"{cls.__name__} names no {name}, and {recipe['solver'].label} needs one")
-        self.solver = recipe["solver"].build(given["solver"], **parts)
+        self.solver = recipe["solver"].build(settings["solver"], **parts)
         if isinstance(self.solver, Solver):
             self.solver.row = type(self).name
 

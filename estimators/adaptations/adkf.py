@@ -67,7 +67,7 @@ SETTINGS = structure(c0=float, c1=float, two=float, smallest=float)
 @helper
 def _whitened(prediction: Prediction) -> float:
     """The residual statistic ``sqrt(v' S^-1 v / m)``; -1 if S is singular."""
-    innovation, _, predicted, nominal, _ = prediction
+    innovation, predicted, nominal = prediction.innovation, prediction.predicted, prediction.nominal
     nis = normalised_square(innovation, predicted, nominal)
     return -1.0 if nis < 0.0 else sqrt(nis / innovation.size)
 
@@ -75,7 +75,7 @@ def _whitened(prediction: Prediction) -> float:
 @helper
 def _printed(prediction: Prediction) -> float:
     """The residual statistic as printed, eq. 31: v'v / sqrt(tr S)."""
-    innovation, _, predicted, nominal, _ = prediction
+    innovation, predicted, nominal = prediction.innovation, prediction.predicted, prediction.nominal
     square, trace = 0.0, 0.0
     for i in range(innovation.size):
         square += innovation[i] * innovation[i]

@@ -27,7 +27,9 @@ SETTINGS = structure(bandwidth=float, smallest=float, iterations=int)
 def _iterate(settings: Vector, prediction: Prediction, residual: Vector) -> float:
     """The fixed-point iteration of `MaximumCorrentropy` from a residual, which is overwritten; the smallest weight."""
     own = settings.view(SETTINGS)[0]
-    innovation, _, predicted, nominal, noise = prediction
+    innovation, predicted, nominal, noise = (
+        prediction.innovation, prediction.predicted, prediction.nominal, prediction.noise,
+    )  # fmt: skip
     bandwidth, smallest, m = own.bandwidth, own.smallest, innovation.size
     weights, after = np.zeros(m), np.empty((m, m))
     least = 1.0
@@ -52,7 +54,7 @@ def from_update(
     settings: Vector, memory: Vector, common: Vector, readings: Readings, k: int, prediction: Prediction
 ) -> float:
     """Divide R by the weights, from the residual after the plain update; the smallest weight of a component."""
-    innovation, _, predicted, nominal, _ = prediction
+    innovation, predicted, nominal = prediction.innovation, prediction.predicted, prediction.nominal
     residual, after = innovation.copy(), np.empty((innovation.size, innovation.size))
     posterior(innovation, predicted, nominal, residual, after)
     return _iterate(settings, prediction, residual)

@@ -234,7 +234,7 @@ def _add_innovation(settings: Vector, memory: Vector, prediction: Prediction) ->
 @kernel
 def _add_residual(settings: Vector, memory: Vector, prediction: Prediction) -> None:
     """Put the residual after an update with the noise of a prediction into the window."""
-    innovation, _, predicted, _, noise = prediction
+    innovation, predicted, noise = prediction.innovation, prediction.predicted, prediction.noise
     m, kept = innovation.size, memory[:_HEAD].view(MEMORY)[0]
     residual, after = np.empty(m), np.empty((m, m))
     posterior(innovation, predicted, noise, residual, after)

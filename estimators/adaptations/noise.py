@@ -50,7 +50,7 @@ class NoiseAdaptation(Adaptation):
     #: is none.
     rule: Callable[..., float] | None = None
     #: Whether a method of the class chooses in place of the rule of its base.
-    in_its_own_way: ClassVar[bool] = False
+    chooses_by_method: ClassVar[bool] = False
     #: What the number that the rule returns is reported as.
     reported: ClassVar[str] = ""
     #: Whether the rule estimates the noise, so that the last one stands while a prediction is poor.
@@ -60,7 +60,7 @@ class NoiseAdaptation(Adaptation):
         super().__init_subclass__()
         own = vars(cls)
         if own.keys() & {"rule", "adapt", "choose"}:
-            cls.in_its_own_way = "rule" not in own
+            cls.chooses_by_method = "rule" not in own
         if isinstance(rule := own.get("rule"), FunctionType):
             cls.rule = staticmethod(rule)  # a plain function would be a method of the instance
 
@@ -81,7 +81,7 @@ class NoiseAdaptation(Adaptation):
     @property
     def ruled(self) -> bool:
         """Whether a rule does all that `choose` does, with the parameters of this adaptation."""
-        return self.rule is not None and not self.in_its_own_way
+        return self.rule is not None and not self.chooses_by_method
 
     def settings_of(self, longer: float) -> Array:
         """What the rule needs to know of an instrument with so many measurements in a second, at least 1."""
@@ -119,7 +119,9 @@ class NoiseAdaptation(Adaptation):
 
     def adapt(self, innovation: Innovation) -> Array | None:
         """Choose the noise of one measurement (`choose_noise`). An instrument without noise is not adapted."""
-        m, residual, predicted, nominal, covariance, _ = innovation
+        m, residual, predicted, nominal, covariance = (
+            innovation.measurement, innovation.residual, innovation.predicted, innovation.noise, innovation.covariance,
+        )  # fmt: skip
         if self._choice is None:
             self._choice = self.choice(list(self.index), 0 if covariance is None else len(covariance))
         reading, row = self._reading, self.index[m.instrument]

@@ -67,7 +67,9 @@ def huber_noise(
 ) -> float:
     """Divide the nominal noise by Huber's weights; the least."""
     own = settings.view(HUBER)[0]
-    innovation, _, predicted, nominal, noise = prediction
+    innovation, predicted, nominal, noise = (
+        prediction.innovation, prediction.predicted, prediction.nominal, prediction.noise,
+    )  # fmt: skip
     u0, u1, u2 = standardised(innovation, predicted, nominal)
     return _weigh(huber(u0, own.k), huber(u1, own.k), huber(u2, own.k), own.smallest, nominal, noise)
 
@@ -78,7 +80,9 @@ def igg3_noise(
 ) -> float:
     """Divide the nominal noise by IGG-III weights; the least."""
     own = settings.view(IGG3)[0]
-    innovation, _, predicted, nominal, noise = prediction
+    innovation, predicted, nominal, noise = (
+        prediction.innovation, prediction.predicted, prediction.nominal, prediction.noise,
+    )  # fmt: skip
     u0, u1, u2 = standardised(innovation, predicted, nominal)
     k0, k1, two = own.k0, own.k1, own.two
     return _weigh(

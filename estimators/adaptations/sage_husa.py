@@ -28,7 +28,9 @@ def sage_husa_noise(
     settings: Vector, memory: Vector, common: Vector, readings: Readings, k: int, prediction: Prediction
 ) -> float:
     """Update the estimate by the recursion of `SageHusa`, and write it into ``noise`` within its bounds; 0."""
-    innovation, _, predicted, nominal, noise = prediction
+    innovation, predicted, nominal, noise = (
+        prediction.innovation, prediction.predicted, prediction.nominal, prediction.noise,
+    )  # fmt: skip
     own, kept = settings.view(SETTINGS)[0], memory.view(MEMORY)[0]
     m = innovation.size
     estimate = kept.estimate[: m * m].reshape((m, m))

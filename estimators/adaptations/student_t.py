@@ -88,7 +88,9 @@ def student_t_noise(
 ) -> float:
     """Divide the nominal noise by `student_weight`, which is returned."""
     own = settings.view(SETTINGS)[0]
-    innovation, _, predicted, nominal, noise = prediction
+    innovation, predicted, nominal, noise = (
+        prediction.innovation, prediction.predicted, prediction.nominal, prediction.noise,
+    )  # fmt: skip
     weight = student_weight(innovation, predicted, nominal, own.dof, own.iterations)
     for i in range(innovation.size):
         for j in range(innovation.size):

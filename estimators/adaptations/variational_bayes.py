@@ -77,7 +77,9 @@ def variational_bayes_noise(
     settings: Vector, memory: Vector, common: Vector, readings: Readings, k: int, prediction: Prediction
 ) -> float:
     """Make one step of `VariationalBayes`, and write the noise of its last iteration into ``noise``; 0."""
-    innovation, _, predicted, nominal, noise = prediction
+    innovation, predicted, nominal, noise = (
+        prediction.innovation, prediction.predicted, prediction.nominal, prediction.noise,
+    )  # fmt: skip
     own, kept = settings.view(SETTINGS)[0], memory.view(MEMORY)[0]
     kept.gamma_shape = own.forgetting * kept.gamma_shape + 0.5
     scales = kept.scales[: innovation.size]

@@ -7,7 +7,7 @@ not see that eight elements lie side by side.
 
 from __future__ import annotations
 
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,12 +19,26 @@ __all__ = [
     "Places", "add_eight", "add_product", "eight_of", "eight_sums", "list_elements", "padded", "sparse_product",
 ]  # fmt: skip
 
-Eight: TypeAlias = tuple[float, float, float, float, float, float, float, float]
 #: An unsigned index or number of elements, and many.
 Place: TypeAlias = int | np.uint64
 Places: TypeAlias = NDArray[np.uint64]
 _0, _1, _2, _3, _4, _5, _6, _7, _8 = (np.uint64(i) for i in range(9))
-NOTHING = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+
+
+class Eight(NamedTuple):
+    """Eight numbers in one vector register."""
+
+    s0: float
+    s1: float
+    s2: float
+    s3: float
+    s4: float
+    s5: float
+    s6: float
+    s7: float
+
+
+NOTHING = Eight(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 @helper
@@ -58,7 +72,7 @@ def eight_sums(value: Array, column: Places, i: Place, count: Place, M: Array, j
         Dense matrix.
     j : int
         First of eight columns of M.
-    s : tuple of float
+    s : Eight
         What the sums begin with.
     """
     s0, s1, s2, s3, s4, s5, s6, s7 = s
@@ -72,20 +86,20 @@ def eight_sums(value: Array, column: Places, i: Place, count: Place, M: Array, j
         s5 += x * M[k, j + _5]
         s6 += x * M[k, j + _6]
         s7 += x * M[k, j + _7]
-    return s0, s1, s2, s3, s4, s5, s6, s7
+    return Eight(s0, s1, s2, s3, s4, s5, s6, s7)
 
 
 @helper
 def eight_of(row: Array, j: Place) -> Eight:
     """Eight elements of a row, from j on."""
-    return row[j], row[j + _1], row[j + _2], row[j + _3], row[j + _4], row[j + _5], row[j + _6], row[j + _7]
+    return Eight(row[j], row[j + _1], row[j + _2], row[j + _3], row[j + _4], row[j + _5], row[j + _6], row[j + _7])
 
 
 @helper
 def put_eight(row: Array, j: Place, s: Eight) -> None:
     """Overwrite eight elements of a row, from j on."""
-    row[j], row[j + _1], row[j + _2], row[j + _3] = s[0], s[1], s[2], s[3]
-    row[j + _4], row[j + _5], row[j + _6], row[j + _7] = s[4], s[5], s[6], s[7]
+    row[j], row[j + _1], row[j + _2], row[j + _3] = s.s0, s.s1, s.s2, s.s3
+    row[j + _4], row[j + _5], row[j + _6], row[j + _7] = s.s4, s.s5, s.s6, s.s7
 
 
 @helper
@@ -94,7 +108,7 @@ def add_eight(row: Array, j: Place, s: Eight) -> None:
     t = eight_of(row, j)
     put_eight(
         row, j,
-        (t[0] + s[0], t[1] + s[1], t[2] + s[2], t[3] + s[3], t[4] + s[4], t[5] + s[5], t[6] + s[6], t[7] + s[7]),
+        Eight(t.s0 + s.s0, t.s1 + s.s1, t.s2 + s.s2, t.s3 + s.s3, t.s4 + s.s4, t.s5 + s.s5, t.s6 + s.s6, t.s7 + s.s7),
     )  # fmt: skip
 
 
@@ -120,7 +134,7 @@ def _eight_columns(M: Array, x: Array, j: Place, total: Array) -> Eight:
         s5 += M[k, j + _5] * a
         s6 += M[k, j + _6] * a
         s7 += M[k, j + _7] * a
-    return s0, s1, s2, s3, s4, s5, s6, s7
+    return Eight(s0, s1, s2, s3, s4, s5, s6, s7)
 
 
 @helper

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import gymnasium
 import numpy as np
@@ -24,9 +24,28 @@ from .environment import run_seed
 from .features import Numbers
 from .filters import checked_actions
 
-__all__ = ["VoyagesVectorEnv"]
+__all__ = ["Decided", "VoyagesVectorEnv"]
 
 Flags = NDArray[np.bool_]
+
+
+class Decided(NamedTuple):
+    """What a decision on n voyages has led to; the order is that of Gymnasium.
+
+    Attributes
+    ----------
+    rewards : (n,) array
+        Rewards.
+    terminated, truncated : (n,) array of bool
+        Whether the task has ended a voyage; whether its recording has ended.
+    infos : dict
+        Further values, as Gymnasium's vector environments return them.
+    """
+
+    rewards: NDArray[Any]
+    terminated: Flags
+    truncated: Flags
+    infos: dict[str, Any]
 
 
 class VoyagesVectorEnv(VectorEnv[Numbers, Numbers, NDArray[Any]]):
@@ -98,8 +117,8 @@ class VoyagesVectorEnv(VectorEnv[Numbers, Numbers, NDArray[Any]]):
         """(n, o) float32 array: what was observed last; it may be written to."""
 
     @abstractmethod
-    def _decide(self, actions: Numbers, active: Flags) -> tuple[NDArray[Any], Flags, Flags, dict[str, Any]]:
-        """Step some voyages and observe them; rewards, terminated, truncated, infos."""
+    def _decide(self, actions: Numbers, active: Flags) -> Decided:
+        """Step some voyages and observe them."""
 
     def reset(
         self,
@@ -156,7 +175,7 @@ class VoyagesVectorEnv(VectorEnv[Numbers, Numbers, NDArray[Any]]):
             array = np.where(over.reshape(-1, *[1] * (array.ndim - 1)), 0, array)  # not read
         what = f"the actions of {self.num_envs} agents in {self.task_name} are"
         array = checked_actions(array, (self.num_envs, *self._action_shape), what)
-        rewards, terminated, truncated, infos = self._decide(array, active)
+        rewards, terminated, truncated, infos = self._decide(array, active)  # as Gymnasium orders them
         infos = _of(infos, active)
         ended = active & (terminated | truncated)
         self._over |= ended

@@ -11,12 +11,11 @@ from typing import Any
 
 import numpy as np
 from gymnasium.vector import AutoresetMode
-from numpy.typing import NDArray
 
 from simnav.estimator import Estimator
 from simnav.scenario import Scenario
 
-from .batch import Flags, VoyagesVectorEnv
+from .batch import Decided, Flags, VoyagesVectorEnv
 from .features import Numbers
 from .guidance import GuidanceOptions, GuidedVoyages
 
@@ -70,7 +69,7 @@ class GuidanceVectorEnv(VoyagesVectorEnv):
     def _observations(self) -> Numbers:
         return self._guided.observation
 
-    def _decide(self, actions: Numbers, active: Flags) -> tuple[NDArray[Any], Flags, Flags, dict[str, Any]]:
+    def _decide(self, actions: Numbers, active: Flags) -> Decided:
         guided = self._guided
         rewards, aground, last = guided.step(active, actions)
         infos: dict[str, Any] = {}
@@ -79,4 +78,4 @@ class GuidanceVectorEnv(VoyagesVectorEnv):
             infos = {"truth": truth, "_truth": active.copy(), "aside": guided.aside.copy(), "_aside": active.copy()}
         for i in np.flatnonzero(active & (aground | last)).tolist():
             infos = self._add_info(infos, {"scores": guided.scores(i)}, i)
-        return rewards, aground, last, infos
+        return Decided(rewards, aground, last, infos)

@@ -13,11 +13,10 @@ from typing import Any
 
 import numpy as np
 from gymnasium.vector import AutoresetMode
-from numpy.typing import NDArray
 
 from simnav.scenario import Scenario
 
-from .batch import Flags, VoyagesVectorEnv
+from .batch import Decided, Flags, VoyagesVectorEnv
 from .environment import TaskOptions, check_counts
 from .features import Numbers
 from .filters import Filters
@@ -104,7 +103,7 @@ class FilterTaskVectorEnv(VoyagesVectorEnv):
         assert self._filters is not None
         return self._filters.observation
 
-    def _decide(self, actions: Numbers, active: Flags) -> tuple[NDArray[Any], Flags, Flags, dict[str, Any]]:
+    def _decide(self, actions: Numbers, active: Flags) -> Decided:
         filters, pool, slots, k = self._filters, self._pool, self._slots, self._k
         assert filters is not None
         linear = pool.linear
@@ -125,4 +124,4 @@ class FilterTaskVectorEnv(VoyagesVectorEnv):
         k[ended] -= 1  # a voyage that is over has no next step to look at
         self._look(active & ~ended)
         filters.observation[ended] = 0.0
-        return rewards, np.zeros(self.num_envs, np.bool_), ended, infos
+        return Decided(rewards, np.zeros(self.num_envs, np.bool_), ended, infos)

@@ -182,7 +182,7 @@ def _error(estimate: Estimate, truth: Array) -> Array:
     """Estimate minus truth, in plain floats: once a step."""
     error = np.zeros(9)
     (latitude, longitude, height), velocity, attitude = truth.tolist()
-    given = estimate.mask()
+    estimated = estimate.mask()
     if estimate.position is None:
         error[:3] = np.nan
     else:
@@ -194,6 +194,6 @@ def _error(estimate: Estimate, truth: Array) -> Array:
         error[2] = height - position[2]
     error[3:6] = np.nan if estimate.velocity is None else estimate.velocity - velocity
     error[8] = np.nan if estimate.attitude is None else math.remainder(estimate.attitude[2] - attitude[2], math.tau)
-    error[:6] = np.where(given[:6], error[:6], np.nan)
-    error[8] = error[8] if given[8] else np.nan
+    error[:6] = np.where(estimated[:6], error[:6], np.nan)
+    error[8] = error[8] if estimated[8] else np.nan
     return error

@@ -82,9 +82,15 @@ def append_aid(
 
 @kernel
 def append_aids(
-    aids: AidingFactors, row: int, node: int, between: int, instrument: IntegerVector, time: Vector, noise: Stack,
+    aids: AidingFactors,
+    row: int,
+    node: int,
+    between: int,
+    instrument: IntegerVector,
+    time: Vector,
+    noise: Stack,
     value: Matrix,
-) -> None:  # fmt: skip
+) -> None:
     """Do `append_aid` for k measurements, from a row on."""
     for k in range(time.size):
         append_aid(aids, row + k, node, between, instrument[k], time[k], noise[k], value[k])

@@ -138,12 +138,12 @@ class ChannelReadings:
             blocks[name] = own[:, at]
         motion = self._navigation(states, row, own)
         points = NavigationPoints(time=time, **motion._asdict(), blocks=blocks, channel=channel, side=side)
-        reading, given = self._observations(points, self._sheet)
+        reading, by_block = self._observations(points, self._sheet)
         jacobian = np.empty((len(time), value.shape[1], offset + own.shape[1])) if out is None else out
         jacobian[...] = 0.0
-        self._by_navigation(given[NAVIGATION], own, jacobian)
+        self._by_navigation(by_block[NAVIGATION], own, jacobian)
         for name, at in self._at:
-            jacobian[:, :, at.start + offset : at.stop + offset] = given[name]
+            jacobian[:, :, at.start + offset : at.stop + offset] = by_block[name]
         if self.biased and len(biased := np.flatnonzero(self._bias_at[channel] >= 0)):
             component = np.arange(value.shape[1])
             columns = self._bias_at[channel[biased], None] + component

@@ -55,10 +55,10 @@ def by_channel(instruments: Instruments) -> Instruments:
 def _apart(sheet: Datasheet) -> list[Datasheet]:
     if not sheet.channels:
         return [sheet]
-    given = {name: getattr(sheet, name) for name in _FIELDS if name not in ("name", "channels")}
+    fields = {name: getattr(sheet, name) for name in _FIELDS if name not in ("name", "channels")}
     return [
         ChannelDatasheet(
-            f"{sheet.name}:{channel}", instrument=sheet.name, channel=channel, siblings=sheet.channels, **given
+            f"{sheet.name}:{channel}", instrument=sheet.name, channel=channel, siblings=sheet.channels, **fields
         )
         for channel in sheet.channels
     ]
@@ -66,8 +66,8 @@ def _apart(sheet: Datasheet) -> list[Datasheet]:
 
 def reading_of(measurement: Measurement) -> Measurement:
     """The measurement of a channel as one of an instrument of its own; its side information stays with it."""
-    time, instrument, kind, value, channel, side = measurement
-    return Measurement(time, f"{instrument}:{channel}" if channel else instrument, kind, value, "", side)
+    m = measurement
+    return Measurement(m.time, m.source, m.kind, m.value, "", m.side)
 
 
 def of_channels(stream: AidStream) -> list[AidStream]:
@@ -94,8 +94,8 @@ def whole(sheet: Datasheet) -> Datasheet:
     """The datasheet of the instrument that a channel belongs to, as the kind's functions receive it."""
     if not isinstance(sheet, ChannelDatasheet):
         return sheet
-    given = {name: getattr(sheet, name) for name in _FIELDS if name not in ("name", "channels")}
-    return Datasheet(sheet.instrument, channels=sheet.siblings, **given)
+    fields = {name: getattr(sheet, name) for name in _FIELDS if name not in ("name", "channels")}
+    return Datasheet(sheet.instrument, channels=sheet.siblings, **fields)
 
 
 def owners(instruments: Instruments) -> dict[str, str]:

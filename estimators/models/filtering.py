@@ -95,7 +95,8 @@ def aid_table(aids: Sequence[Aid | None], components: Sequence[int], noise: Sequ
     )  # fmt: skip
     for row, (aid, figures) in enumerate(zip(aids, noise, strict=True)):
         if aid is not None:
-            table.code[row], table.lever_arm[row], table.bias_at[row], table.scale_at[row] = aid
+            table.code[row], table.lever_arm[row] = aid.code, aid.lever_arm
+            table.bias_at[row], table.scale_at[row] = aid.bias_at, aid.scale_at
             table.noise[row, : len(figures)] = figures
     return table
 

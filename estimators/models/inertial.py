@@ -416,7 +416,7 @@ class InertialModel(FlatStateModel):
         """The noise of the datasheet; None if the noise depends on the state."""
         name = measurement.instrument
         if name in self._fused:
-            return None if self.aid_parameters[name][0] == HEADING and not has_heading(self.dcm) else self.noise[name]
+            return None if self.aid_parameters[name].code == HEADING and not has_heading(self.dcm) else self.noise[name]
         if name in self.own and (more := self.own[name].noise_without_state(measurement.side)) is not None:
             return self.noise[name] + more
         return super().nominal_noise(measurement)

@@ -118,7 +118,7 @@ class MeasurementFunction:
 
     def __init__(self, sheet: Datasheet, places: Mapping[str, int] = MappingProxyType({}), since: float = 0.0):
         assert not sheet.channels, "each channel has an equation of its own, see `by_channel`"
-        self.sheet, self.kind, self._given = sheet, KINDS[sheet.kind], whole(sheet)
+        self.sheet, self.kind, self._of_instrument = sheet, KINDS[sheet.kind], whole(sheet)
         self.channel = sheet.channel if isinstance(sheet, ChannelDatasheet) else ""
         observation = observation_of(sheet)
         assert observation is not None
@@ -219,7 +219,7 @@ class MeasurementFunction:
 
     def _call(self, point: NavigationPoint) -> Any:
         try:
-            return self._observation(point, self._given)
+            return self._observation(point, self._of_instrument)
         except Exception as error:
             raise ValueError(f"{self._label()} raised {type(error).__name__}: {error}") from error
 
@@ -323,7 +323,7 @@ class MeasurementFunction:
         if function is None:
             return None
         try:
-            sigma = np.asarray(function(side, self._given), dtype=np.float64)
+            sigma = np.asarray(function(side, self._of_instrument), dtype=np.float64)
         except Exception as error:
             message = f"reading_sigma of kind {self.sheet.kind!r} raised {type(error).__name__}: {error}"
             raise ValueError(message) from error
@@ -342,7 +342,7 @@ class MeasurementFunction:
         function, d = self.kind.message_noise, len(self.kind.components)
         assert function is not None
         try:
-            noise = np.asarray(function(point, self._given), dtype=np.float64)
+            noise = np.asarray(function(point, self._of_instrument), dtype=np.float64)
         except Exception as error:
             message = f"message_noise of kind {self.sheet.kind!r} raised {type(error).__name__}: {error}"
             raise ValueError(message) from error
@@ -449,12 +449,12 @@ class MeasurementFunction:
         blocks = {name: np.broadcast_to(zero, (k, len(zero))) for name, zero in self._zeros.items()}
         for name, at in self._slices:
             blocks[name] = point.blocks[name] + errors[:, offset + at.start : offset + at.stop]
-        channel = self._given.channels.index(self.channel) if self.channel else 0
+        channel = self._of_instrument.channels.index(self.channel) if self.channel else 0
         side = np.broadcast_to(point.side, (k, *point.side.shape))
         points = NavigationPoints(
             time=np.full(k, point.time), **states._asdict(), blocks=blocks, channel=np.full(k, channel), side=side
         )
-        reading, _ = self.observations(points, self._given)
+        reading, _ = self.observations(points, self._of_instrument)
         return np.asarray(reading)
 
     def by_angular_rate(self, point: NavigationPoint) -> Array:

@@ -76,18 +76,18 @@ def advance(weights: Vector, inputs: Vector, memory: Vector, outputs: Vector) ->
     inner = bias + rows
     inner_bias = inner + rows * m
     output = inner_bias + rows
-    given, kept = np.empty(rows), np.empty(rows)
+    from_inputs, from_memory = np.empty(rows), np.empty(rows)
     for i in range(rows):
         a, b = weights[bias + i], weights[inner_bias + i]
         for j in range(n):
             a += weights[i * n + j] * inputs[j]
         for j in range(m):
             b += weights[inner + i * m + j] * memory[j]
-        given[i], kept[i] = a, b
+        from_inputs[i], from_memory[i] = a, b
     for i in range(m):
-        reset = 1.0 / (1.0 + exp(-given[i] - kept[i]))
-        keep = 1.0 / (1.0 + exp(-given[m + i] - kept[m + i]))
-        new = tanh(given[2 * m + i] + reset * kept[2 * m + i])
+        reset = 1.0 / (1.0 + exp(-from_inputs[i] - from_memory[i]))
+        keep = 1.0 / (1.0 + exp(-from_inputs[m + i] - from_memory[m + i]))
+        new = tanh(from_inputs[2 * m + i] + reset * from_memory[2 * m + i])
         memory[i] = (1.0 - keep) * new + keep * memory[i]
     for j in range(k):
         outputs[j] = weights[output + k * m + j]

@@ -166,18 +166,15 @@ class Admission:
         begin, end, rows, latest = since - LATE, measurements.time + LATE, self._rows, self.record.latest.tolist()
         usable = is_usable.function
         for m in sorted(measurements.aids, key=_time):
-            time, name, _, value, channel, _ = m
-            if channel:
-                m = reading_of(m)
-                name = m.instrument
-            row = rows.get(name)
+            reading = reading_of(m) if m.channel else m
+            row, time = rows.get(reading.instrument), m.time
             if row is None:
                 continue
-            if not usable(time, value.tolist(), latest[row], self._limits[row], begin, end):
+            if not usable(time, m.value.tolist(), latest[row], self._limits[row], begin, end):
                 self.skipped += 1
                 continue
             latest[row] = time
-            admitted.append(m)
+            admitted.append(reading)
         self.record.latest[:] = latest
         return admitted
 

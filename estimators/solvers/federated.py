@@ -235,7 +235,9 @@ class FederatedEstimator(KalmanEstimator):
 
     def correct(self, dynamics: Dynamics, choice: Choice, readings: Readings, k: int, prediction: Prediction) -> float:
         """Correct the covariance of the local filter."""
-        innovation, cross, predicted, _, noise = prediction
+        innovation, cross, predicted, noise = (
+            prediction.innovation, prediction.cross, prediction.predicted, prediction.noise,
+        )  # fmt: skip
         return joseph_update(self._correcting.covariance, cross, predicted + noise, innovation, dynamics.correction)
 
     def retract(self, dynamics: Dynamics) -> None:

@@ -173,7 +173,7 @@ class InertialGraph:
         self.motion = Preintegration(self.model._noise, np.diag(covariance)[9:], frame, start.time)
         self.motion.begin(state, bias)
         self.node, self._rate = 0, np.zeros(3)
-        self._aid = {name: (code, np.array(arm)) for name, (code, arm, _, _) in self.model.aid_parameters.items()}
+        self._aid = {name: (aid.code, np.array(aid.lever_arm)) for name, aid in self.model.aid_parameters.items()}
         inverse = np.linalg.inv(self._error_map(state))
         self.start_covariance = inverse @ covariance @ inverse.T
         return self.prior(0, state, bias, self.start_covariance), self.values(0, state, bias)

@@ -336,7 +336,9 @@ class KalmanEstimator(Solver):
         if own is None:
             prediction.noise[...] = prediction.nominal
             return
-        innovation, cross, predicted, nominal, noise = prediction
+        innovation, cross, predicted, nominal, noise = (
+            prediction.innovation, prediction.cross, prediction.predicted, prediction.nominal, prediction.noise,
+        )  # fmt: skip
         chosen = own.adapt(Innovation(m, innovation, predicted, nominal, covariance, cross))
         if chosen is None:
             readings.rejected[k] = True

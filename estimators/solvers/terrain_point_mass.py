@@ -135,7 +135,9 @@ class TerrainPointMass(KalmanEstimator):
             self._begin_clone()
             return nis
         self._sounded = False
-        residual, cross, predicted, _, noise = prediction
+        residual, cross, predicted, noise = (
+            prediction.innovation, prediction.cross, prediction.predicted, prediction.noise,
+        )  # fmt: skip
         projected, innovation = cross.copy(), predicted + noise
         nis = super().correct(dynamics, choice, readings, k, prediction)
         if nis >= 0.0 and self._density is not None:
@@ -198,11 +200,11 @@ class TerrainPointMass(KalmanEstimator):
         density, P = self._density, self.covariance
         assert density is not None
         regression = np.linalg.solve(P[_AT, _AT], P[_AT]).T  # B
-        given = P - regression @ P[_AT]  # G
-        given[_AT], given[:, _AT] = 0.0, 0.0
+        remaining = P - regression @ P[_AT]  # G
+        remaining[_AT], remaining[:, _AT] = 0.0, 0.0
         other = linearised.jacobian[0].copy()
         other[_AT] = 0.0
-        projected = given @ other
+        projected = remaining @ other
         variance = float(linearised.noise[0, 0] + other @ projected)
         here = self._predictions(m, np.zeros((1, 2)))[0][0] + linearised.innovation[0]
         while True:
@@ -236,7 +238,7 @@ class TerrainPointMass(KalmanEstimator):
             gain, innovation = np.zeros_like(gain), 0.0
         correction = regression @ kept[0] + gain * middle
         cross = np.outer(regression @ mixed, gain)
-        P[:] = given + regression @ kept[1] @ regression.T + cross + cross.T
+        P[:] = remaining + regression @ kept[1] @ regression.T + cross + cross.T
         P += (own - innovation) * np.outer(gain, gain)
         P[:] = 0.5 * (P + P.T)
         self.model.correct(correction)

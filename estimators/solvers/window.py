@@ -41,7 +41,6 @@ oldest state. The newest one is the last block of the elimination.
 
 from __future__ import annotations
 
-import contextlib
 from collections import deque
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -51,10 +50,12 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
+from simnav.compiled import ready
 from simnav.estimators.adaptations.base import Adaptation, Innovation
 from simnav.estimators.adaptations.choice import no_choice
 from simnav.estimators.adaptations.noise import NoiseAdaptation
 from simnav.estimators.algebra.block_tridiagonal import half_squares, keep_weights, solve_chain
+from simnav.estimators.algebra.direct_update import normalised_square
 from simnav.estimators.algebra.factors import NewRows, Rows
 from simnav.estimators.composition import Solver
 from simnav.estimators.models.base import ErrorModel
@@ -214,10 +215,10 @@ class WindowEstimator(LooksBack, Solver):
         """The step of a window where all that it does is compiled; None: it is made by methods."""
         chain, own = self.chain, self.adaptation
         f = chain.functions
-        if f is None or self._owners or self.every_sample:
+        if f is None or self.every_sample:
             return None
         if own is None:
-            return WindowStep(
+            return None if self._owners else WindowStep(
                 dynamics=chain.dynamics, choice=no_choice(), advance=f.advance, predict=f.predict_noise,
                 choose=use_nominal, make_node=f.make_node, attach=f.attach,
             )  # fmt: skip
@@ -302,7 +303,9 @@ class WindowEstimator(LooksBack, Solver):
             if size[k] < 0.0:
                 continue
             name = self.chain.names[row]
-            diagnostics[f"innovation.{name}"], diagnostics[f"nis.{name}"] = size[k], nis[k]
+            diagnostics[f"innovation.{name}"] = size[k]
+            if nis[k] >= 0.0:
+                diagnostics[f"nis.{name}"] = nis[k]
             if rejected[k]:
                 self._admission.skipped -= 1
                 flagged.append((name, float(readings.time[k])))
@@ -351,9 +354,9 @@ class WindowEstimator(LooksBack, Solver):
         predicted = jacobian @ cross
         chosen = self.adaptation.adapt(Innovation(m, residual, predicted, noise, covariance, cross))
         self._diagnostics[f"innovation.{m.instrument}"] = hypot(*residual.tolist())
-        with contextlib.suppress(np.linalg.LinAlgError):
-            white = np.linalg.solve(predicted + (noise if chosen is None else chosen), residual)
-            self._diagnostics[f"nis.{m.instrument}"] = float(residual @ white)
+        nis = normalised_square(residual, ready(predicted), ready(noise if chosen is None else chosen))
+        if nis >= 0.0:
+            self._diagnostics[f"nis.{m.instrument}"] = nis
         if chosen is None:
             readings.rejected[k] = True
             self._flagged.append((m.instrument, m.time))

@@ -33,10 +33,10 @@ class ChannelVote:
 
     def reset(self, instruments: Instruments) -> None:
         """Begin a run."""
-        given = owners(instruments)
-        numbers = {instrument: k for k, instrument in enumerate(dict.fromkeys(given.values()))}
+        owner = owners(instruments)
+        numbers = {instrument: k for k, instrument in enumerate(dict.fromkeys(owner.values()))}
         #: Number of the instrument of each channel.
-        self._number = {channel: numbers[instrument] for channel, instrument in given.items()}
+        self._number = {channel: numbers[instrument] for channel, instrument in owner.items()}
         self.begin()
 
     def begin(self) -> None:

@@ -56,9 +56,14 @@ class _News(NamedTuple):
 
 @kernel
 def _news(
-    time: Vector, tested: float, norm: Vector, components: IntegerVector, limits: Vector, instrument: IntegerVector,
+    time: Vector,
+    tested: float,
+    norm: Vector,
+    components: IntegerVector,
+    limits: Vector,
+    instrument: IntegerVector,
     fixes: FlagVector,
-) -> _News:  # fmt: skip
+) -> _News:
     """Test the measurements after a time; ``fixes`` says which instruments give fixes."""
     first, failing, fixed = time.size, 0, -np.inf
     while first > 0 and time[first - 1] > tested:

@@ -61,28 +61,28 @@ def distance_travelled(recording: Recording, epochs: int | None = None) -> float
 
 
 @register_score("horizontal_rmse", title="Horizontal RMSE", unit="m", better="lower")
-def _horizontal_rmse(given: ScoringInput) -> float:
-    return rms(given.horizontal)
+def _horizontal_rmse(scored: ScoringInput) -> float:
+    return rms(scored.horizontal)
 
 
 @register_score("horizontal_mae", title="Mean horizontal error", unit="m", better="lower")
-def _horizontal_mae(given: ScoringInput) -> float:
-    return _mean_absolute(given.horizontal)
+def _horizontal_mae(scored: ScoringInput) -> float:
+    return _mean_absolute(scored.horizontal)
 
 
 @register_score("horizontal_max", title="Largest horizontal error", unit="m", better="lower")
-def _horizontal_max(given: ScoringInput) -> float:
-    return _largest(given.horizontal)
+def _horizontal_max(scored: ScoringInput) -> float:
+    return _largest(scored.horizontal)
 
 
 @register_score("cep50", title="CEP50: median horizontal error", unit="m", better="lower")
-def _cep50(given: ScoringInput) -> float:
-    return _quantile(given.horizontal, 0.50)
+def _cep50(scored: ScoringInput) -> float:
+    return _quantile(scored.horizontal, 0.50)
 
 
 @register_score("r95", title="R95: 95th percentile of the horizontal error", unit="m", better="lower")
-def _r95(given: ScoringInput) -> float:
-    return _quantile(given.horizontal, 0.95)
+def _r95(scored: ScoringInput) -> float:
+    return _quantile(scored.horizontal, 0.95)
 
 
 # --- component by component ---------------------------------------------------------------------------
@@ -94,8 +94,8 @@ def _register_component(
     """Register a score: a measure of one component of the error, or of the length of two components."""
 
     @register_score(name, title=title, unit=unit, better="lower")
-    def component(given: ScoringInput) -> float:
-        error = given.held_error
+    def component(scored: ScoringInput) -> float:
+        error = scored.held_error
         if len(columns) == 2:
             return measure(np.hypot(error[:, columns[0]], error[:, columns[1]]))
         return measure(error[:, columns[0]])
@@ -121,20 +121,20 @@ _register_component("heading_mae", "Mean heading error", "rad", (8,), _mean_abso
 
 
 @register_score("final_error", title="Horizontal error at the last epoch", unit="m", better="lower")
-def _final_error(given: ScoringInput) -> float:
-    return float(given.horizontal[-1]) if len(given.horizontal) else float("nan")
+def _final_error(scored: ScoringInput) -> float:
+    return float(scored.horizontal[-1]) if len(scored.horizontal) else float("nan")
 
 
 @register_score(
     "drift", title="Horizontal error at the last epoch, of the distance travelled", unit="%", better="lower"
 )
-def _drift(given: ScoringInput) -> float:
-    distance = distance_travelled(given.recording, len(given.error))
-    return 100.0 * _final_error(given) / distance if distance > 0.0 else float("nan")
+def _drift(scored: ScoringInput) -> float:
+    distance = distance_travelled(scored.recording, len(scored.error))
+    return 100.0 * _final_error(scored) / distance if distance > 0.0 else float("nan")
 
 
 @register_score("availability", title="Share of all epochs with a horizontal position", unit="-", better="higher")
-def _availability(given: ScoringInput) -> float:
-    known = np.isfinite(given.recording.data.truth.position[:, :2]).all(axis=1)
-    given_here = np.isfinite(given.error[:, :2]).all(axis=1)
-    return float(given_here.sum() / known.sum()) if known.any() else float("nan")
+def _availability(scored: ScoringInput) -> float:
+    known = np.isfinite(scored.recording.data.truth.position[:, :2]).all(axis=1)
+    estimated = np.isfinite(scored.error[:, :2]).all(axis=1)
+    return float(estimated.sum() / known.sum()) if known.any() else float("nan")

@@ -40,22 +40,22 @@ def rms_beyond(error: Array, sigma: Array) -> float:
     return float(np.sqrt(max(square, 0.0)))
 
 
-def _beyond(given: ScoringInput, columns: tuple[int, ...]) -> float:
-    truth = given.recording.data.truth
+def _beyond(scored: ScoringInput, columns: tuple[int, ...]) -> float:
+    truth = scored.recording.data.truth
     if not isinstance(truth, ReferenceStates):
         return float("nan")
-    return rms_beyond(given.held_error[:, columns], truth.sigma[: len(given.held_error), columns])
+    return rms_beyond(scored.held_error[:, columns], truth.sigma[: len(scored.held_error), columns])
 
 
 @register_score(
     "horizontal_rmse_beyond_reference", title="Horizontal RMSE less that of the reference", unit="m", better="lower"
 )
-def _horizontal(given: ScoringInput) -> float:
-    return _beyond(given, (0, 1))
+def _horizontal(scored: ScoringInput) -> float:
+    return _beyond(scored, (0, 1))
 
 
 @register_score(
     "vertical_rmse_beyond_reference", title="Vertical RMSE less that of the reference", unit="m", better="lower"
 )
-def _vertical(given: ScoringInput) -> float:
-    return _beyond(given, (2,))
+def _vertical(scored: ScoringInput) -> float:
+    return _beyond(scored, (2,))

@@ -151,12 +151,12 @@ def coverage(nees_horizontal: Array, level: float) -> float:
     return float(np.mean(x <= -2.0 * math.log1p(-level))) if len(x) else float("nan")
 
 
-def nees_of_groups(given: ScoringInput) -> dict[str, tuple[Array, NDArray[np.int64]]]:
+def nees_of_groups(scored: ScoringInput) -> dict[str, tuple[Array, NDArray[np.int64]]]:
     """The result of `nees` for each group; empty without a covariance. For `ScoringInput.shared`."""
-    covariance = given.trial.covariance
+    covariance = scored.trial.covariance
     if covariance is None:
         return {}
-    return {group: nees(given.error, covariance, components) for group, components in GROUPS.items()}
+    return {group: nees(scored.error, covariance, components) for group, components in GROUPS.items()}
 
 
 def first_fault(recording: Recording) -> float:
@@ -171,19 +171,19 @@ def first_fault(recording: Recording) -> float:
     return min((float(t[0]) for t in times if len(t)), default=math.inf)
 
 
-def _before_faults(given: ScoringInput) -> NDArray[np.bool_]:
+def _before_faults(scored: ScoringInput) -> NDArray[np.bool_]:
     """A mask of the epochs before the first fault."""
-    return given.trial.time < first_fault(given.recording) - 1e-9
+    return scored.trial.time < first_fault(scored.recording) - 1e-9
 
 
 #: Parts of a run with scores of their own: the whole run, before the first fault, and from then on.
 _PARTS = {"": "", "_clean": ", before the first fault", "_faulty": ", from the first fault on"}
 
 
-def _part(given: ScoringInput, part: str) -> NDArray[np.bool_]:
+def _part(scored: ScoringInput, part: str) -> NDArray[np.bool_]:
     if not part:
-        return np.ones(len(given.trial.time), dtype=bool)
-    before = given.shared(_before_faults)
+        return np.ones(len(scored.trial.time), dtype=bool)
+    before = scored.shared(_before_faults)
     return before if part == "_clean" else ~before
 
 
@@ -194,12 +194,12 @@ def _register_nees(group: str, title: str, part: str = "") -> None:
         f"nees_{group}{part}", title=f"Mean NEES by degree of freedom, {title}{_PARTS[part]}", unit="-", better="one",
         uses_covariance=True,
     )  # fmt: skip
-    def mean(given: ScoringInput) -> float:
-        found = given.shared(nees_of_groups).get(group)
+    def mean(scored: ScoringInput) -> float:
+        found = scored.shared(nees_of_groups).get(group)
         if found is None:
             return float("nan")
         values, degrees = found
-        known = (degrees > 0) & _part(given, part)
+        known = (degrees > 0) & _part(scored, part)
         return min(float(values[known].sum() / degrees[known].sum()), LARGEST) if known.any() else float("nan")
 
 
@@ -211,12 +211,12 @@ def _register_coverage(percent: int, part: str = "") -> None:
         better="nominal",
         uses_covariance=True,
     )
-    def share(given: ScoringInput) -> float:
-        found = given.shared(nees_of_groups).get("horizontal")
+    def share(scored: ScoringInput) -> float:
+        found = scored.shared(nees_of_groups).get("horizontal")
         if found is None:
             return float("nan")
         values, degrees = found
-        return coverage(np.where((degrees == 2) & _part(given, part), values, np.nan), percent / 100.0)
+        return coverage(np.where((degrees == 2) & _part(scored, part), values, np.nan), percent / 100.0)
 
 
 _TITLES = {"horizontal": "horizontal position", "vertical": "height"}

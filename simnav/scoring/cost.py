@@ -13,24 +13,24 @@ from simnav.types import Array
 __all__: list[str] = []
 
 
-def _seconds(given: ScoringInput) -> Array:
-    seconds = given.trial.update_seconds
+def _seconds(scored: ScoringInput) -> Array:
+    seconds = scored.trial.update_seconds
     return seconds[1:] if len(seconds) > 1 else seconds
 
 
 @register_score("update_median", title="Time per epoch, median", unit="s", better="lower")
-def _median(given: ScoringInput) -> float:
-    seconds = _seconds(given)
+def _median(scored: ScoringInput) -> float:
+    seconds = _seconds(scored)
     return float(np.median(seconds)) if len(seconds) else float("nan")
 
 
 @register_score("update_mean", title="Time per epoch, mean", unit="s", better="lower")
-def _mean(given: ScoringInput) -> float:
-    seconds = _seconds(given)
+def _mean(scored: ScoringInput) -> float:
+    seconds = _seconds(scored)
     return float(np.mean(seconds)) if len(seconds) else float("nan")
 
 
 @register_score("update_p95", title="Time per epoch, 95th percentile", unit="s", better="lower")
-def _p95(given: ScoringInput) -> float:
-    seconds = _seconds(given)
+def _p95(scored: ScoringInput) -> float:
+    seconds = _seconds(scored)
     return float(np.quantile(seconds, 0.95)) if len(seconds) else float("nan")

@@ -73,15 +73,15 @@ def detection(trial: Trial, recording: Recording) -> dict[str, float]:
     return scores
 
 
-def _rates(given: ScoringInput) -> dict[str, float]:
-    return detection(given.trial, given.recording)
+def _rates(scored: ScoringInput) -> dict[str, float]:
+    return detection(scored.trial, scored.recording)
 
 
 @register_score("detection_rate", title="Faulty measurements flagged", unit="-", better="higher")
-def _detection_rate(given: ScoringInput) -> float:
-    return given.shared(_rates)["detection_rate"]
+def _detection_rate(scored: ScoringInput) -> float:
+    return scored.shared(_rates)["detection_rate"]
 
 
 @register_score("false_alarm_rate", title="Sound measurements flagged", unit="-", better="lower")
-def _false_alarm_rate(given: ScoringInput) -> float:
-    return given.shared(_rates)["false_alarm_rate"]
+def _false_alarm_rate(scored: ScoringInput) -> float:
+    return scored.shared(_rates)["false_alarm_rate"]

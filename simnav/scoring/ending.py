@@ -29,14 +29,14 @@ SHARE = 0.1
     "beyond_sigma", title=f"Share of the epochs with an error beyond {FAR:g} times its stated sigma", unit="-",
     better="lower", uses_covariance=True,
 )  # fmt: skip
-def _beyond_sigma(given: ScoringInput) -> float:
+def _beyond_sigma(scored: ScoringInput) -> float:
     """Of the epochs with a covariance: horizontal position, height, velocity or heading; NaN without any.
 
     The error of a group of d components, in stated sigmas, is the square root of its NEES divided by d.
     """
-    known = np.zeros(len(given.trial.time), dtype=bool)
+    known = np.zeros(len(scored.trial.time), dtype=bool)
     far = known.copy()
-    groups = given.shared(nees_of_groups)
+    groups = scored.shared(nees_of_groups)
     for group in JUDGED if groups else ():
         values, degrees = groups[group]
         known |= degrees > 0
@@ -44,18 +44,18 @@ def _beyond_sigma(given: ScoringInput) -> float:
     return float(np.mean(far[known])) if known.any() else float("nan")
 
 
-def _reports(given: ScoringInput) -> NDArray[np.bool_]:
+def _reports(scored: ScoringInput) -> NDArray[np.bool_]:
     """The diagnostic ``inconsistent`` as a mask, at the epochs that have it."""
-    reported = given.trial.diagnostics.get("inconsistent", np.empty(0))
+    reported = scored.trial.diagnostics.get("inconsistent", np.empty(0))
     return reported[np.isfinite(reported)] > 0.5 if reported.ndim == 1 else np.zeros(0, dtype=bool)
 
 
 @register_score(
     "inconsistent", title="Share of the epochs at which it reports that it is inconsistent", unit="-", better="lower"
 )
-def _inconsistent(given: ScoringInput) -> float:
+def _inconsistent(scored: ScoringInput) -> float:
     """NaN for an estimator that does not test itself."""
-    reports = _reports(given)
+    reports = _reports(scored)
     return float(np.mean(reports)) if reports.size else float("nan")
 
 
@@ -65,9 +65,9 @@ def _inconsistent(given: ScoringInput) -> float:
     unit="-",
     better="lower",
 )
-def _inconsistent_end(given: ScoringInput) -> float:
+def _inconsistent_end(scored: ScoringInput) -> float:
     """NaN for an estimator that does not test itself."""
-    reports = _reports(given)
+    reports = _reports(scored)
     return float(np.mean(reports[-max(1, reports.size // 10) :])) if reports.size else float("nan")
 
 

@@ -78,14 +78,14 @@ def protection_levels(trial: Trial, risk: float = RISK) -> Array:
     (T,) array
         Protection levels; NaN at epochs with neither diagnostic nor covariance.
     """
-    given = trial.diagnostics.get("protection_level")
-    if given is not None:
-        if given.ndim != 1:
+    reported = trial.diagnostics.get("protection_level")
+    if reported is not None:
+        if reported.ndim != 1:
             raise ValueError(
                 f"{trial.estimator}: the diagnostic 'protection_level' is one number an epoch, "
-                f"not an array of shape {given.shape[1:]}"
+                f"not an array of shape {reported.shape[1:]}"
             )
-        return given
+        return reported
     if trial.covariance is None:
         return np.full(len(trial), np.nan)
     p = trial.covariance[:, :2, :2]
@@ -181,19 +181,19 @@ def _epochs(trial: Trial, recording: Recording, error: Array) -> tuple[Array, Ar
     return e[known], level[known]
 
 
-def _of(given: ScoringInput) -> tuple[Array, Array] | None:
+def _of(scored: ScoringInput) -> tuple[Array, Array] | None:
     """Errors and protection levels of a run; None if it has no protection level at all."""
-    if not np.isfinite(protection_levels(given.trial)).any():
+    if not np.isfinite(protection_levels(scored.trial)).any():
         return None
-    return _epochs(given.trial, given.recording, given.horizontal)
+    return _epochs(scored.trial, scored.recording, scored.horizontal)
 
 
 @register_score(
     "protection_exceeded", title="Share of epochs with an error above the protection level", unit="-", better="lower",
     uses_covariance=True,
 )  # fmt: skip
-def _exceeded(given: ScoringInput) -> float:
-    found = given.shared(_of)
+def _exceeded(scored: ScoringInput) -> float:
+    found = scored.shared(_of)
     if found is None:
         return float("nan")
     error, level = found
@@ -208,8 +208,8 @@ def _register_limit(limit: float) -> None:
         f"integrity_risk_{suffix}", title=f"Share of epochs with an error above {limit:g} m that are not warned of",
         unit="-", better="lower", uses_covariance=True,
     )  # fmt: skip
-    def risk(given: ScoringInput) -> float:
-        found = given.shared(_of)
+    def risk(scored: ScoringInput) -> float:
+        found = scored.shared(_of)
         if found is None:
             return float("nan")
         return Stanford(*found, limit).shares["hazardously misleading"]
@@ -218,8 +218,8 @@ def _register_limit(limit: float) -> None:
         f"integrity_availability_{suffix}", title=f"Share of epochs with a protection level of {limit:g} m or less",
         unit="-", better="higher", uses_covariance=True,
     )  # fmt: skip
-    def availability(given: ScoringInput) -> float:
-        found = given.shared(_of)
+    def availability(scored: ScoringInput) -> float:
+        found = scored.shared(_of)
         return float("nan") if found is None else float(np.mean(found[1] <= limit))
 
 
@@ -230,9 +230,9 @@ def _register_accuracy(radius: float) -> None:
         unit="-",
         better="higher",
     )
-    def within(given: ScoringInput) -> float:
-        known = np.isfinite(given.recording.data.truth.position[:, :2]).all(axis=1).sum()
-        return float((given.horizontal <= radius).sum() / known) if known and len(given.error) else float("nan")
+    def within(scored: ScoringInput) -> float:
+        known = np.isfinite(scored.recording.data.truth.position[:, :2]).all(axis=1).sum()
+        return float((scored.horizontal <= radius).sum() / known) if known and len(scored.error) else float("nan")
 
 
 for _limit in ALERT_LIMITS:

@@ -56,12 +56,12 @@ def _later(trial: Trial, lag: str) -> int:
     return min(round(seconds_of(lag) / float(np.median(np.diff(trial.time)))), len(trial))
 
 
-def lagged_errors(given: ScoringInput, lag: str) -> Array:
+def lagged_errors(scored: ScoringInput, lag: str) -> Array:
     """Errors of the estimates of earlier times.
 
     Parameters
     ----------
-    given : ScoringInput
+    scored : ScoringInput
         Of a run with this lag.
     lag : str
         The lag as names have it.
@@ -71,7 +71,7 @@ def lagged_errors(given: ScoringInput, lag: str) -> Array:
     (n, 9) array
         Errors at the first n epochs of the run, like `simnav.scoring.errors`; NaN in components that are not known.
     """
-    trial, steps = given.trial, _later(given.trial, lag)
+    trial, steps = scored.trial, _later(scored.trial, lag)
     change = trial.diagnostics[f"{_PREFIX}{lag}"][steps:]
     n = len(change)
     position, offset = trial.position[:n].copy(), change[:, :3]
@@ -83,13 +83,13 @@ def lagged_errors(given: ScoringInput, lag: str) -> Array:
     )
     known = trial.estimated[:n] & np.isfinite(change)
     known[:, 6:] = trial.estimated[:n, 6:]
-    return state_errors(states, given.recording.data.truth[:n], known)
+    return state_errors(states, scored.recording.data.truth[:n], known)
 
 
-def _of_errors(measure: Callable[[Array], Array], factor: str, given: ScoringInput) -> float:
-    if f"{_PREFIX}{factor}" not in given.trial.diagnostics:
+def _of_errors(measure: Callable[[Array], Array], factor: str, scored: ScoringInput) -> float:
+    if f"{_PREFIX}{factor}" not in scored.trial.diagnostics:
         return float("nan")
-    error = given.shared(_Errors(factor))
+    error = scored.shared(_Errors(factor))
     return rms(measure(error))
 
 
@@ -99,8 +99,8 @@ class _Errors:
     def __init__(self, lag: str):
         self.lag = lag
 
-    def __call__(self, given: ScoringInput) -> Array:
-        return lagged_errors(given, self.lag)
+    def __call__(self, scored: ScoringInput) -> Array:
+        return lagged_errors(scored, self.lag)
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, _Errors) and other.lag == self.lag
@@ -109,11 +109,11 @@ class _Errors:
         return hash((_Errors, self.lag))
 
 
-def _of_sigmas(axis: str, lag: str, given: ScoringInput) -> float:
-    if f"{_PREFIX}{lag}" not in given.trial.diagnostics:
+def _of_sigmas(axis: str, lag: str, scored: ScoringInput) -> float:
+    if f"{_PREFIX}{lag}" not in scored.trial.diagnostics:
         return float("nan")
-    steps = _later(given.trial, lag)
-    parts = [sigma_errors(given.trial, stream, axis, steps)[1] for stream in given.recording.data.aids.values()]
+    steps = _later(scored.trial, lag)
+    parts = [sigma_errors(scored.trial, stream, axis, steps)[1] for stream in scored.recording.data.aids.values()]
     return rms(np.concatenate(parts)) if parts else float("nan")
 
 

@@ -60,10 +60,10 @@ def _held(
     """States without gaps in the position, and the mask of the components that are estimated."""
     position, estimated = states.position.copy(), estimated.copy()
     for part in (slice(0, 2), slice(2, 3)):
-        given: NDArray[np.bool_] = np.asarray((estimated[:, part] & np.isfinite(position[:, part])).all(axis=1))
-        if not given.any() or given.all():
+        known: NDArray[np.bool_] = np.asarray((estimated[:, part] & np.isfinite(position[:, part])).all(axis=1))
+        if not known.any() or known.all():
             continue
-        last = np.maximum.accumulate(np.where(given, np.arange(len(position)), -1))
+        last = np.maximum.accumulate(np.where(known, np.arange(len(position)), -1))
         position[:, part] = np.where((last >= 0)[:, None], position[last, part], start[part])
         estimated[:, part] = True
     return NavigationStates(states.time, position, states.velocity, states.attitude), estimated
@@ -73,10 +73,10 @@ def smoothed_errors(trial: Trial, recording: Recording) -> Array | None:
     """Errors of the smoothed trajectory, like `held_errors`; None if the estimator does not smooth."""
     if trial.smoothed is None:
         return None
-    given: NDArray[np.bool_] = np.any(trial.estimated, axis=0)
-    if not given.any():  # the estimator only smooths
-        given = np.ones(9, dtype=bool)
-    states, estimated = _held(trial.smoothed, np.broadcast_to(given, trial.estimated.shape), recording.start.position)
+    known: NDArray[np.bool_] = np.any(trial.estimated, axis=0)
+    if not known.any():  # the estimator only smooths
+        known = np.ones(9, dtype=bool)
+    states, estimated = _held(trial.smoothed, np.broadcast_to(known, trial.estimated.shape), recording.start.position)
     return state_errors(states, recording.data.truth[: len(trial)], estimated)
 
 

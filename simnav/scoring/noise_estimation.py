@@ -80,15 +80,15 @@ def sigma_errors(trial: Trial, stream: AidStream, axis: str, later: int = 0) -> 
     return stream.time[inside], np.asarray(estimate[epoch[inside]] - true)
 
 
-def _rmse(given: ScoringInput) -> dict[str, float]:
-    return noise_estimation(given.trial, given.recording)
+def _rmse(scored: ScoringInput) -> dict[str, float]:
+    return noise_estimation(scored.trial, scored.recording)
 
 
 @register_score("sigma_north_rmse", title="Estimated sigma north, RMSE", unit="m", better="lower")
-def _sigma_north_rmse(given: ScoringInput) -> float:
-    return given.shared(_rmse)["sigma_north_rmse"]
+def _sigma_north_rmse(scored: ScoringInput) -> float:
+    return scored.shared(_rmse)["sigma_north_rmse"]
 
 
 @register_score("sigma_east_rmse", title="Estimated sigma east, RMSE", unit="m", better="lower")
-def _sigma_east_rmse(given: ScoringInput) -> float:
-    return given.shared(_rmse)["sigma_east_rmse"]
+def _sigma_east_rmse(scored: ScoringInput) -> float:
+    return scored.shared(_rmse)["sigma_east_rmse"]

@@ -135,14 +135,14 @@ def outage_scores(error: Array, recording: Recording, *, threshold: float = RECO
     return scores
 
 
-def _of_run(given: ScoringInput) -> dict[str, float]:
-    return outage_scores(given.held_error, given.recording)
+def _of_run(scored: ScoringInput) -> dict[str, float]:
+    return outage_scores(scored.held_error, scored.recording)
 
 
 def _register(name: str, title: str, unit: str, better: Better) -> None:
     @register_score(name, title=title, unit=unit, better=better)
-    def mean(given: ScoringInput) -> float:
-        return given.shared(_of_run)[name]
+    def mean(scored: ScoringInput) -> float:
+        return scored.shared(_of_run)[name]
 
 
 _register("outage_end_error", "Horizontal error at the end of an outage, mean", "m", "lower")

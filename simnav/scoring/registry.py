@@ -5,8 +5,8 @@ A score is a function of a `ScoringInput` with a title, a unit and a direction::
     from simnav import register_score
 
     @register_score("horizontal_p99", title="99th percentile of the horizontal error", unit="m", better="lower")
-    def horizontal_p99(given):
-        return np.nanquantile(given.horizontal, 0.99)
+    def horizontal_p99(scored):
+        return np.nanquantile(scored.horizontal, 0.99)
 
 The scores of simnav are defined in the same way, in the modules of this package (`simnav.scoring.standard`). A file of
 a third party is loaded by ``simnav --plugin my_scores.py`` or `simnav.load_plugin`. A package names its module in the
@@ -124,8 +124,8 @@ class Score:
         self.name, self.title, self.unit, self.better = name, title, unit, better
         self.uses_covariance = uses_covariance
 
-    def __call__(self, given: ScoringInput) -> float:
-        return self.function(given)
+    def __call__(self, scored: ScoringInput) -> float:
+        return self.function(scored)
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle the score for another process."""

@@ -53,11 +53,11 @@ def score(trial: Trial, recording: Recording, names: Iterable[str] | None = None
     ScoreWarning
         If the function of a score raises or returns an infinite value. The score is then NaN; others are not affected.
     """
-    given = _SharedInput(trial, recording)
+    scored = _SharedInput(trial, recording)
     chosen = dict(SCORES) if names is None else {name: SCORES[name] for name in names}
     if names is None:
         chosen |= {name: SCORES[name] for name in names_of_families(trial)}
-    return {name: _value(one, given) for name, one in chosen.items()}
+    return {name: _value(one, scored) for name, one in chosen.items()}
 
 
 class _SharedInput(ScoringInput):
@@ -89,14 +89,14 @@ def _read_only(array: Array) -> Array:
     return view
 
 
-def _value(one: Score, given: ScoringInput) -> float:
+def _value(one: Score, scored: ScoringInput) -> float:
     try:
-        value = float(one(given))
+        value = float(one(scored))
         if not math.isinf(value):
             return value
         problem = "it is infinite"
     except (Exception, SystemExit) as error:
         problem = f"{type(error).__name__}: {error}"
-    estimator, scenario = given.trial.estimator, given.recording.scenario
+    estimator, scenario = scored.trial.estimator, scored.recording.scenario
     warnings.warn(f"score {one.name!r} of {estimator} on {scenario} is left out: {problem}", ScoreWarning, stacklevel=3)
     return float("nan")

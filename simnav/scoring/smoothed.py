@@ -14,15 +14,15 @@ _NAN = float("nan")
 
 
 @register_score("smoothed_horizontal_rmse", title="Horizontal RMSE, smoothed", unit="m", better="lower")
-def _horizontal_rmse(given: ScoringInput) -> float:
-    error = given.smoothed_error
+def _horizontal_rmse(scored: ScoringInput) -> float:
+    error = scored.smoothed_error
     return _NAN if error is None else rms(horizontal(error))
 
 
 def _register_component(name: str, title: str, unit: str, column: int) -> None:
     @register_score(name, title=title, unit=unit, better="lower")
-    def rmse(given: ScoringInput) -> float:
-        error = given.smoothed_error
+    def rmse(scored: ScoringInput) -> float:
+        error = scored.smoothed_error
         return _NAN if error is None else rms(error[:, column])
 
 
@@ -31,10 +31,10 @@ _register_component("smoothed_east_rmse", "East RMSE, smoothed", "m", 1)
 
 
 @register_score("smoothed_horizontal_max", title="Largest horizontal error, smoothed", unit="m", better="lower")
-def _horizontal_max(given: ScoringInput) -> float:
-    if given.smoothed_error is None:
+def _horizontal_max(scored: ScoringInput) -> float:
+    if scored.smoothed_error is None:
         return _NAN
-    h = horizontal(given.smoothed_error)
+    h = horizontal(scored.smoothed_error)
     return float(np.nanmax(h)) if np.isfinite(h).any() else _NAN
 
 
