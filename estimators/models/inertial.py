@@ -68,7 +68,7 @@ from .equations import EQUATIONS, equation_of
 from .error_states import merged, merged_states
 from .filtering import Aid, AidTable, Dynamics, ModelFunctions, aid_table
 from .flat_state import FlatStateModel
-from .inertial_errors import ERROR
+from .inertial_errors import ERROR, PART
 from .inertial_functions import INERTIAL_FUNCTIONS
 from .lever_arms import has_measurement_function, with_lever_arms
 from .measurement_functions import MeasurementFunction, PredictedReading
@@ -444,8 +444,8 @@ class InertialModel(FlatStateModel):
 
     def estimate(self, covariance: Array) -> Estimate:
         """The state as an estimate, all nine components."""
-        attitude = roll_pitch_yaw(self.dcm)
-        estimate = Estimate(self.time, self.position.copy(), self.velocity.copy(), attitude, covariance[:9, :9].copy())
+        attitude, nine = roll_pitch_yaw(self.dcm), covariance[PART.navigation, PART.navigation].copy()
+        estimate = Estimate(self.time, self.position.copy(), self.velocity.copy(), attitude, nine)
         if self.blocks.brought or self.reports_all:
             values = np.concatenate([self.bias, self.calibration])
             estimate.states = self.blocks.report(values, _MOTION, covariance, self.reports_all)
@@ -458,7 +458,8 @@ class InertialModel(FlatStateModel):
         states = numbers[:, :MOTION_NUMBERS].view(INERTIAL_STATE)[:, 0]
         attitude = np.array([_angles(elements) for elements in states["dcm"].reshape(-1, 9).tolist()])
         time = states["clock"].view(CLOCK)["time"][:, 0]
-        return Estimates(time, states["position"], states["velocity"], attitude, covariances[:, :9, :9])
+        nine = covariances[:, PART.navigation, PART.navigation]
+        return Estimates(time, states["position"], states["velocity"], attitude, nine)
 
 
 def roll_pitch_yaw(dcm: Array) -> Array:

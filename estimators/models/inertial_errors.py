@@ -30,8 +30,18 @@ class InertialErrors(NamedTuple):
     calibration: int = 15
 
     @property
+    def height(self) -> int:
+        """The vertical component of the position; for Python, not in kernels, as those below."""
+        return self.position + 2
+
+    @property
+    def sinking(self) -> int:
+        """The vertical component of the velocity."""
+        return self.velocity + 2
+
+    @property
     def heading(self) -> int:
-        """The component of the attitude about the vertical; for Python, not in kernels."""
+        """The component of the attitude about the vertical."""
         return self.attitude + 2
 
 

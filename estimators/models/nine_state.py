@@ -25,6 +25,7 @@ from .base import Linearised
 from .equations import equation_of
 from .filtering import Dynamics, ModelFunctions, Prediction, Readings, aid_of
 from .inertial import InertialModel
+from .inertial_errors import PART
 from .inertial_functions import state_of
 from .measurements import NAVIGATION_STATES, observe_inertial
 from .propagation import IMU_NOISE, Samples, correct_inertial, motion_of, propagate_inertial, time_of
@@ -154,11 +155,11 @@ class NineStateModel(InertialModel):
 
     def carry(self, error: Array, elapsed: float) -> None:
         """Take an error through the last propagation, in place."""
-        error[:] = self.transition[:9, :9] @ error
+        error[:] = self.transition[PART.navigation, PART.navigation] @ error
 
     def measure(self, measurement: Measurement) -> Linearised | None:
         """Linearise one measurement (`simnav.estimators.models.measurements`)."""
         linearised = super().measure(measurement)
         if linearised is None:
             return None
-        return linearised._replace(jacobian=np.ascontiguousarray(linearised.jacobian[:, :9]))
+        return linearised._replace(jacobian=np.ascontiguousarray(linearised.jacobian[:, PART.navigation]))

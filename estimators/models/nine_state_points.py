@@ -10,6 +10,7 @@ import numpy as np
 
 from simnav.types import Array, Measurement
 
+from .inertial_errors import PART
 from .inertial_points import InertialPoints
 from .measurements import NAVIGATION_STATES
 from .nine_state import NineStateModel
@@ -28,7 +29,7 @@ class NineStatePoints(NineStateModel, InertialPoints):
         """Advance the state and the points; return the process noise."""
         full = _with_biases(errors)
         noise = super().propagate_points(full, until)
-        errors[:] = full[:, :9]
+        errors[:] = full[:, PART.navigation]
         return noise
 
     def observe_points(self, measurement: Measurement, errors: Array) -> Array:
@@ -39,5 +40,5 @@ class NineStatePoints(NineStateModel, InertialPoints):
 def _with_biases(errors: Array) -> Array:
     """(k, 15) errors of points: those of nine states, and none of the biases."""
     full = np.zeros((len(errors), NAVIGATION_STATES))
-    full[:, :9] = errors
+    full[:, PART.navigation] = errors
     return full

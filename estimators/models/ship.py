@@ -188,7 +188,7 @@ class ShipModel(FlatStateModel, MovingModel):
             np.concatenate([np.zeros(SHIP.speed), density]),
         )
         self.transition, self.constants = np.eye(n), filled(SHIP_MOTION, turn_time=self.turn_time)
-        self._height_variance = float(start.covariance[2, 2])
+        self._height_variance = float(start.covariance[ERROR.height, ERROR.height])
         self.numbers = np.zeros(SHIP_NUMBERS + n)
         self._bind()
         self.time = start.time
@@ -314,8 +314,10 @@ class ShipModel(FlatStateModel, MovingModel):
         psi = float(self.x[SHIP.heading])
         velocity, full = np.zeros(3), np.zeros((9, 9))
         describe_ship(self.x, covariance, self.sway, velocity, full)
-        full[2, 2], full[5, 5] = self._height_variance, VERTICAL_SPEED**2
-        full[6, 6] = full[7, 7] = HEEL**2
+        full[ERROR.height, ERROR.height] = self._height_variance
+        full[ERROR.sinking, ERROR.sinking] = VERTICAL_SPEED**2
+        for angle in range(ERROR.attitude, ERROR.heading):
+            full[angle, angle] = HEEL**2
         attitude = np.array([0.0, 0.0, wrap(psi)])
         estimate = Estimate(self.time, self.position.copy(), velocity, attitude, full, ESTIMATED)
         if self.blocks.brought or self.reports_all:

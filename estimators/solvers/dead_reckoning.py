@@ -292,10 +292,11 @@ class DeadReckoningEstimator(Solver):
         full[range(ERROR.attitude, ERROR.heading), range(ERROR.attitude, ERROR.heading)] = tilt
         age = self._time - self._started
         drift_down = float(tilt.mean()) * float(v[:2] @ v[:2]) * age**2 + sigma**2 * age
-        full[2, 2] = start[2, 2] + drift_down
+        height = start[ERROR.height, ERROR.height] + drift_down
         if self._depth is not None:
-            full[2, 2] = float(self._depth.sigma[0] ** 2 + self._depth.bias[0] ** 2) + SEAWAY**2
-        full[5, 5] += float(tilt.mean()) * float(v[:2] @ v[:2])
+            height = float(self._depth.sigma[0] ** 2 + self._depth.bias[0] ** 2) + SEAWAY**2
+        full[ERROR.height, ERROR.height] = height
+        full[ERROR.sinking, ERROR.sinking] += float(tilt.mean()) * float(v[:2] @ v[:2])
         estimated = None
         attitude = rpy_from_dcm(c)
         if self._imu is None:

@@ -25,7 +25,7 @@ from simnav.compiled import kernel
 from simnav.estimators.models.base import Linearised
 from simnav.estimators.models.filtering import Aid
 from simnav.estimators.models.inertial import InertialModel
-from simnav.estimators.models.inertial_errors import ERROR
+from simnav.estimators.models.inertial_errors import ERROR, PART
 from simnav.estimators.models.measurements import (
     DVL,
     GNSS_POSITION,
@@ -40,7 +40,7 @@ from simnav.kernel_types import Matrix, Vector
 from simnav.types import Array, Estimate, InitialState, Instruments, Measurement
 
 from .gtsam_preintegration import Preintegration
-from .tangent_frame import TANGENT, GeodeticState, LocalState, TangentFrame, tangent_state
+from .tangent_frame import TANGENT, TANGENT_PART, GeodeticState, LocalState, TangentFrame, tangent_state
 
 __all__ = ["InertialGraph", "Observation", "TangentState", "observe_tangent"]
 
@@ -163,14 +163,15 @@ class InertialGraph:
         import gtsam
 
         self.model = with_stated_sigmas(InertialModel(calibrate=False), instruments)
-        covariance = self.model.begin(start, instruments)[:15, :15].copy()
-        index = np.arange(9, 15)
+        covariance = self.model.begin(start, instruments)
+        covariance = covariance[: ERROR.calibration, : ERROR.calibration].copy()
+        index = np.arange(ERROR.gyroscope_bias, ERROR.calibration)
         covariance[index, index] = np.maximum(covariance[index, index], np.repeat(np.square(LEAST_BIAS), 3))
         self.frame = frame = TangentFrame(start.position)
         turn = frame.turn(start.position)
         state = gtsam.NavState(gtsam.Rot3(turn @ self.model.dcm), frame.local(start.position), turn @ start.velocity)
         bias = gtsam.imuBias.ConstantBias()
-        self.motion = Preintegration(self.model._noise, np.diag(covariance)[9:], frame, start.time)
+        self.motion = Preintegration(self.model._noise, np.diag(covariance)[ERROR.gyroscope_bias :], frame, start.time)
         self.motion.begin(state, bias)
         self.node, self._rate = 0, np.zeros(3)
         self._aid = {name: (aid.code, np.array(aid.lever_arm)) for name, aid in self.model.aid_parameters.items()}
@@ -192,24 +193,26 @@ class InertialGraph:
         import gtsam
 
         graph = gtsam.NonlinearFactorGraph()
-        x, v, b = self.keys(node)
+        (x, v, b), part = self.keys(node), TANGENT_PART
         sigma = np.sqrt(np.diag(covariance))
         correlation = covariance / sigma / sigma[:, None]
-        for group in (slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 15)):
+        for group in (part.rotation, part.place, part.speed, part.bias):
             correlation[group, group] = 0.0
         if np.abs(correlation).max() > LEAST_CORRELATION:
             root = np.linalg.inv(np.linalg.cholesky(0.5 * (covariance + covariance.T)))
             unit = gtsam.noiseModel.Unit.Create(15)
-            linear = gtsam.JacobianFactor(x, root[:, :6], v, root[:, 6:9], b, root[:, 9:], np.zeros(15), unit)
+            linear = gtsam.JacobianFactor(
+                x, root[:, part.pose], v, root[:, part.speed], b, root[:, part.bias], np.zeros(15), unit
+            )
             graph.push_back(gtsam.LinearContainerFactor(linear, self.values(node, state, bias)))
             return graph
         gaussian = gtsam.noiseModel.Gaussian.Covariance
         turn = state.pose().rotation().matrix()
-        place, rotation = turn @ covariance[3:6, 3:6] @ turn.T, state.pose().rotation()
-        graph.push_back(gtsam.PoseRotationPrior3D(x, rotation, gaussian(covariance[:3, :3])))
+        place, rotation = turn @ covariance[part.place, part.place] @ turn.T, state.pose().rotation()
+        graph.push_back(gtsam.PoseRotationPrior3D(x, rotation, gaussian(covariance[part.rotation, part.rotation])))
         graph.push_back(gtsam.GPSFactor(x, state.position(), gaussian(place)))
-        graph.push_back(gtsam.PriorFactorPoint3(v, state.velocity(), gaussian(covariance[6:9, 6:9])))
-        graph.push_back(gtsam.PriorFactorConstantBias(b, bias, gaussian(covariance[9:, 9:])))
+        graph.push_back(gtsam.PriorFactorPoint3(v, state.velocity(), gaussian(covariance[part.speed, part.speed])))
+        graph.push_back(gtsam.PriorFactorConstantBias(b, bias, gaussian(covariance[part.bias, part.bias])))
         return graph
 
     def values(self, node: int, state: Any, bias: Any) -> Any:
@@ -272,11 +275,11 @@ class InertialGraph:
             state = TangentState(rotation, np.array(pose.translation()), speed, rate, bias)
             observe_tangent((code, arm), value, origin, axes, state, e, h)
             if jacobians is not None:
-                jacobians[0] = h[:m, :6]
+                jacobians[0] = h[:m, TANGENT_PART.pose]
                 if moving:
-                    jacobians[1] = h[:m, 6:9]
+                    jacobians[1] = h[:m, TANGENT_PART.speed]
                 if with_rate:
-                    jacobians[2] = h[:m, 9:]
+                    jacobians[2] = h[:m, TANGENT_PART.bias]
             return e[:m]
 
         keys = [x, v, b] if with_rate else [x, v] if moving else [x]
@@ -297,7 +300,7 @@ class InertialGraph:
     def estimate(self, covariance: Array) -> Estimate:
         """Where the motion has led, from the (15, 15) covariance of the newest node."""
         state = self.motion.predict()
-        to_ours = self._error_map(state)[:9]
+        to_ours = self._error_map(state)[PART.navigation]
         ours = to_ours @ self.motion.carry(covariance) @ to_ours.T
         return Estimate(self.motion.time, *self.navigation(state), 0.5 * (ours + ours.T))
 

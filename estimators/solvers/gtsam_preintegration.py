@@ -42,7 +42,7 @@ from simnav.kernel_types import Matrix, Vector
 from simnav.structures import filled, length, structure
 from simnav.types import Array, ImuSamples
 
-from .tangent_frame import TangentFrame
+from .tangent_frame import TANGENT_PART, TangentFrame
 
 __all__ = ["Preintegration", "imu_pieces"]
 
@@ -303,11 +303,12 @@ class Preintegration:
         by_state, by_bias = np.zeros((9, 9), order="F"), np.zeros((9, 6), order="F")
         end = self._measurements.predict(self.state, self.bias, by_state, by_bias)
         into, out = np.eye(9), np.eye(15)
-        into[6:, 6:] = self.state.pose().rotation().matrix().T
-        out[6:9, 6:9] = end.pose().rotation().matrix()
+        part = TANGENT_PART
+        into[part.speed, part.speed] = self.state.pose().rotation().matrix().T
+        out[part.speed, part.speed] = end.pose().rotation().matrix()
         transition = np.eye(15)
-        transition[:9, :9] = by_state @ into
-        transition[:9, 9:] = by_bias
+        transition[part.state, part.state] = by_state @ into
+        transition[part.state, part.bias] = by_bias
         moved = transition @ covariance @ transition.T + self._measurements.preintMeasCov()
         carried: Array = out @ moved @ out.T
         return carried

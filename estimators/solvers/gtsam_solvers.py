@@ -45,6 +45,7 @@ from simnav.types import (
 
 from .admission import LATE, Admission
 from .gtsam_graph import InertialGraph, Observation
+from .tangent_frame import TANGENT_PART
 
 __all__ = ["BatchEstimator", "FixedLagEstimator", "GncEstimator", "GtsamEstimator", "Isam2Estimator"]
 
@@ -471,7 +472,7 @@ class GncEstimator(BatchEstimator):
                 if len(keys) == 1:
                     tie = gtsam.JacobianFactor(keys[0], jacobian, y, -np.eye(m), right, tight)
                 else:
-                    a, b = jacobian[:, :6], jacobian[:, 6:9]
+                    a, b = jacobian[:, TANGENT_PART.pose], jacobian[:, TANGENT_PART.speed]
                     tie = gtsam.JacobianFactor(keys[0], a, keys[1], b, y, -np.eye(m), right, tight)
                 factors.push_back(gtsam.LinearContainerFactor(tie, point))
                 factor = gtsam.PriorFactorVector(y, np.zeros(m), gtsam.noiseModel.Unit.Create(m))

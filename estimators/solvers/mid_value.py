@@ -40,6 +40,7 @@ import numpy as np
 
 from simnav.estimators.adaptations.base import Adaptation
 from simnav.estimators.composition import Solver
+from simnav.estimators.models.inertial_errors import PART
 from simnav.estimators.models.suitable import ModelChoice
 from simnav.estimators.weightings.base import Isolation, Weighting
 from simnav.geometry.earth import radii_scalar
@@ -77,10 +78,10 @@ def middle(estimates: Sequence[Estimate]) -> tuple[Estimate, Array]:
     apart = rows - chosen
     latitude, _, height, *velocity, roll, pitch, yaw = chosen.tolist()
     meridian, transverse = radii_scalar(sin(latitude))
-    apart[:, :3] *= (meridian + height, (transverse + height) * cos(latitude), -1.0)
+    apart[:, PART.position] *= (meridian + height, (transverse + height) * cos(latitude), -1.0)
     c, s = cos(yaw), sin(yaw)
     turned = ((c * cos(pitch), s * cos(pitch), -sin(pitch)), (-s, c, 0.0), (0.0, 0.0, 1.0))
-    apart[:, 6:] = apart[:, 6:] @ np.array(turned)
+    apart[:, PART.attitude] = apart[:, PART.attitude] @ np.array(turned)
     covariance: Array = apart.T @ apart
     for one in estimates:
         assert one.covariance is not None
@@ -88,7 +89,7 @@ def middle(estimates: Sequence[Estimate]) -> tuple[Estimate, Array]:
     covariance /= n
     return Estimate(
         first.time,
-        None if first.position is None else chosen[:3],
+        None if first.position is None else chosen[PART.position],
         None if first.velocity is None else np.array(velocity),
         None if first.attitude is None else np.array((roll, pitch, yaw)),
         covariance, first.estimated, states=first.states,

@@ -38,7 +38,10 @@ from simnav.geometry.earth import (
 from simnav.kernel_types import Matrix, Vector
 from simnav.types import Array
 
-__all__ = ["TANGENT", "GeodeticState", "LocalState", "TangentErrors", "TangentFrame", "tangent_state"]
+__all__ = [
+    "TANGENT", "TANGENT_PART", "GeodeticState", "LocalState", "TangentErrors", "TangentFrame", "TangentParts",
+    "tangent_state",
+]  # fmt: skip
 
 _SECOND_ECCENTRICITY_SQUARED = ECCENTRICITY_SQUARED / (1.0 - ECCENTRICITY_SQUARED)
 
@@ -64,6 +67,27 @@ class TangentErrors(NamedTuple):
 
 
 TANGENT = TangentErrors()
+
+
+class TangentParts(NamedTuple):
+    """The components of each part, and of GTSAM's variables: the pose, the velocity and both biases."""
+
+    rotation: slice
+    place: slice
+    pose: slice
+    speed: slice
+    bias: slice
+    state: slice
+
+
+TANGENT_PART = TangentParts(
+    rotation=slice(TANGENT.rotation, TANGENT.place),
+    place=slice(TANGENT.place, TANGENT.speed),
+    pose=slice(TANGENT.rotation, TANGENT.speed),
+    speed=slice(TANGENT.speed, TANGENT.accelerometer_bias),
+    bias=slice(TANGENT.accelerometer_bias, TANGENT.gyroscope_bias + 3),
+    state=slice(TANGENT.rotation, TANGENT.accelerometer_bias),
+)
 
 
 class LocalState(NamedTuple):

@@ -38,6 +38,7 @@ import numpy as np
 
 from simnav.compiled import helper, kernel
 from simnav.estimators.models.channels import instrument_of, owners
+from simnav.estimators.models.inertial_errors import PART
 from simnav.kernel_types import IntegerVector, Matrix, Vector
 from simnav.kinds import POSITION, VELOCITY
 from simnav.types import Array, Instruments
@@ -170,7 +171,7 @@ class GradientAdaptive(Weighting):
             self._shapes = np.array([*shapes, self._motion], dtype=np.float64)
             self._scales = np.ones(len(self._shapes))
         if self.preset == "paper":
-            norm, motion = _rows(factors.residual), _rows(factors.motion_residual[:, :9])
+            norm, motion = _rows(factors.residual), _rows(factors.motion_residual[:, PART.navigation])
         else:
             norm, motion = factors.norm, factors.motion_norm * (3.0 / factors.motion_residual.shape[1]) ** 0.5
         constants, scales, zero = self._shapes, self._scales, np.zeros(len(motion), np.int64)
