@@ -207,6 +207,10 @@ class ErrorModel(ABC):
         """
         return None
 
+    def functions_of(self, name: str) -> ModelFunctions | None:
+        """The kernels that predict and correct by an instrument, even where others need the methods of the model."""
+        return None
+
     def functions(self) -> ModelFunctions | None:
         """The equations as kernels over `dynamics`; None where a filter has to call the methods of the model."""
         return None

@@ -67,7 +67,8 @@ def _apart(sheet: Datasheet) -> list[Datasheet]:
 def reading_of(measurement: Measurement) -> Measurement:
     """The measurement of a channel as one of an instrument of its own; its side information stays with it."""
     m = measurement
-    return Measurement(m.time, m.source, m.kind, m.value, "", m.side)
+    name = f"{m.instrument}:{m.channel}" if m.channel else m.instrument
+    return Measurement(m.time, name, m.kind, m.value, "", m.side)
 
 
 def of_channels(stream: AidStream) -> list[AidStream]:

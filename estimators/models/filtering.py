@@ -284,6 +284,12 @@ class ReadingsOfSteps:
             self._readings = room_for(2 * count)
         return self._readings
 
+    def of_instruments(self, measurements: Sequence[Measurement]) -> Readings:
+        """Room for measurements, of which only the instruments are written."""
+        into, known = self.room(len(measurements)), self._row
+        into.instrument[: len(measurements)] = [known[m.instrument][0] for m in measurements]
+        return into
+
     def fill(self, measurements: Sequence[Measurement]) -> Readings:
         """The measurements as arrays; those of the call before are overwritten."""
         into, known = self.room(len(measurements)), self._row

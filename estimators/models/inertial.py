@@ -321,6 +321,10 @@ class InertialModel(FlatStateModel):
             "limits": limits, **table._asdict(),
         }  # fmt: skip
 
+    def functions_of(self, name: str) -> ModelFunctions | None:
+        """As `ErrorModel.functions_of`."""
+        return self.equations if name in self._fused else None
+
     def functions(self) -> ModelFunctions | None:
         """As `ErrorModel.functions`; None if an instrument has an equation or a clock of its own."""
         return self.equations if self._fused == set(self.noise) and not self.blocks.clocks else None

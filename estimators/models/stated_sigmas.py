@@ -60,6 +60,9 @@ class _Stated(ErrorModel):
     def functions(self) -> ModelFunctions | None:
         return None if self.stated_variances else super().functions()
 
+    def functions_of(self, name: str) -> ModelFunctions | None:
+        return None if name in self.stated_variances else super().functions_of(name)
+
     def measure_together(self, measurements: Sequence[Measurement]) -> Linearised | None:
         return None if any(map(self._states, measurements)) else super().measure_together(measurements)
 

@@ -31,7 +31,7 @@ from simnav.estimators.adaptations.noise import NoiseAdaptation
 from simnav.estimators.adaptations.noise_report import NoiseReport
 from simnav.estimators.algebra.joseph import joseph_update, project
 from simnav.estimators.composition import Solver
-from simnav.estimators.models.base import ErrorModel, Linearised
+from simnav.estimators.models.base import NO_SAMPLES, ErrorModel, Linearised
 from simnav.estimators.models.channels import owners, summary
 from simnav.estimators.models.coupling import by_source
 from simnav.estimators.models.filtering import Dynamics, ModelFunctions, Prediction, Readings, ReadingsOfSteps
@@ -54,6 +54,8 @@ __all__ = ["FilterFunctions", "KalmanEstimator"]
 
 #: Methods of a step, which compiled steps do not call.
 _OF_A_STEP = ("update", "_use", "_note", "_estimate")
+#: Methods that a filter of kernels has functions in place of.
+_OF_A_READING = ("functions", "predict", "correct", "retract")
 
 
 class FilterFunctions(NamedTuple):
@@ -208,8 +210,12 @@ class KalmanEstimator(Solver):
             self._compiled
             and not self._owners
             and (own is None or type(own).diagnostics is NoiseAdaptation.diagnostics)
-            and all(getattr(type(self), name) is getattr(KalmanEstimator, name) for name in _OF_A_STEP)
+            and self._keeps(_OF_A_STEP)
         )
+
+    def _keeps(self, methods: Sequence[str]) -> bool:
+        """Whether it overrides none of some methods."""
+        return all(getattr(type(self), name) is getattr(KalmanEstimator, name) for name in methods)
 
     def smooth(self) -> NavigationStates | None:
         """The smoother's trajectory at the ends of all steps; None before the first, and without a smoother."""
@@ -267,9 +273,24 @@ class KalmanEstimator(Solver):
         self.dynamics = self._dynamics()
         functions = self.functions()._asdict()
         self._predict_together = functions.pop("predict_together")
+        self._of_kernels: dict[str, Filter] = {}
+        if self._predict_together is not None and self._keeps(_OF_A_READING):
+            self._of_kernels = self._filters_of_kernels()
         if functions["choose"] is use_nominal and not all(isinstance(f, Kernel) for f in functions.values()):
             functions["choose"] = self.choose  # a loop in Python copies an array sooner than it calls a kernel
         return Filter(dynamics=self.dynamics, choice=self.choice(instruments), **functions)
+
+    def _filters_of_kernels(self) -> dict[str, Filter]:
+        """The filter by which a single reading of an instrument is used, where the model has kernels for it."""
+        found: dict[str, Filter] = {}
+        for name in self._names:
+            kernels = self.model.functions_of(name)
+            if kernels is not None:
+                found[name] = next(iter(found.values()), None) or Filter(
+                    dynamics=self.dynamics, choice=no_choice(), propagate=kernels.propagate, predict=kernels.predict,
+                    choose=use_nominal, inflate=inflate_moving, correct=correct, retract=kernels.retract,
+                )  # fmt: skip
+        return found
 
     def choice(self, instruments: Instruments) -> Choice:
         """How the noise of each reading is chosen in a run."""
@@ -301,8 +322,12 @@ class KalmanEstimator(Solver):
         """Use measurements in order of their times, propagate to a time, and record what became of each."""
         self._measurements, count = measurements, len(measurements)
         readings = self._arrays.fill(measurements)
+        of_kernels = self._of_kernels.get(measurements[0].instrument) if count == 1 else None
         if self._compiled:
             filter_step.unchecked(self._filter, readings, samples, count, until)
+        elif of_kernels is not None:
+            self.propagate(self.dynamics, samples, until)
+            filter_step.unchecked(of_kernels, readings, NO_SAMPLES, count, self.model.time)
         else:
             filter_step.function(self._filter.in_python, readings, samples, count, until)
         self._note(readings, count)

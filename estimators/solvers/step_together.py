@@ -54,7 +54,7 @@ def step_together(
     predicted = predict(measurements)
     if predicted is None:
         return None
-    readings, count, dynamics = arrays.fill(measurements), len(measurements), f.dynamics
+    readings, count, dynamics = arrays.of_instruments(measurements), len(measurements), f.dynamics
     readings.rejected[:count], readings.sigma[:count, 0], readings.reported[:count] = False, np.nan, 0.0
     nis, size = readings.nis[:count], readings.size[:count]
     joseph_sequence.unchecked(dynamics.covariance, *predicted, dynamics.correction, nis, size)
