@@ -51,7 +51,7 @@ _ANTENNA = structure(
     arm=3, swing=3, place=3, sin_latitude=float, cos_latitude=float, sin_longitude=float, cos_longitude=float
 )
 _ANTENNA_NUMBERS = length(_ANTENNA)
-_DENSITY_RATIO = [c.name for c in SIDE].index("density_ratio")
+_ELEVATION, _DENSITY_RATIO = ([c.name for c in SIDE].index(name) for name in ("elevation", "density_ratio"))
 _CLOCK = np.eye(2)
 
 
@@ -210,14 +210,14 @@ def observe_all(points: NavigationPoints, sheet: Datasheet) -> tuple[Array, dict
     """The same for n readings (`simnav.kinds.Observations`)."""
     _, position, velocity, dcm, rate, blocks, channel, side = points
     side = ready(side)
-    n, (sigma, frequencies) = len(position), _figures(sheet, side.view(SEEN)["elevation"][:, 0])
+    n, (sigma, frequencies) = len(position), _figures(sheet, side[:, _ELEVATION])
     reading, navigation, signals = np.empty((n, 2)), np.empty((n, 2, 9)), np.zeros((n, 2, len(sheet.channels)))
     troposphere, ionosphere = np.zeros((n, 2, 1)), np.zeros((n, 2, 1))
     delay = blocks["ionosphere"] if frequencies == 1 else np.empty((n, 0))
     states = _States(ready(position), ready(velocity), ready(dcm), ready(rate))
     receiver = _Blocks(ready(blocks["clock"]), ready(blocks["troposphere"]), ready(blocks["signals"]), ready(delay))
     jacobians = _Jacobians(navigation, troposphere, signals, ionosphere)
-    _predict_all(states, sheet.lever_arm, side, channel, sigma, receiver, reading, jacobians)
+    _predict_all.unchecked(states, sheet.lever_arm, side, channel, sigma, receiver, reading, jacobians)
     by_block = {
         "navigation": navigation, "clock": np.broadcast_to(_CLOCK, (n, 2, 2)), "troposphere": troposphere,
         "signals": signals,
