@@ -5,20 +5,21 @@ linearise at another point: with a heading that is wrong by a radian an extended
 diverge.
 
 The state is a **nominal** trajectory, and the error vector y (estimate minus nominal). The nominal trajectory starts
-each step of the run at the truth, and follows the measured IMU samples to the end of the step. Within a step it differs
-from the truth by millimetres. With the transition matrix Phi, the Jacobian H and the innovation r at the nominal
-trajectory::
+each step of the run at the truth, and follows the IMU samples to the end of the step, less their mean errors in it.
+These are the nominal biases, with which it also ends at the truth. With the errors left in, a large bias would be a
+specific force that the vessel has not: turned by a wrong heading, it would seem to tell the heading. With the
+transition matrix Phi, the Jacobian H and the innovation r at the nominal trajectory::
 
-    y(t + dt) = Phi y(t),    y += nominal minus truth  (where a step begins),    innovation = r - H y
+    y(t + dt) = Phi y(t),    y += old minus new nominal  (where a step begins),    innovation = r - H y
 
 So the estimate, nominal plus y, is that of a linear Kalman filter for any size of y. The effect of the samples' errors
-is in the difference between the nominal trajectory and the truth at the end of a step. If the truth is not known (NaN
-in a recorded log), the estimate itself is the next nominal state, as in an extended Kalman filter.
+is in y, by the nominal biases. If the truth is not known (NaN in a recorded log), the estimate itself is the next
+nominal state, as in an extended Kalman filter, and the nominal biases stay.
 
 `simnav.estimators.models.inertial` combines some errors in one state. This model also has separate states for
 
 - the turn-on bias beside the in-run bias, of the IMU and of each aid
-- scale factors and misalignments of the IMU: they act as a bias in proportion to the rate or force, as measured
+- scale factors and misalignments of the IMU: they act as a bias in proportion to the rate or force
 - the scale factor of each velocity and depth, the misalignment of a DVL, the deviation of a magnetic compass
 - the processes that a datasheet declares by name, of first or second order, with their factors
 
@@ -64,6 +65,8 @@ from .truth_linearised_factors import TruthLinearisedFactors
 __all__ = ["TruthLinearisedModel"]
 
 _NAV, _INERTIAL = ERROR.gyroscope_bias, ERROR.calibration
+#: Velocity and attitude, and the biases of the IMU that change them in a step.
+_MOVING, _BIASES = slice(ERROR.velocity, _NAV), slice(_NAV, _INERTIAL)
 #: Times closer than this are one and the same [s].
 _SAME = 1e-6
 #: Three less the trace of a rotation matrix that is a vector product to third order: an angle of 3 mrad.
@@ -71,7 +74,7 @@ _SMALL = 1e-5
 
 
 class _ImuError(NamedTuple):
-    """A state that acts as a bias of one axis of the IMU (0 to 5), times what axis ``times`` measures (-1: times 1)."""
+    """A state that acts as a bias of one axis of the IMU (0 to 5), times the motion along ``times`` (-1: times 1)."""
 
     axis: int
     times: int
@@ -207,10 +210,10 @@ class TruthLinearisedModel(ErrorModel):
 
     def _anchor(self) -> None:
         """Where a step begins: go on from the truth; where it is not known, from the estimate."""
-        k = min(int(np.searchsorted(self.truth.time, self.time - _SAME)), len(self.truth) - 1)
-        nominal, y = self.nominal, self.y
-        if abs(self.truth.time[k] - self.time) > _SAME:
+        k = self._epoch()
+        if k < 0:
             return
+        nominal, y = self.nominal, self.y
         for mine, theirs in self._block_at:
             nominal.calibration[theirs.start - _INERTIAL : theirs.stop - _INERTIAL] += y[mine]
             y[mine] = 0.0
@@ -219,17 +222,42 @@ class TruthLinearisedModel(ErrorModel):
             y[:_NAV] = 0.0
         else:
             position, velocity, dcm = self.truth.position[k], self.truth.velocity[k], self._dcm[k]
-            off = nominal.position - position
-            off[1] = remainder(off[1], tau)
-            y[PART.position] += off * self._metres[k]
-            y[PART.velocity] += nominal.velocity - velocity
-            turn = nominal.dcm @ dcm.T
-            if turn[0, 0] + turn[1, 1] + turn[2, 2] < 3.0 - _SMALL:
-                y[PART.attitude] += rotation_vector_from_dcm(turn)
-            else:
-                about = turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]
-                y[PART.attitude] += 0.5 * np.array(about)
+            y[:_NAV] += self._off(k)
         nominal.position[:], nominal.velocity[:], nominal.dcm[:] = position, velocity, dcm
+
+    def _epoch(self) -> int:
+        """Index of the present time among those of the truth; -1 between them."""
+        k = min(int(np.searchsorted(self.truth.time, self.time - _SAME)), len(self.truth) - 1)
+        return k if abs(self.truth.time[k] - self.time) <= _SAME else -1
+
+    def _off(self, k: int) -> Array:
+        """(9,) nominal state minus the truth of an epoch [m, m/s, rad]."""
+        nominal = self.nominal
+        position, turn = nominal.position - self.truth.position[k], nominal.dcm @ self._dcm[k].T
+        position[1] = remainder(position[1], tau)
+        if turn[0, 0] + turn[1, 1] + turn[2, 2] < 3.0 - _SMALL:
+            about = rotation_vector_from_dcm(turn)
+        else:
+            about = 0.5 * np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]])
+        return np.concatenate([position * self._metres[k], nominal.velocity - self.truth.velocity[k], about])
+
+    def _reach_truth(self) -> None:
+        """Choose the nominal biases with which the nominal trajectory ends the step at the truth, by going there once.
+
+        They stay where samples are missing: what the velocity is off there is no error of samples.
+        """
+        k, nominal = self._epoch(), self.nominal
+        if k < 0 or self._known[k : k + 2].sum() < 2:
+            return
+        numbers, held = nominal.numbers.copy(), nominal.held
+        self._unused[:] = 0.0
+        nominal.propagate(self._unused, self.truth.time[k + 1])
+        off, complete = self._off(k + 1)[_MOVING], nominal.held == held
+        nominal.numbers[:], nominal.next_sample[0] = numbers, 0
+        if complete:
+            change = np.linalg.solve(nominal.transition[_MOVING, _BIASES], off)
+            nominal.bias -= change
+            self.y[_BIASES] += change
 
     def _navigation(self) -> tuple[Array, Array, Array]:
         """Position, velocity and attitude matrix of the estimate."""
@@ -246,14 +274,16 @@ class TruthLinearisedModel(ErrorModel):
         """Take the IMU samples of the step that follows."""
         self._anchor()
         self.nominal.load(imu)
+        self._reach_truth()
         self._integral = None
         if imu is not None and len(imu) and any(e.times >= 0 for e in self._imu_errors):
-            increments = np.hstack([imu.angular_rate, imu.specific_force]) * imu.interval[:, None]
+            measured = np.hstack([imu.angular_rate, imu.specific_force])
+            increments = (measured - self.nominal.bias) * imu.interval[:, None]
             total = np.vstack([np.zeros(6), np.cumsum(increments, axis=0)])
             self._integral = np.concatenate([[imu.time[0] - imu.interval[0]], imu.time]), total
 
-    def _measured(self, first: float, last: float) -> Array:
-        """(6,) mean of the IMU's samples over a part of the step."""
+    def _motion(self, first: float, last: float) -> Array:
+        """(6,) mean angular rate and specific force over a part of the step."""
         if self._integral is None:
             return np.zeros(6)
         time, total = self._integral
@@ -279,8 +309,8 @@ class TruthLinearisedModel(ErrorModel):
             phi[at, at + 1] = elapsed
         self.blocks.couple(phi, elapsed)
         if self._imu_errors:
-            measured = self._measured(self.time, until)
-            factor = np.append(measured, 1.0)[self._times]  # -1, for a bias, is the last
+            motion = self._motion(self.time, until)
+            factor = np.append(motion, 1.0)[self._times]  # -1, for a bias, is the last
             phi[:_NAV, m : m + len(factor)] = factor * phi[:_NAV, self._axes]
         covariance[:] = phi @ covariance @ phi.T
         covariance[:m, :m] += self.nominal.process_noise
@@ -334,10 +364,7 @@ class TruthLinearisedModel(ErrorModel):
         return Linearised(innovation - jacobian @ self.y, jacobian, own.noise)
 
     def _by_bias(self, measurement: Measurement) -> Array:
-        """(d, 3) derivative of a reading that is predicted by a function, by the biases of the gyroscopes.
-
-        The nominal rate is as measured, so the swing of a lever arm has the whole bias of the gyroscopes in it.
-        """
+        """(d, 3) derivative of a reading that is predicted by a function, by the biases of the gyroscopes."""
         own = self.nominal.own[measurement.instrument]
         point = own.point(measurement.time, self.nominal.state_of_own(), measurement.side)
         return -own.by_angular_rate(point)
@@ -348,15 +375,16 @@ class TruthLinearisedModel(ErrorModel):
 
     def snapshot(self) -> list[Array]:
         """Copies of what `correct` changes, and of the nominal state that it is an error of."""
-        nominal = self.nominal
-        arrays = self.y, nominal.position, nominal.velocity, nominal.dcm, nominal.calibration
-        return [array.copy() for array in arrays]
+        return [array.copy() for array in self._arrays()]
 
     def restore(self, snapshot: list[Array]) -> None:
         """Take corrections back."""
-        self.y[:] = snapshot[0]
+        for array, stored in zip(self._arrays(), snapshot, strict=True):
+            array[:] = stored
+
+    def _arrays(self) -> tuple[Array, ...]:
         nominal = self.nominal
-        nominal.position[:], nominal.velocity[:], nominal.dcm[:], nominal.calibration[:] = snapshot[1:]
+        return self.y, nominal.position, nominal.velocity, nominal.dcm, nominal.bias, nominal.calibration
 
     def estimate(self, covariance: Array) -> Estimate:
         """The state as an estimate, all nine components."""
@@ -364,6 +392,7 @@ class TruthLinearisedModel(ErrorModel):
         estimate = Estimate(self.time, position, velocity, roll_pitch_yaw(dcm), covariance[:_NAV, :_NAV].copy())
         if self.blocks.brought or self.reports_all:
             values = self.y.copy()
+            values[_BIASES] += self.nominal.bias
             for mine, theirs in self._block_at:
                 values[mine] += self.nominal.calibration[theirs.start - _INERTIAL : theirs.stop - _INERTIAL]
             estimate.states = self.blocks.report(values, 0, covariance, self.reports_all)

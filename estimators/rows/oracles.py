@@ -29,9 +29,12 @@ class Oracle(Row, solver=piece(OracleEstimator, restore=False), adaptation=TrueN
     2
         The swing of the lever arm of an instrument that is observed by a function (raw observations of satellites, or
         an uncertain lever arm) takes account of the gyroscopes' biases.
+    3
+        It is linearised at the true motion, without the errors of the IMU: beside a large bias of an accelerometer a
+        Doppler log alone does not tell the heading.
     """
 
-    version = 2
+    version = 3
 
 
 @register("oracle-clairvoyant")
@@ -45,9 +48,12 @@ class OracleClairvoyant(Row, solver=piece(OracleEstimator, restore=True), adapta
     2
         The swing of the lever arm of an instrument that is observed by a function (raw observations of satellites, or
         an uncertain lever arm) takes account of the gyroscopes' biases.
+    3
+        It is linearised at the true motion, without the errors of the IMU: beside a large bias of an accelerometer a
+        Doppler log alone does not tell the heading.
     """
 
-    version = 2
+    version = 3
 
 
 @register("oracle-rts")
@@ -62,9 +68,12 @@ class OracleRts(Oracle, smoother=Smoother):
     2
         The swing of the lever arm of an instrument that is observed by a function (raw observations of satellites, or
         an uncertain lever arm) takes account of the gyroscopes' biases.
+    3
+        It is linearised at the true motion, without the errors of the IMU: beside a large bias of an accelerometer a
+        Doppler log alone does not tell the heading.
     """
 
-    version = 2
+    version = 3
 
 
 @register("oracle-mixture")
@@ -80,9 +89,12 @@ class OracleMixture(Oracle, adaptation=MixtureNoise):
     2
         The swing of the lever arm of an instrument that is observed by a function (raw observations of satellites, or
         an uncertain lever arm) takes account of the gyroscopes' biases.
+    3
+        It is linearised at the true motion, without the errors of the IMU: beside a large bias of an accelerometer a
+        Doppler log alone does not tell the heading.
     """
 
-    version = 2
+    version = 3
 
 
 @register("oracle-times")
@@ -98,6 +110,9 @@ class OracleTimes(Oracle, adaptation=FaultTimes):
     2
         The swing of the lever arm of an instrument that is observed by a function (raw observations of satellites, or
         an uncertain lever arm) takes account of the gyroscopes' biases.
+    3
+        It is linearised at the true motion, without the errors of the IMU: beside a large bias of an accelerometer a
+        Doppler log alone does not tell the heading.
     """
 
-    version = 2
+    version = 3

@@ -10,25 +10,25 @@ __all__ = ["Oracle", "OracleClairvoyant", "OracleMixture", "OracleRts", "OracleT
 
 @register("oracle")
 class Oracle(Row, solver=piece(OracleEstimator, restore=False), adaptation=TrueNoise):
-    version = 2
+    version = 3
     def __init__(self) -> None: ...
 
 @register("oracle-clairvoyant")
 class OracleClairvoyant(Row, solver=piece(OracleEstimator, restore=True), adaptation=NominalNoise):
-    version = 2
+    version = 3
     def __init__(self) -> None: ...
 
 @register("oracle-rts")
 class OracleRts(Oracle, smoother=Smoother):
-    version = 2
+    version = 3
     def __init__(self) -> None: ...
 
 @register("oracle-mixture")
 class OracleMixture(Oracle, adaptation=MixtureNoise):
-    version = 2
+    version = 3
     def __init__(self) -> None: ...
 
 @register("oracle-times")
 class OracleTimes(Oracle, adaptation=FaultTimes):
-    version = 2
+    version = 3
     def __init__(self) -> None: ...
