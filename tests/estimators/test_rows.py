@@ -22,10 +22,7 @@ from simnav.types import Datasheet, Instruments
 from tests.cases.sorts_of_rows import first_of_each_solver
 
 # All checks of one of these take from three to twelve seconds.
-SLOW = {
-    "anfis-fgo", "fgo-full", "fgo-unsimplified", "filterpy-ukf", "gtsam-batch", "gtsam-fixed-lag", "gtsam-gnc",
-    "mid-value", "ship-ckf", "solution-separation",
-}  # fmt: skip
+SLOW = {"fgo-unsimplified", "filterpy-ukf", "gtsam-batch", "gtsam-fixed-lag", "gtsam-gnc", "solution-separation"}
 WHOLE = [name for name in first_of_each_solver() if name not in SLOW]
 
 
