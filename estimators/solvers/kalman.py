@@ -281,16 +281,16 @@ class KalmanEstimator(Solver):
         return Filter(dynamics=self.dynamics, choice=self.choice(instruments), **functions)
 
     def _filters_of_kernels(self) -> dict[str, Filter]:
-        """The filter by which a single reading of an instrument is used, where the model has kernels for it."""
-        found: dict[str, Filter] = {}
-        for name in self._names:
-            kernels = self.model.functions_of(name)
-            if kernels is not None:
-                found[name] = next(iter(found.values()), None) or Filter(
-                    dynamics=self.dynamics, choice=no_choice(), propagate=kernels.propagate, predict=kernels.predict,
-                    choose=use_nominal, inflate=inflate_moving, correct=correct, retract=kernels.retract,
-                )  # fmt: skip
-        return found
+        """The one filter that uses single readings, by the name of each instrument that the model has kernels for."""
+        kernels = {name: own for name in self._names if (own := self.model.functions_of(name)) is not None}
+        if not kernels:
+            return {}
+        functions = next(iter(kernels.values()))
+        single = Filter(
+            dynamics=self.dynamics, choice=no_choice(), propagate=functions.propagate, predict=functions.predict,
+            choose=use_nominal, inflate=inflate_moving, correct=correct, retract=functions.retract,
+        )  # fmt: skip
+        return dict.fromkeys(kernels, single)
 
     def choice(self, instruments: Instruments) -> Choice:
         """How the noise of each reading is chosen in a run."""
