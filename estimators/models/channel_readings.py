@@ -21,7 +21,7 @@ from simnav.types import Array
 
 from .ambiguity import innovation_of
 from .channels import ChannelDatasheet, whole
-from .inertial_errors import ERROR, PART
+from .inertial_errors import ERROR, PART, TRIAD
 from .measurement_functions import Kinematics, MeasurementFunction
 from .measurements import State
 from .named_state import NamedState
@@ -86,7 +86,7 @@ class ChannelReadings:
         places = first.places
         stated = [block for block in first.sheet.blocks if block.name in places]
         self._at = [(b.name, slice(places[b.name], places[b.name] + b.size)) for b in stated]
-        self._zeros = {b.name: np.zeros((1, b.size)) for b in first.sheet.blocks if b.name not in places}
+        self._without_state = {b.name: b.size for b in first.sheet.blocks if b.name not in places}
 
     def __deepcopy__(self, memo: object) -> ChannelReadings:
         """Itself: it never changes, and an estimator that takes late readings is copied in each step."""
@@ -133,7 +133,7 @@ class ChannelReadings:
             Derivative of the prediction by the error state.
         """
         offset, own = self.first_own, self._own_states(states).take(row, axis=0)
-        blocks = {name: np.broadcast_to(zero, (len(time), zero.shape[1])) for name, zero in self._zeros.items()}
+        blocks = {name: np.zeros((len(time), size)) for name, size in self._without_state.items()}
         for name, at in self._at:
             blocks[name] = own[:, at]
         motion = self._navigation(states, row, own)
@@ -160,7 +160,7 @@ class ChannelReadings:
     def _navigation(self, states: NamedState, row: NDArray[np.intp], own: Array) -> Kinematics:
         """The motion at each of n readings; ``own`` is what `_own_states` has there."""
         assert isinstance(states, State)
-        turning = states.rate[:, :3] - states.bias[:, :3]
+        turning = states.rate[:, TRIAD.gyroscopes] - states.bias[:, TRIAD.gyroscopes]
         turning -= np.einsum("nji,nj->ni", states.dcm, earth_rate(states.position[:, 0]))
         motion = Kinematics(states.position, states.velocity, states.dcm, turning)
         return Kinematics(*(column.take(row, axis=0) for column in motion))
@@ -172,8 +172,6 @@ class ChannelReadings:
     def more_noise(self, sides: Sequence[Array]) -> Array | None:
         """`MeasurementFunction.noise_without_state` of n readings.
 
-        Each sigma is computed by itself: functions of NumPy may differ in the last digit between one number and many.
-
         Parameters
         ----------
         sides : sequence of (s,) array
@@ -184,17 +182,15 @@ class ChannelReadings:
         (n, d, d) array or None
             Covariances. None where each reading has to be asked for by itself, also for the sake of a message.
         """
-        function, n, d = self.kind.reading_sigma, len(sides), len(self.kind.components)
-        if function is None or self.has_noise:
+        if self.kind.reading_sigma is None or self.has_noise:
             return None
         try:
-            sigma = np.array([function(side, self._sheet) for side in sides], dtype=np.float64)
+            variance = self.noise(np.array(sides))
         except Exception:  # the reading that it is about says which
             return None
-        if sigma.shape != (n, d) or not (isfinite(sigma.sum()) and sigma.min() >= 0.0):
-            return None
+        n, d = variance.shape
         more = np.zeros((n, d, d))
-        more[:, range(d), range(d)] = sigma**2 - self._sheet.sigma**2
+        more[:, range(d), range(d)] = variance - self._sheet.sigma**2
         return more
 
     def noise(self, side: Array) -> Array:

@@ -50,7 +50,7 @@ from .declared_errors import errors_of
 from .error_states import merged
 from .filtering import Aid
 from .inertial import InertialModel
-from .inertial_errors import ERROR
+from .inertial_errors import ERROR, TRIAD
 from .measurements import DVL, observe
 
 __all__ = ["DvlCalibrationModel", "DvlErrors"]
@@ -159,8 +159,9 @@ class DvlCalibrationModel(InertialModel):
         u, raw, to_body = np.empty(3), np.empty((3, ERROR.accelerometer_bias)), self.dcm.T
         observe.unchecked(Aid(DVL, sheet.lever_arm + dl, -1, -1), np.zeros(3), self._state(), u, raw)
         u *= -1.0  # measured minus predicted
-        turn = skew(self.raw_rate - self.bias[:3] - to_body @ earth_rate(float(self.position[0])))
-        acceleration = self.raw_force - self.bias[3:] + to_body @ self._gravity - turn @ (to_body @ self.velocity)
+        turn = skew(self.raw_rate - self.bias[TRIAD.gyroscopes] - to_body @ earth_rate(float(self.position[0])))
+        force = self.raw_force - self.bias[TRIAD.accelerometers]
+        acceleration = force + to_body @ self._gravity - turn @ (to_body @ self.velocity)
         u -= acceleration * tau
         s, across = skew(eta), skew(u)
         turned = _IDENTITY - s + 0.5 * (s @ s)

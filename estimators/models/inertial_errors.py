@@ -1,10 +1,13 @@
-"""Where the parts of an inertial state's error stand, in vectors and in rows and columns of matrices."""
+"""Where the parts of an inertial state's error stand, in vectors and in rows and columns of matrices.
+
+The six numbers of an IMU, such as its biases, have the same order: `TRIAD`.
+"""
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
-__all__ = ["ERROR", "PART", "InertialErrors", "InertialParts"]
+__all__ = ["ERROR", "PART", "TRIAD", "InertialErrors", "InertialParts", "Triads"]
 
 
 class InertialErrors(NamedTuple):
@@ -77,3 +80,13 @@ PART = InertialParts(
     motion=slice(ERROR.position, ERROR.attitude),
     navigation=slice(ERROR.position, ERROR.gyroscope_bias),
 )
+
+
+class Triads(NamedTuple):
+    """The components of six numbers of an IMU; in kernels, too."""
+
+    gyroscopes: slice = slice(0, 3)
+    accelerometers: slice = slice(3, 6)
+
+
+TRIAD = Triads()

@@ -34,7 +34,7 @@ from simnav.types import Array, Measurement
 
 from .filtering import Aid, Dynamics, ModelFunctions, Prediction, Readings, aid_of
 from .inertial import InertialModel
-from .inertial_errors import ERROR
+from .inertial_errors import ERROR, TRIAD
 from .inertial_functions import predict as linearise
 from .inertial_functions import propagate as propagate_linearised
 from .inertial_functions import retract, state_of
@@ -175,7 +175,7 @@ def observe_points(
     linear, scratch = np.zeros((3, n)), np.zeros((3, 12))
     at_state, reading = np.zeros(3), np.zeros(3)
     value = position  # any will do; for a fix, one nearby is the more accurate
-    v, b, m = velocity.copy(), bias[:3].copy(), dcm.copy()
+    v, b, m = velocity.copy(), bias[TRIAD.gyroscopes].copy(), dcm.copy()
     through = velocity.copy()  # the water, for a log
     if code == SPEED_LOG and bias_at >= 0:
         for j in range(2):

@@ -32,7 +32,7 @@ from simnav.types import KINDS, NO_SIDE, Array, Datasheet
 from .ambiguity import innovation_of
 from .channels import ChannelDatasheet, whole
 from .delayed import acceleration, is_delayed
-from .inertial_errors import PART
+from .inertial_errors import PART, TRIAD
 from .lever_arms import observation_of
 from .measurements import State
 
@@ -166,8 +166,10 @@ class MeasurementFunction:
             Side information of the reading.
         """
         position, velocity, dcm, rate, bias = state.position, state.velocity, state.dcm, state.rate, state.bias
-        turning = rate[:3] - bias[:3] - dcm.T @ earth_rate(position[0])
-        moved = acceleration(position, velocity, dcm, rate[3:] - bias[3:6]) if len(rate) == 6 else None
+        turning = rate[TRIAD.gyroscopes] - bias[TRIAD.gyroscopes] - dcm.T @ earth_rate(position[0])
+        moved = None
+        if len(rate) == 6:
+            moved = acceleration(position, velocity, dcm, rate[TRIAD.accelerometers] - bias[TRIAD.accelerometers])
         blocks = self.blocks(state.calibration)
         return NavigationPoint(time, position, velocity, dcm, turning, blocks, self.channel, side, moved)
 
@@ -446,11 +448,11 @@ class MeasurementFunction:
         """
         assert self.observations is not None
         k = len(errors)
-        blocks = {name: np.broadcast_to(zero, (k, len(zero))) for name, zero in self._zeros.items()}
+        blocks = {name: np.zeros((k, len(zero))) for name, zero in self._zeros.items()}
         for name, at in self._slices:
             blocks[name] = point.blocks[name] + errors[:, offset + at.start : offset + at.stop]
         channel = self._of_instrument.channels.index(self.channel) if self.channel else 0
-        side = np.broadcast_to(point.side, (k, *point.side.shape))
+        side = point.side[None].repeat(k, axis=0)
         points = NavigationPoints(
             time=np.full(k, point.time), **states._asdict(), blocks=blocks, channel=np.full(k, channel), side=side
         )

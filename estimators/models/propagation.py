@@ -38,7 +38,7 @@ from simnav.structures import structure
 from simnav.types import Array
 
 from .covariance_propagation import propagate_covariance
-from .inertial_errors import ERROR
+from .inertial_errors import ERROR, TRIAD
 
 __all__ = [
     "BLOCK",
@@ -409,8 +409,8 @@ def advance_inertial(
         Index of the first sample that is not completely used, and number of blocks.
     """
     position, velocity, dcm, turn = state.position, state.velocity, state.dcm, state.turn
-    gyroscope_bias, accelerometer_bias = state.bias[:3], state.bias[3:]
-    angle, change = state.increments[:3], state.increments[3:]
+    gyroscope_bias, accelerometer_bias = state.bias[TRIAD.gyroscopes], state.bias[TRIAD.accelerometers]
+    angle, change = state.increments[TRIAD.gyroscopes], state.increments[TRIAD.accelerometers]
     clock, imu = state.clock.view(CLOCK)[0], noise.view(IMU_NOISE)[0]
     eps = 1e-7
     before = np.empty((3, 3))

@@ -23,7 +23,7 @@ from simnav.recording import Recording
 from simnav.streams import stream
 from simnav.types import ImuDatasheet, ImuSamples, InitialState, Instruments, TriadDatasheet
 
-from .inertial_errors import ERROR
+from .inertial_errors import ERROR, TRIAD
 
 __all__ = ["levelled", "true_motion", "with_imu"]
 
@@ -61,8 +61,8 @@ def true_motion(recording: Recording) -> ImuSamples:
     noise /= np.sqrt(samples.interval)[:, None]
     return replace(
         samples,
-        angular_rate=samples.angular_rate + ANGLE_RANDOM_WALK * noise[:, :3],
-        specific_force=samples.specific_force + VELOCITY_RANDOM_WALK * noise[:, 3:],
+        angular_rate=samples.angular_rate + ANGLE_RANDOM_WALK * noise[:, TRIAD.gyroscopes],
+        specific_force=samples.specific_force + VELOCITY_RANDOM_WALK * noise[:, TRIAD.accelerometers],
     )
 
 

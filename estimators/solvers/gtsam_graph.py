@@ -25,7 +25,7 @@ from simnav.compiled import kernel
 from simnav.estimators.models.base import Linearised
 from simnav.estimators.models.filtering import Aid
 from simnav.estimators.models.inertial import InertialModel
-from simnav.estimators.models.inertial_errors import ERROR, PART
+from simnav.estimators.models.inertial_errors import ERROR, PART, TRIAD
 from simnav.estimators.models.measurements import (
     DVL,
     GNSS_POSITION,
@@ -107,7 +107,8 @@ def observe_tangent(
     there = GeodeticState(np.empty(3), np.empty(3), np.empty((3, 3)), np.empty((9, 9)))
     tangent_state(origin, axes, LocalState(state.rotation, state.place, state.speed), there, np.empty(3))
     nothing, ours = np.empty(0), np.empty((3, ERROR.calibration))
-    at = State(there.position, there.velocity, there.dcm, state.rate, state.bias[3:], nothing)
+    gyroscopes = state.bias[3:]  # GTSAM has them behind the accelerometers
+    at = State(there.position, there.velocity, there.dcm, state.rate, gyroscopes, nothing)
     d = observe_inertial(Aid(code, arm, -1, -1), value, at, error, ours)
     for i in range(d):
         error[i] = -error[i]
@@ -241,7 +242,8 @@ class InertialGraph:
         model, state = self.model, self.motion.predict()
         there = self._geodetic(state)
         model.position[:], model.velocity[:], model.dcm[:] = there.position, there.velocity, there.dcm
-        model.bias[:3], model.bias[3:] = self.motion.bias.gyroscope(), self.motion.bias.accelerometer()
+        model.bias[TRIAD.gyroscopes] = self.motion.bias.gyroscope()
+        model.bias[TRIAD.accelerometers] = self.motion.bias.accelerometer()
         model.raw_rate[:] = self.motion.rate
         return model.measure(measurement)
 

@@ -28,6 +28,7 @@ import numpy as np
 
 from simnav.compiled import kernel
 from simnav.estimators.models.base import NO_SAMPLES
+from simnav.estimators.models.inertial_errors import TRIAD
 from simnav.estimators.models.propagation import (
     CLOCK,
     HELD_ATTITUDE,
@@ -100,8 +101,8 @@ def imu_pieces(
     eps = 1e-7
     sampled = clock.view(CLOCK)[0]
     rate, force = sampled.mean_rate, sampled.mean_force
-    gyroscope, accelerometer = bias[:3], bias[3:]
-    angle, change = memory[:3], memory[3:]
+    gyroscope, accelerometer = bias[TRIAD.gyroscopes], bias[TRIAD.accelerometers]
+    angle, change = memory[TRIAD.gyroscopes], memory[TRIAD.accelerometers]
     t, i, count = sampled.time, first, 0
     while t < until - eps:
         covered = next_interval(sampled, samples, i, t, until, nominal)
@@ -182,7 +183,7 @@ class Preintegration:
         self._noise: Any = densities.view(IMU_NOISE)[0]
         self._frame = frame
         gyroscope, accelerometer = float(self._noise.gyroscope_walk), float(self._noise.accelerometer_walk)
-        of_gyroscopes, of_accelerometers = (LEAST_WALK * float(part[0]) for part in (variance[:3], variance[3:]))
+        of_gyroscopes, of_accelerometers = (LEAST_WALK * float(variance[triad][0]) for triad in TRIAD)
         self._walk = ImuNoise(
             max(gyroscope, of_gyroscopes, LEAST_WALK * LEAST_GYROSCOPE) * _EYE,
             max(accelerometer, of_accelerometers, LEAST_WALK * LEAST_ACCELEROMETER) * _EYE,
@@ -259,7 +260,7 @@ class Preintegration:
             self._end = None
         self.elapsed += elapsed
         used = held == 0.0
-        mean = (rate[used] - self._hat[:3]).T @ duration[used] / elapsed
+        mean = (rate[used] - self._hat[TRIAD.gyroscopes]).T @ duration[used] / elapsed
         self._turn += min(1.0, elapsed / TURN_TIME) * (mean - self._turn)
 
     def _hold(self, dt: float) -> None:
@@ -270,7 +271,7 @@ class Preintegration:
         force = 2.0 * np.cross(w, speed) + np.cross(w, np.cross(w, place)) - self._frame.gravity(place)
         p.setGyroscopeCovariance(self._white.gyroscope + HELD_ATTITUDE**2 * _EYE)
         p.setAccelerometerCovariance(self._white.accelerometer + HELD_VELOCITY**2 * _EYE)
-        force, rate = back @ force + self._hat[3:], back @ w + self._hat[:3]
+        force, rate = back @ force + self._hat[TRIAD.accelerometers], back @ w + self._hat[TRIAD.gyroscopes]
         parts = max(HELD_PARTS, ceil(dt / HELD_PART))
         for _ in range(parts):
             self._measurements.integrateMeasurement(force, rate, dt / parts)

@@ -14,6 +14,7 @@ from simnav.estimators.adaptations.truth import NominalNoise, TrueNoise, imu_fau
 from simnav.estimators.models.base import ErrorModel
 from simnav.estimators.models.fault_states import FaultStateModel
 from simnav.estimators.models.inertial import InertialModel
+from simnav.estimators.models.inertial_errors import TRIAD
 from simnav.estimators.models.true_motion import levelled, true_motion, with_imu
 from simnav.estimators.models.truth_linearised import TruthLinearisedModel
 from simnav.recording import Recording
@@ -137,7 +138,10 @@ class OracleEstimator(KalmanEstimator):
             times, error = self._imu_faults
             k = int(np.searchsorted(times, imu.time[0] - 1e-9))
             e = error[k : k + len(imu)]
-            imu = replace(imu, angular_rate=imu.angular_rate - e[:, :3], specific_force=imu.specific_force - e[:, 3:])
+            gyroscopes, accelerometers = e[:, TRIAD.gyroscopes], e[:, TRIAD.accelerometers]
+            imu = replace(
+                imu, angular_rate=imu.angular_rate - gyroscopes, specific_force=imu.specific_force - accelerometers
+            )
         estimate = super().update(Measurements(measurements.start, measurements.time, imu, aids))
         if self._motion is not None:
             estimate.estimated = ESTIMATED

@@ -19,6 +19,7 @@ from math import hypot, pi
 
 import numpy as np
 
+from simnav.compiled import helper
 from simnav.types import Array
 
 __all__ = ["NOMINAL_DENSITY_RATIO", "amplification", "density_ratio", "noise_factor", "range_error"]
@@ -46,6 +47,7 @@ def amplification(frequencies: int) -> float:
     return 1.0 if frequencies == 1 else _TWO_FREQUENCIES
 
 
+@helper
 def range_error(elevation: Array | float, signal: float, multipath: float) -> Array:
     """One sigma [m] of the error of a satellite's range that lasts for minutes.
 
@@ -58,5 +60,5 @@ def range_error(elevation: Array | float, signal: float, multipath: float) -> Ar
     multipath : float
         Error of the multipath in units of that of open surroundings [-].
     """
-    bounced = _MULTIPATH + _LOW_MULTIPATH * np.exp(-np.asarray(elevation) / _MULTIPATH_ANGLE)
+    bounced = _MULTIPATH + _LOW_MULTIPATH * np.exp(-elevation / _MULTIPATH_ANGLE)
     return np.hypot(signal, multipath * bounced)

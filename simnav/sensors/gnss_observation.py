@@ -51,8 +51,7 @@ _ANTENNA = structure(
     arm=3, swing=3, place=3, sin_latitude=float, cos_latitude=float, sin_longitude=float, cos_longitude=float
 )
 _ANTENNA_NUMBERS = length(_ANTENNA)
-_ELEVATION, _DENSITY_RATIO = ([c.name for c in SIDE].index(name) for name in ("elevation", "density_ratio"))
-_CLOCK = np.eye(2)
+_DENSITY_RATIO = [c.name for c in SIDE].index("density_ratio")
 
 
 @helper
@@ -134,10 +133,18 @@ class _Blocks(NamedTuple):
     ionosphere: Matrix
 
 
+class _Errors(NamedTuple):
+    """The errors of signals and of multipath that last for minutes, as of `range_error`."""
+
+    signal: float
+    multipath: float
+
+
 class _Jacobians(NamedTuple):
     """The derivatives of n readings by position, velocity and attitude (n, 2, 9), and by blocks (n, 2, ...)."""
 
     navigation: Stack
+    clock: Stack
     troposphere: Stack
     signals: Stack
     ionosphere: Stack
@@ -149,7 +156,7 @@ def _predict_all(
     arm: Vector,
     side: Matrix,
     channel: IntegerVector,
-    sigma: Vector,
+    errors: _Errors,
     blocks: _Blocks,
     reading: Matrix,
     jacobians: _Jacobians,
@@ -166,8 +173,8 @@ def _predict_all(
         Side information.
     channel : (n,) int array
         Channels.
-    sigma : (n,) array
-        One sigma of the lasting error of each range [m].
+    errors : _Errors
+        The lasting errors of ranges.
     blocks : _Blocks
         The states of the receiver.
     reading : (n, 2) array
@@ -190,11 +197,12 @@ def _predict_all(
             _antenna(position[i], dcm[i], rate[i], arm, antenna)
         _predict(antenna, states.velocity[i], side[i], reading[i], jacobians.navigation[i])
         seen, c = side[i].view(SEEN)[0], channel[i]
-        mapping = seen.mapping
+        mapping, sigma = seen.mapping, range_error(seen.elevation, errors.signal, errors.multipath)
         reading[i, 1] += clock[i, 1]
         x = reading[i, 0] + clock[i, 0]
-        x += seen.troposphere + mapping * blocks.troposphere[i, 0] + sigma[i] * blocks.signals[i, c]
-        jacobians.troposphere[i, 0, 0], jacobians.signals[i, 0, c] = mapping, sigma[i]
+        x += seen.troposphere + mapping * blocks.troposphere[i, 0] + sigma * blocks.signals[i, c]
+        jacobians.clock[i, 0, 0] = jacobians.clock[i, 1, 1] = 1.0
+        jacobians.troposphere[i, 0, 0], jacobians.signals[i, 0, c] = mapping, sigma
         if ionosphere.shape[1] > 0:
             x += seen.ionosphere * (1.0 + ionosphere[i, 0])
             jacobians.ionosphere[i, 0, 0] = seen.ionosphere
@@ -209,30 +217,20 @@ def observe(point: NavigationPoint, sheet: Datasheet) -> tuple[Array, dict[str, 
 def observe_all(points: NavigationPoints, sheet: Datasheet) -> tuple[Array, dict[str, Array]]:
     """The same for n readings (`simnav.kinds.Observations`)."""
     _, position, velocity, dcm, rate, blocks, channel, side = points
-    side = ready(side)
-    n, (sigma, frequencies) = len(position), _figures(sheet, side[:, _ELEVATION])
+    n, details = len(position), sheet.details
+    frequencies = int(details["frequencies"])
+    errors = _Errors(float(details["signal_error"]), float(details["multipath"]) * amplification(frequencies))
     reading, navigation, signals = np.empty((n, 2)), np.empty((n, 2, 9)), np.zeros((n, 2, len(sheet.channels)))
-    troposphere, ionosphere = np.zeros((n, 2, 1)), np.zeros((n, 2, 1))
+    clock, troposphere, ionosphere = np.zeros((n, 2, 2)), np.zeros((n, 2, 1)), np.zeros((n, 2, 1))
     delay = blocks["ionosphere"] if frequencies == 1 else np.empty((n, 0))
     states = _States(ready(position), ready(velocity), ready(dcm), ready(rate))
     receiver = _Blocks(ready(blocks["clock"]), ready(blocks["troposphere"]), ready(blocks["signals"]), ready(delay))
-    jacobians = _Jacobians(navigation, troposphere, signals, ionosphere)
-    _predict_all.unchecked(states, sheet.lever_arm, side, channel, sigma, receiver, reading, jacobians)
-    by_block = {
-        "navigation": navigation, "clock": np.broadcast_to(_CLOCK, (n, 2, 2)), "troposphere": troposphere,
-        "signals": signals,
-    }  # fmt: skip
+    jacobians = _Jacobians(navigation, clock, troposphere, signals, ionosphere)
+    _predict_all.unchecked(states, sheet.lever_arm, ready(side), channel, errors, receiver, reading, jacobians)
+    by_block = {"navigation": navigation, "clock": clock, "troposphere": troposphere, "signals": signals}
     if frequencies == 1:
         by_block["ionosphere"] = ionosphere
     return reading, by_block
-
-
-def _figures(sheet: Datasheet, elevation: Array) -> tuple[Array, int]:
-    """One sigma of the lasting error of each range [m], and the number of frequencies."""
-    details = sheet.details
-    frequencies = int(details["frequencies"])
-    multipath = details["multipath"] * amplification(frequencies)
-    return np.asarray(range_error(elevation, details["signal_error"], multipath)), frequencies
 
 
 def reading_sigma(side: Array, sheet: Datasheet) -> Array:
