@@ -44,7 +44,6 @@ import numpy as np
 
 from simnav.compiled import kernel
 from simnav.estimator.lookup import make
-from simnav.estimators.models.inertial_errors import TRIAD
 from simnav.geometry.earth import displace, earth_rate, gravity
 from simnav.geometry.rotation import (
     dcm_from_rotation_vector,
@@ -197,7 +196,8 @@ class CoarseAlignment:
         found, attitude = estimate.covariance, estimate.attitude
         if found is None or attitude is None or not found.diagonal()[6:].max() <= ENOUGH**2:
             return
-        dcm, _ = self._turned(self._filters.best.model.bias[TRIAD.gyroscopes])
+        gyroscope_bias = self._filters.best.model.bias[:3]
+        dcm, _ = self._turned(gyroscope_bias)
         position = self.start.position if estimate.position is None else estimate.position
         back = dcm_from_rotation_vector(earth_rate(float(position[0])) * (estimate.time - self.start.time))
         first = rpy_from_dcm(back @ dcm_from_rpy(attitude) @ dcm.T)
