@@ -16,6 +16,7 @@ program for the investigation of airborne multipath errors*, ION NTM 2005.
 from __future__ import annotations
 
 from math import hypot, pi
+from typing import TypeVar
 
 import numpy as np
 
@@ -23,6 +24,8 @@ from simnav.compiled import helper
 from simnav.types import Array
 
 __all__ = ["NOMINAL_DENSITY_RATIO", "amplification", "density_ratio", "noise_factor", "range_error"]
+
+Number = TypeVar("Number", float, Array)
 
 #: C/N0 at which datasheets state the noise [dB-Hz].
 NOMINAL_DENSITY_RATIO = 45.0
@@ -37,9 +40,10 @@ def density_ratio(elevation: Array) -> Array:
     return np.asarray(_AT_HORIZON + _GAIN * np.sin(elevation))
 
 
-def noise_factor(ratio: Array | float) -> Array:
+def noise_factor(ratio: Number) -> Number:
     """The white noise in units of that of the datasheet, from C/N0 [dB-Hz] of any shape."""
-    return np.asarray(10.0 ** ((NOMINAL_DENSITY_RATIO - ratio) / 20.0))
+    factor: Number = 10.0 ** ((NOMINAL_DENSITY_RATIO - ratio) / 20.0)
+    return factor
 
 
 def amplification(frequencies: int) -> float:

@@ -235,11 +235,9 @@ def observe_all(points: NavigationPoints, sheet: Datasheet) -> tuple[Array, dict
 
 def reading_sigma(side: Array, sheet: Datasheet) -> Array:
     """The white noise of readings, from their C/N0 (`simnav.kinds.ReadingSigma`)."""
-    amplified = amplification(int(sheet.details["frequencies"]))
-    if side.ndim == 1:  # the same in less time
-        factor = float(noise_factor(side[_DENSITY_RATIO]))
-        pseudorange, rate = sheet.sigma.tolist()
-        return np.array([pseudorange * factor * amplified, rate * factor])
-    sigma: Array = sheet.sigma * noise_factor(side[..., _DENSITY_RATIO])[..., None]
-    sigma[..., 0] *= amplified
+    ratio = side[..., _DENSITY_RATIO]
+    # Each by itself: functions of NumPy may differ in the last digit between one number and many.
+    factor = np.array([noise_factor(each) for each in ratio.ravel().tolist()]).reshape(ratio.shape)
+    sigma: Array = sheet.sigma * factor[..., None]
+    sigma[..., 0] *= amplification(int(sheet.details["frequencies"]))
     return sigma
