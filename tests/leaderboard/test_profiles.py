@@ -47,13 +47,14 @@ def test_standard_has_the_same_seeds_for_all_rows_of_a_track():
     assert 20 <= len(chosen) <= 25
     loose = {n for n in names() if getattr(find(n), "loose", False)}
     special = {"satellites": loose, "acoustic": loose, "cooperative": {"ekf-ci"}, "terrain": loose | {"terrain-pmf"}}
-    few = {"papers": 10, "long": 10, "coloured": 8, "robustness": 8} | dict.fromkeys(special, 8)
+    with_chosen = dict.fromkeys(special, 30) | dict.fromkeys(("coloured", "robustness", "satellites", "acoustic"), 8)
+    with_chosen |= {"papers": 10, "long": 10}
     slow = {"terrain-pmf"}  # the only row that matches soundings with the chart by itself
     assert {row for _, row in most} == slow | {n for n in names() if not describe(n).slow}
     for (scenario, row), runs in most.items():
         track = known[scenario].track
-        assert runs == (6 if scenario == "twelve-hours" else few.get(track, 30))
-        assert track not in few or row in chosen | special.get(track, set())
+        assert runs == (6 if scenario == "twelve-hours" else with_chosen.get(track, 30))
+        assert track not in with_chosen or row in chosen | special.get(track, set())
 
 
 def test_a_profile_of_ones_own(tmp_path: Path):
