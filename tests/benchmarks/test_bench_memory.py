@@ -112,23 +112,22 @@ class Sea:
         """By how much it grows between the two numbers of epochs, or in a later part if that is less [bytes]."""
         first, second = pieces
         ends = range(first, min(first + PARTS * (second - first), len(self.steps)) + 1, second - first)
-        amounts: dict[int, int] = {}
+        amounts: list[int] = []
         epoch = 0
 
         def look() -> None:
             nonlocal epoch
             epoch += 1
-            if epoch in ends and epoch not in amounts:
+            if epoch in ends:
                 gc.collect()
-                amounts[epoch] = held()
+                amounts.append(held())
 
         tracemalloc.start()
         try:
             self.run(estimator, ends[-1], look)
         finally:
             tracemalloc.stop()
-        held_at = list(amounts.values())
-        return min(later - earlier for earlier, later in itertools.pairwise(held_at))
+        return min(later - earlier for earlier, later in itertools.pairwise(amounts))
 
     def native(self, name: str, seconds: int) -> int:
         """Peak of what the C library has given out since the start [bytes]."""
