@@ -14,7 +14,7 @@ the estimate after the step, with the datasheet's noise, bias and the covariance
 from __future__ import annotations
 
 from dataclasses import replace
-from math import cos, hypot, isfinite, nan, sin, sqrt
+from math import cos, isfinite, sin, sqrt
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -23,18 +23,20 @@ from simnav.compiled import helper, kernel, ready
 from simnav.estimates import Estimates
 from simnav.estimators.algebra.chi_square import chi_square_limits, normal_quantile
 from simnav.geometry.earth import radii_scalar
+from simnav.geometry.rotation import wrap_scalar
 from simnav.kernel_types import IntegerVector, Matrix, Vector
 from simnav.kinds import kinds_with
 from simnav.records import Record
 from simnav.steps import Steps
 from simnav.types import Array, Datasheet, Estimate, Instruments, Measurement, Measurements
 
+from .models.inertial_errors import PART
 from .persistence import Courses, add_innovation, is_correlated, is_large, no_innovations
 
 __all__ = ["FixTest"]
 
 _SAME = 1e-6  # a fix from before the step by less than this is of the step [s]
-_STILL = np.zeros(3)
+_STILL, _UNKNOWN = np.zeros(3), np.full(3, np.nan)
 
 
 class _Limits(NamedTuple):
@@ -53,6 +55,14 @@ class _Limits(NamedTuple):
     distance: float
 
 
+class _Before(NamedTuple):
+    """The estimate before: its time (1,), velocity and attitude (3,); the time is NaN before the first."""
+
+    time: Vector
+    velocity: Vector
+    attitude: Vector
+
+
 class _Receivers(Record):
     """The r receivers of a run, and the course of each.
 
@@ -60,19 +70,22 @@ class _Receivers(Record):
     ----------
     courses : Courses
         Their recent fixes.
+    before : _Before
+        The estimate before the present one.
     against : (r,) array of int
         How many fixes in a row contradict the estimate.
-    arm : (r, 2) array
-        Horizontal lever arm, forward and starboard [m].
+    arm : (r, 3) array
+        Lever arm, forward, starboard and down [m].
     variance : (r, 2) array
         Variances of a fix, north and east [m^2].
     swing : (r,) array
-        Square of the lever arm, which is the variance of a fix where the heading is not known [m^2].
+        Square of the horizontal lever arm: the variance of a fix where the heading is not known [m^2].
     limits : _Limits
         Of the test.
     """
 
     courses: Courses
+    before: _Before
     against: IntegerVector
     arm: Matrix
     variance: Matrix
@@ -81,43 +94,86 @@ class _Receivers(Record):
 
 
 class _Estimate(NamedTuple):
-    """An estimate with which a fix is compared: its time and vectors, and the variances north and east [m^2]."""
+    """An estimate with which a fix is compared.
+
+    Attributes
+    ----------
+    time : float
+        Its time [s].
+    position, velocity, attitude : (3,) arrays
+        As of `simnav.types.Estimate`.
+    position_variance, attitude_variance : (3,) arrays
+        Of the covariance, north, east and down [m^2], [rad^2].
+    """
 
     time: float
     position: Vector
     velocity: Vector
-    heading: float
-    north: float
-    east: float
+    attitude: Vector
+    position_variance: Vector
+    attitude_variance: Vector
+
+
+@helper
+def _turned(arm: Vector, roll: float, pitch: float, heading: float) -> tuple[float, float, float]:
+    """A vector in body axes, turned to north, east and down."""
+    sr, cr, sp, cp, s, c = sin(roll), cos(roll), sin(pitch), cos(pitch), sin(heading), cos(heading)
+    starboard, below = cr * arm[1] - sr * arm[2], sr * arm[1] + cr * arm[2]
+    forward = cp * arm[0] + sp * below
+    return c * forward - s * starboard, s * forward + c * starboard, cp * below - sp * arm[0]
+
+
+@helper
+def _between(angle: float, before: float, share: float) -> float:
+    """An angle that changes in proportion to time, at a share of the step from its end (0 or less)."""
+    return angle + share * wrap_scalar(angle - before)
 
 
 @helper
 def _add_fix(receivers: _Receivers, row: int, time: float, latitude: float, longitude: float, estimate: Any) -> None:
     """Compare a fix with the estimate after its step.
 
-    The lever arm is turned by the heading; roll and pitch move it by less than a fix.
+    The estimate is carried back to the time of the fix, by velocity and angles that change in proportion to time. The
+    antenna is on its lever arm, and an error of the attitude moves it.
     """
-    north = east = 0.0
-    first, second = receivers.variance[row, 0], receivers.variance[row, 1]
-    if time != estimate.time:
-        later = time - estimate.time
-        north, east = later * estimate.velocity[0], later * estimate.velocity[1]
-    forward, starboard = receivers.arm[row, 0], receivers.arm[row, 1]
-    if forward != 0.0 or starboard != 0.0:
-        if isfinite(estimate.heading):
-            c, s = cos(estimate.heading), sin(estimate.heading)
-            north, east = north + c * forward - s * starboard, east + s * forward + c * starboard
+    first = receivers.variance[row, 0] + estimate.position_variance[0]
+    second = receivers.variance[row, 1] + estimate.position_variance[1]
+    velocity, angles, before = estimate.velocity, estimate.attitude, receivers.before
+    later = time - estimate.time
+    share = later / (estimate.time - before.time[0])
+    if not isfinite(share):
+        share = 0.0
+    north = later * (velocity[0] + 0.5 * share * (velocity[0] - before.velocity[0]))
+    east = later * (velocity[1] + 0.5 * share * (velocity[1] - before.velocity[1]))
+    arm = receivers.arm[row]
+    if arm[0] != 0.0 or arm[1] != 0.0 or arm[2] != 0.0:
+        roll = _between(angles[0], before.attitude[0], share)
+        pitch = _between(angles[1], before.attitude[1], share)
+        heading = _between(angles[2], before.attitude[2], share)
+        if isfinite(roll + pitch + heading):
+            x, y, z = _turned(arm, roll, pitch, heading)
+            north, east, turned = north + x, east + y, estimate.attitude_variance
+            first += z * z * turned[1] + y * y * turned[2]
+            second += z * z * turned[0] + x * x * turned[2]
         else:  # it lies in some direction
             first, second = first + receivers.swing[row], second + receivers.swing[row]
     position, limits, course = estimate.position, receivers.limits, receivers.courses
     meridian, prime_vertical = radii_scalar(sin(position[0]))
     north = (latitude - position[0]) * (meridian + position[2]) - north
     east = (longitude - position[1]) * (prime_vertical + position[2]) * cos(position[0]) - east
-    u, v = north / sqrt(estimate.north + first), east / sqrt(estimate.east + second)
+    u, v = north / sqrt(first), east / sqrt(second)
     if isfinite(u + v):
         add_innovation(course, row, u, v, 0.0, 2, time, u * u + v * v > limits.square)
         against = is_correlated(course, row, limits.direction) and is_large(course, row, limits.distance)
         receivers.against[row] = receivers.against[row] + 1 if against else 0
+
+
+@kernel
+def _keep(before: _Before, time: float, velocity: Vector, attitude: Vector) -> None:
+    """Keep an estimate for the next step."""
+    before.time[0] = time
+    for axis in range(3):
+        before.velocity[axis], before.attitude[axis] = velocity[axis], attitude[axis]
 
 
 @kernel
@@ -147,13 +203,14 @@ class _Fixes(NamedTuple):
 
 
 class _Answers(NamedTuple):
-    """The estimates of t steps: time (t,), position and velocity (t, 3), heading (t,), variances (t, 2)."""
+    """The estimates of t steps: time (t,), and (t, 3) arrays of all that an `_Estimate` has."""
 
     time: Vector
     position: Matrix
     velocity: Matrix
-    heading: Vector
-    variance: Matrix
+    attitude: Matrix
+    position_variance: Matrix
+    attitude_variance: Matrix
 
 
 @kernel
@@ -163,12 +220,13 @@ def _judge_fixes(receivers: _Receivers, fixes: _Fixes, answers: _Answers, worst:
     for step in range(worst.size):
         while k < fixes.step.size and fixes.step[k] == step:
             estimate = _Estimate(
-                answers.time[step], answers.position[step], answers.velocity[step], answers.heading[step],
-                answers.variance[step, 0], answers.variance[step, 1],
+                answers.time[step], answers.position[step], answers.velocity[step], answers.attitude[step],
+                answers.position_variance[step], answers.attitude_variance[step],
             )  # fmt: skip
             _add_fix(receivers, fixes.receiver[k], fixes.time[k], fixes.place[k, 0], fixes.place[k, 1], estimate)
             against = receivers.against.max()
             k += 1
+        _keep(receivers.before, answers.time[step], answers.velocity[step], answers.attitude[step])
         worst[step] = against
 
 
@@ -194,11 +252,12 @@ class FixTest:
         kinds = kinds_with("position", "horizontal_position")
         sheets = [s for s in instruments.values() if s.kind in kinds]
         self._rows = {sheet.name: row for row, sheet in enumerate(sheets)}
-        arms = np.array([sheet.lever_arm[:2] for sheet in sheets]).reshape(-1, 2)
+        arms = np.array([sheet.lever_arm for sheet in sheets]).reshape(-1, 3)
         self._receivers = _Receivers(
-            courses=no_innovations(len(sheets)), against=np.zeros(len(sheets), np.int64), arm=arms,
+            courses=no_innovations(len(sheets)), before=_Before(np.full(1, np.nan), np.zeros(3), np.zeros(3)),
+            against=np.zeros(len(sheets), np.int64), arm=arms,
             variance=np.array([_variance(sheet)[:2] for sheet in sheets]).reshape(-1, 2),
-            swing=np.array([hypot(*arm) ** 2 for arm in arms.tolist()]),
+            swing=np.sum(arms[:, :2] ** 2, axis=1),
             limits=_Limits(
                 square=chi_square_limits(self.SOUND)[2], direction=normal_quantile(self.PERSISTENT),
                 distance=normal_quantile(self.SOUND),
@@ -221,19 +280,17 @@ class FixTest:
         Estimate
         """
         if self._rows and estimate.position is not None and estimate.covariance is not None:
+            answer = _answer(estimate, estimate.position, estimate.covariance)
             for m in measurements.aids:
                 if m.instrument in self._rows and m.time > measurements.start - _SAME:
-                    self._add(m, estimate, estimate.position, estimate.covariance)
+                    self._add(m, answer)
+            _keep.unchecked(self._receivers.before, answer.time, answer.velocity, answer.attitude)
         if not self.contradicted:
             return estimate
         return replace(estimate, diagnostics={**estimate.diagnostics, "inconsistent": 1.0})
 
-    def _add(self, m: Measurement, estimate: Estimate, position: Array, covariance: Array) -> None:
+    def _add(self, m: Measurement, answer: _Estimate) -> None:
         """Add a fix of this step."""
-        velocity = _STILL if estimate.velocity is None else ready(estimate.velocity)
-        heading = nan if estimate.attitude is None else float(estimate.attitude[2])
-        variances = float(covariance[0, 0]), float(covariance[1, 1])
-        answer = _Estimate(estimate.time, ready(position), velocity, heading, *variances)
         fix: list[float] = m.value.tolist()
         worst = _judge_fix.unchecked(self._receivers, self._rows[m.instrument], (m.time, fix[0], fix[1]), answer)
         self.contradicted = worst >= self.PATIENCE
@@ -246,11 +303,12 @@ class FixTest:
         rows, step, starts = steps.rows_of(self._rows), steps.step, np.array([steps.start, *steps.ends[:-1]])
         at = np.flatnonzero((rows >= 0) & (steps.time > starts[step] - _SAME))
         fixes = _Fixes(step[at], rows[at], steps.time[at], np.ascontiguousarray(steps.value[at, :2]))
+        variance = covariance.diagonal(axis1=1, axis2=2)
         answers = _Answers(
             ready(estimates.time), ready(position),
             np.zeros((t, 3)) if estimates.velocity is None else ready(estimates.velocity),
-            np.full(t, nan) if estimates.attitude is None else ready(estimates.attitude[:, 2]),
-            ready(covariance.diagonal(axis1=1, axis2=2)[:, :2]),
+            np.full((t, 3), np.nan) if estimates.attitude is None else ready(estimates.attitude),
+            ready(variance[:, PART.position]), ready(variance[:, PART.attitude]),
         )  # fmt: skip
         worst = np.empty(t, np.int64)
         _judge_fixes.unchecked(self._receivers, fixes, answers, worst)
@@ -258,6 +316,16 @@ class FixTest:
         self.contradicted = bool(contradicted[-1])
         if contradicted.any():
             estimates.diagnostics["inconsistent"] = np.where(contradicted, 1.0, estimates.diagnostics["inconsistent"])
+
+
+def _answer(estimate: Estimate, position: Array, covariance: Array) -> _Estimate:
+    """An estimate as the kernels take it."""
+    variance = covariance.diagonal()
+    return _Estimate(
+        estimate.time, ready(position), ready(_STILL if estimate.velocity is None else estimate.velocity),
+        ready(_UNKNOWN if estimate.attitude is None else estimate.attitude), ready(variance[PART.position]),
+        ready(variance[PART.attitude]),
+    )  # fmt: skip
 
 
 def _variance(sheet: Datasheet) -> Array:
