@@ -44,6 +44,7 @@ from simnav.types import Array, Estimate, InitialState, Instruments, Measurement
 
 from .coarse_alignment import CoarseAlignment
 from .fix_test import FixTest
+from .range_test import RangeTest
 
 if typing.TYPE_CHECKING:
     from simnav.recording import Recording
@@ -71,6 +72,8 @@ class Solver(Estimator):
     refuses: ClassVar[Mapping[str, str]] = {}
     row: str = ""
     reports_all: bool = False
+    #: False for a solver that takes its moments from points or particles.
+    linearises: ClassVar[bool] = True
     #: True for a solver that searches an unknown heading by itself, so that its row does not wait for one.
     searches_heading: ClassVar[bool] = False
 
@@ -224,7 +227,7 @@ class Row(Estimator):
     #: What is done with readings that arrive late: the parameter ``late`` of `simnav.estimator.make`.
     late: Manner = "replay"
     _late: LateArrivals | None = None
-    _fix_test: FixTest | None = None
+    _tests: Sequence[FixTest | RangeTest] = ()
     _alignment: CoarseAlignment | None = None
     _truth: TrueTimes | None = None
     _shared: Sequence[object] = ()
@@ -265,6 +268,11 @@ class Row(Estimator):
         return bool({"adaptation", "weighting"} & self.recipe.keys()) or getattr(self.solver, "sets_aside", False)
 
     @property
+    def linearises(self) -> bool:
+        """Whether the row uses a reading by its derivatives at the row's own estimate."""
+        return not self.reference and getattr(self.solver, "linearises", True)
+
+    @property
     def needs(self) -> Needs:
         """The instruments that its solver needs; and one that solves raw readings, if it is loosely coupled."""
         return (*self.solver.needs, _SOLUTIONS) if self.loose else self.solver.needs
@@ -296,9 +304,15 @@ class Row(Estimator):
             raise UnsuitableScenario(f"{self.name}: {lack}")
         self._instruments = instruments = self._used(instruments)
         self._late = self._late_arrivals() if any(sheet.timing for sheet in instruments.values()) else None
-        self._fix_test = FixTest(instruments) if self.sets_aside else None
+        self._tests = self._self_tests(instruments)
         self.solver.reset(start, instruments)
         self._alignment = CoarseAlignment(start, instruments) if self._waits(start) else None
+
+    def _self_tests(self, instruments: Instruments) -> Sequence[FixTest | RangeTest]:
+        """What the row tests of itself beside what its solver tests."""
+        tests: list[FixTest | RangeTest] = [FixTest(instruments)] if self.sets_aside else []
+        ranges = RangeTest(instruments)
+        return [*tests, ranges] if ranges and self.linearises else tests
 
     def _waits(self, start: InitialState) -> bool:
         """Whether the row cannot begin before it knows its attitude."""
@@ -329,15 +343,17 @@ class Row(Estimator):
             estimate = self.solver.update(measurements)
         else:
             self.solver, estimate = self._late.update(self.solver, measurements)
-        return estimate if self._fix_test is None else self._fix_test.judge(measurements, estimate)
+        for test in self._tests:
+            estimate = test.judge(measurements, estimate)
+        return estimate
 
     def update_all(self, steps: Steps) -> Estimates | None:
         """Take several steps by one call, if the solver does and no reading is late."""
         if self._late is not None or type(self).update is not Row.update or are_untimely(steps):
             return None
         estimates = self.solver.update_all(steps)
-        if estimates is not None and self._fix_test is not None:
-            self._fix_test.judge_all(steps, estimates)
+        for test in self._tests if estimates is not None else ():
+            test.judge_all(steps, estimates)
         return estimates
 
     def smooth(self) -> NavigationStates | None:

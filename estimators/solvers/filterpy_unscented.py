@@ -51,6 +51,7 @@ class FilterpyUnscentedEstimator(Solver, FilterpyEstimator):
     """
 
     pieces = ("model",)
+    linearises = False
     refuses: ClassVar[Mapping[str, str]] = dict.fromkeys(
         ("adaptation", "weighting", "isolation", "iteration", "smoother"),
         "filterpy's filter works alone, to be compared with SigmaPointEstimator",

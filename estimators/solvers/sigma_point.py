@@ -55,6 +55,7 @@ class SigmaPointEstimator(KalmanEstimator):
     """
 
     pieces = ("model", "adaptation")
+    linearises = False
     refuses: ClassVar[Mapping[str, str]] = {
         **KalmanEstimator.refuses,
         "iteration": "it linearises no measurement",
