@@ -11,22 +11,29 @@ than this, so the test detects less. Successive windows share most of their meas
 cost of many windows improbable. Therefore the test reports an inconsistency only if the cost has been improbable for
 `PATIENCE` epochs in a row.
 
+A window that was drawn away by wrong measurements agrees with them as soon as all that contradicted them has left it.
+Its position does not come back by that. So it is still reported while at least `LASTING` of the last `LONG` epochs were
+improbable; the covariance is then that of the window as it is.
+
 Source: P. J. G. Teunissen, *Testing Theory*, VSSD, 2006 (overall model test); the normal approximation is E. B. Wilson
 and M. M. Hilferty, "The distribution of chi-square", Proc. Nat. Acad. Sci. 17(12), 1931.
 """
 
 from __future__ import annotations
 
+from collections import deque
 from math import sqrt
 
 from simnav.compiled import helper
 
-__all__ = ["IMPROBABLE", "PATIENCE", "CostTest", "chi_square_deviate"]
+__all__ = ["IMPROBABLE", "LASTING", "LONG", "PATIENCE", "CostTest", "chi_square_deviate"]
 
 #: Standard normal deviate beyond which a cost is improbable (one in 30 000).
 IMPROBABLE = 4.0
 #: Epochs in a row for which it must be improbable.
 PATIENCE = 5
+#: Number of epochs that are remembered: as many as a filter sums up. So many of them must have been improbable.
+LONG, LASTING = 100, 20
 
 
 @helper
@@ -62,6 +69,12 @@ class CostTest:
     def __init__(self) -> None:
         self.variance_factor = float("nan")
         self._improbable = 0
+        self._recent: deque[bool] = deque(maxlen=LONG)
+
+    @property
+    def lasting(self) -> bool:
+        """Whether so many of the last epochs had an improbable sum that the estimate may still be wrong."""
+        return self.inconsistent or (len(self._recent) == LONG and sum(self._recent) >= LASTING)
 
     @property
     def inconsistent(self) -> bool:
@@ -78,4 +91,6 @@ class CostTest:
         if freedom > 0.0:
             squares = 2.0 * cost
             self.variance_factor = squares / freedom
-            self._improbable = self._improbable + 1 if chi_square_deviate(squares, freedom) > IMPROBABLE else 0
+            improbable = chi_square_deviate(squares, freedom) > IMPROBABLE
+            self._improbable = self._improbable + 1 if improbable else 0
+            self._recent.append(improbable)

@@ -252,7 +252,7 @@ class WindowEstimator(LooksBack, Solver):
         if self._owners:
             diagnostics.update(summary(diagnostics, self._owners, self._mean_labels))
         estimate = chain.estimate(chain.predicted_covariance(self.covariance))
-        diagnostics["inconsistent"] = float(self._cost_test.inconsistent)
+        diagnostics["inconsistent"] = float(self._cost_test.lasting)
         if self._cost_test.inconsistent and estimate.covariance is not None:
             estimate.covariance *= self._cost_test.inflation
             wider = self._cost_test.inflation**0.5

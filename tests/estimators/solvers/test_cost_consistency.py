@@ -8,7 +8,7 @@ from scipy import stats
 
 import simnav
 from simnav.estimator import make
-from simnav.estimators.solvers.cost_consistency import PATIENCE, CostTest, chi_square_deviate
+from simnav.estimators.solvers.cost_consistency import LASTING, LONG, PATIENCE, CostTest, chi_square_deviate
 from simnav.scenario import load
 
 
@@ -34,6 +34,25 @@ def test_it_speaks_after_a_few_improbable_epochs_and_falls_silent_again():
     test.add(50.0, 100.0)
     assert not test.inconsistent
     assert test.inflation == 1.0
+
+
+def test_it_remembers_for_a_while_but_only_inflates_in_time():
+    """A window that was drawn away agrees with what did it; a few improbable epochs are soon forgotten."""
+
+    def after(improbable: int) -> list[bool]:
+        test, found = CostTest(), []
+        for k in range(3 * LONG):
+            test.add(200.0 if LONG <= k < LONG + improbable else 50.0, 100.0)
+            assert test.lasting or not test.inconsistent
+            assert (test.inflation > 1.0) == test.inconsistent
+            found.append(test.lasting)
+        return found
+
+    long, short = after(LASTING), after(LASTING - 1)
+    assert all(long[LONG + LASTING : 2 * LONG])
+    assert not any(long[: LONG + PATIENCE - 1])
+    assert not any(long[2 * LONG + 1 :])
+    assert sum(short) == LASTING - PATIENCE
 
 
 @pytest.mark.parametrize(
@@ -67,7 +86,7 @@ def test_the_reported_covariance_is_multiplied_by_the_variance_factor():
     for packet in recording.steps():
         estimate = estimator.update(packet)
         believed = estimator.chain.predicted_covariance(estimator.covariance)[:9, :9]
-        if estimate.diagnostics["inconsistent"]:
+        if estimator._cost_test.inconsistent:
             seen += 1
             assert estimate.diagnostics["variance_factor"] > 1.0
             np.testing.assert_allclose(estimate.covariance, estimate.diagnostics["variance_factor"] * believed)
