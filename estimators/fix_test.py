@@ -24,13 +24,13 @@ from simnav.estimates import Estimates
 from simnav.estimators.algebra.chi_square import chi_square_limits, normal_quantile
 from simnav.geometry.earth import radii_scalar
 from simnav.geometry.rotation import wrap_scalar
-from simnav.kernel_types import IntegerVector, Matrix, Vector
+from simnav.kernel_types import IntegerVector, Matrix, Stack, Vector
 from simnav.kinds import kinds_with
 from simnav.records import Record
 from simnav.steps import Steps
 from simnav.types import Array, Datasheet, Estimate, Instruments, Measurement, Measurements
 
-from .models.inertial_errors import PART
+from .models.inertial_errors import ERROR
 from .persistence import Courses, add_innovation, is_correlated, is_large, no_innovations
 
 __all__ = ["FixTest"]
@@ -102,16 +102,15 @@ class _Estimate(NamedTuple):
         Its time [s].
     position, velocity, attitude : (3,) arrays
         As of `simnav.types.Estimate`.
-    position_variance, attitude_variance : (3,) arrays
-        Of the covariance, north, east and down [m^2], [rad^2].
+    covariance : (9, 9) array
+        Of the error of position, velocity and attitude.
     """
 
     time: float
     position: Vector
     velocity: Vector
     attitude: Vector
-    position_variance: Vector
-    attitude_variance: Vector
+    covariance: Matrix
 
 
 @helper
@@ -136,8 +135,9 @@ def _add_fix(receivers: _Receivers, row: int, time: float, latitude: float, long
     The estimate is carried back to the time of the fix, by velocity and angles that change in proportion to time. The
     antenna is on its lever arm, and an error of the attitude moves it.
     """
-    first = receivers.variance[row, 0] + estimate.position_variance[0]
-    second = receivers.variance[row, 1] + estimate.position_variance[1]
+    covariance = estimate.covariance
+    first = receivers.variance[row, 0] + covariance[ERROR.position, ERROR.position]
+    second = receivers.variance[row, 1] + covariance[ERROR.position + 1, ERROR.position + 1]
     velocity, angles, before = estimate.velocity, estimate.attitude, receivers.before
     later = time - estimate.time
     share = later / (estimate.time - before.time[0])
@@ -152,9 +152,10 @@ def _add_fix(receivers: _Receivers, row: int, time: float, latitude: float, long
         heading = _between(angles[2], before.attitude[2], share)
         if isfinite(roll + pitch + heading):
             x, y, z = _turned(arm, roll, pitch, heading)
-            north, east, turned = north + x, east + y, estimate.attitude_variance
-            first += z * z * turned[1] + y * y * turned[2]
-            second += z * z * turned[0] + x * x * turned[2]
+            north, east, turn = north + x, east + y, ERROR.attitude
+            heading_variance = covariance[turn + 2, turn + 2]
+            first += z * z * covariance[turn + 1, turn + 1] + y * y * heading_variance
+            second += z * z * covariance[turn, turn] + x * x * heading_variance
         else:  # it lies in some direction
             first, second = first + receivers.swing[row], second + receivers.swing[row]
     position, limits, course = estimate.position, receivers.limits, receivers.courses
@@ -203,14 +204,13 @@ class _Fixes(NamedTuple):
 
 
 class _Answers(NamedTuple):
-    """The estimates of t steps: time (t,), and (t, 3) arrays of all that an `_Estimate` has."""
+    """The estimates of t steps: time (t,), vectors (t, 3) and covariance (t, 9, 9)."""
 
     time: Vector
     position: Matrix
     velocity: Matrix
     attitude: Matrix
-    position_variance: Matrix
-    attitude_variance: Matrix
+    covariance: Stack
 
 
 @kernel
@@ -221,7 +221,7 @@ def _judge_fixes(receivers: _Receivers, fixes: _Fixes, answers: _Answers, worst:
         while k < fixes.step.size and fixes.step[k] == step:
             estimate = _Estimate(
                 answers.time[step], answers.position[step], answers.velocity[step], answers.attitude[step],
-                answers.position_variance[step], answers.attitude_variance[step],
+                answers.covariance[step],
             )  # fmt: skip
             _add_fix(receivers, fixes.receiver[k], fixes.time[k], fixes.place[k, 0], fixes.place[k, 1], estimate)
             against = receivers.against.max()
@@ -303,12 +303,11 @@ class FixTest:
         rows, step, starts = steps.rows_of(self._rows), steps.step, np.array([steps.start, *steps.ends[:-1]])
         at = np.flatnonzero((rows >= 0) & (steps.time > starts[step] - _SAME))
         fixes = _Fixes(step[at], rows[at], steps.time[at], np.ascontiguousarray(steps.value[at, :2]))
-        variance = covariance.diagonal(axis1=1, axis2=2)
         answers = _Answers(
             ready(estimates.time), ready(position),
             np.zeros((t, 3)) if estimates.velocity is None else ready(estimates.velocity),
             np.full((t, 3), np.nan) if estimates.attitude is None else ready(estimates.attitude),
-            ready(variance[:, PART.position]), ready(variance[:, PART.attitude]),
+            ready(covariance),
         )  # fmt: skip
         worst = np.empty(t, np.int64)
         _judge_fixes.unchecked(self._receivers, fixes, answers, worst)
@@ -320,11 +319,9 @@ class FixTest:
 
 def _answer(estimate: Estimate, position: Array, covariance: Array) -> _Estimate:
     """An estimate as the kernels take it."""
-    variance = covariance.diagonal()
     return _Estimate(
         estimate.time, ready(position), ready(_STILL if estimate.velocity is None else estimate.velocity),
-        ready(_UNKNOWN if estimate.attitude is None else estimate.attitude), ready(variance[PART.position]),
-        ready(variance[PART.attitude]),
+        ready(_UNKNOWN if estimate.attitude is None else estimate.attitude), ready(covariance),
     )  # fmt: skip
 
 
