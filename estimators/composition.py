@@ -352,8 +352,9 @@ class Row(Estimator):
         if self._late is not None or type(self).update is not Row.update or are_untimely(steps):
             return None
         estimates = self.solver.update_all(steps)
-        for test in self._tests if estimates is not None else ():
-            test.judge_all(steps, estimates)
+        if estimates is not None:
+            for test in self._tests:
+                test.judge_all(steps, estimates)
         return estimates
 
     def smooth(self) -> NavigationStates | None:
