@@ -30,11 +30,12 @@ from simnav.records import Record
 from simnav.steps import Steps
 from simnav.types import Array, Datasheet, Estimate, Instruments, Measurement, Measurements
 
-from .models.inertial_errors import ERROR
 from .persistence import Courses, add_innovation, is_correlated, is_large, no_innovations
 
 __all__ = ["FixTest"]
 
+#: Rows of `simnav.types.Estimate.covariance`: errors of position, and of the attitude about the axes.
+NORTH, EAST, ABOUT_NORTH, ABOUT_EAST, ABOUT_DOWN = 0, 1, 6, 7, 8
 _SAME = 1e-6  # a fix from before the step by less than this is of the step [s]
 _STILL, _UNKNOWN = np.zeros(3), np.full(3, np.nan)
 
@@ -136,8 +137,8 @@ def _add_fix(receivers: _Receivers, row: int, time: float, latitude: float, long
     antenna is on its lever arm, and an error of the attitude moves it.
     """
     covariance = estimate.covariance
-    first = receivers.variance[row, 0] + covariance[ERROR.position, ERROR.position]
-    second = receivers.variance[row, 1] + covariance[ERROR.position + 1, ERROR.position + 1]
+    first = receivers.variance[row, 0] + covariance[NORTH, NORTH]
+    second = receivers.variance[row, 1] + covariance[EAST, EAST]
     velocity, angles, before = estimate.velocity, estimate.attitude, receivers.before
     later = time - estimate.time
     share = later / (estimate.time - before.time[0])
@@ -152,10 +153,9 @@ def _add_fix(receivers: _Receivers, row: int, time: float, latitude: float, long
         heading = _between(angles[2], before.attitude[2], share)
         if isfinite(roll + pitch + heading):
             x, y, z = _turned(arm, roll, pitch, heading)
-            north, east, turn = north + x, east + y, ERROR.attitude
-            heading_variance = covariance[turn + 2, turn + 2]
-            first += z * z * covariance[turn + 1, turn + 1] + y * y * heading_variance
-            second += z * z * covariance[turn, turn] + x * x * heading_variance
+            north, east = north + x, east + y
+            first += z * z * covariance[ABOUT_EAST, ABOUT_EAST] + y * y * covariance[ABOUT_DOWN, ABOUT_DOWN]
+            second += z * z * covariance[ABOUT_NORTH, ABOUT_NORTH] + x * x * covariance[ABOUT_DOWN, ABOUT_DOWN]
         else:  # it lies in some direction
             first, second = first + receivers.swing[row], second + receivers.swing[row]
     position, limits, course = estimate.position, receivers.limits, receivers.courses
