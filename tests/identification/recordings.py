@@ -2,7 +2,7 @@
 
     SIMNAV_DATA=... python -m tests.identification.recordings
     python -m tests.identification.recordings --simulated 6
-    python -m tests.identification.recordings --simulated 24 --exact
+    python -m tests.identification.recordings --simulated 50 --seed 100 --exact --together 10
 
 For every recorded scenario whose files are there: each recording is split in halves, `simnav log identify` fits the
 datasheets on the first half, and the plain row (`ekf`, `ship-ekf` without an IMU) runs over the whole, with today's
@@ -120,6 +120,12 @@ def _joined(found: list[Errors]) -> Errors:
     return Errors(np.concatenate([e.error for e in found]), np.concatenate([e.nees for e in found]))
 
 
+def _taken(pairs: list[tuple[Errors, Errors]], number: int) -> list[tuple[Errors, Errors]]:
+    """As many logs together; the last ones are left out if they are fewer."""
+    parts = [pairs[k : k + number] for k in range(0, len(pairs) - number + 1, number)]
+    return [(_joined([a for a, _ in part]), _joined([b for _, b in part])) for part in parts]
+
+
 def _recorded(names: list[str], most: int) -> Iterator[Log]:
     for name in names:
         scenario = load(name).model_copy(update={"faults": ()})
@@ -153,6 +159,7 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument("--simulated", type=int, default=0, help="voyages of each vessel, in place of recordings")
     parser.add_argument("--seed", type=int, default=0, help="the first voyage")
     parser.add_argument("--exact", action="store_true", help="right datasheets in place of fitted ones")
+    parser.add_argument("--together", type=int, default=1, help="logs that the ranges are asked of, taken together")
     parser.add_argument("--toml", action="store_true", help="print the figures that were fitted")
     chosen = parser.parse_args(arguments)
     if chosen.exact and not chosen.simulated:
@@ -179,14 +186,16 @@ def main(arguments: list[str] | None = None) -> None:
     print("\nall logs of a vessel together")
     for name, by_sheets in together.items():
         for sheets, pairs in by_sheets.items():
-            _print(name, sheets, (_joined([a for a, _ in pairs]), _joined([b for _, b in pairs])))
-    print(f"\nshare of the logs in the asked ranges: {', '.join(_ASKED)}")
+            _print(name, sheets, *_taken(pairs, len(pairs)))
+    print(f"\nshare in the asked ranges, {chosen.together} at a time: {', '.join(_ASKED)}")
     shares: dict[str, list[list[bool]]] = {}
     for name, by_sheets in together.items():
         for sheets, pairs in by_sheets.items():
-            kept = [_kept(pair, today) for pair, today in zip(pairs, by_sheets["today's"], strict=True)]
+            groups = zip(_taken(pairs, chosen.together), _taken(by_sheets["today's"], chosen.together), strict=True)
+            kept = [_kept(pair, today) for pair, today in groups]
             shares.setdefault(sheets, []).extend(kept)
-            _print_shares(name, sheets, kept)
+            if kept:
+                _print_shares(name, sheets, kept)
     for sheets, kept in shares.items():
         _print_shares("all", sheets, kept)
 
