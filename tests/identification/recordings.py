@@ -10,7 +10,8 @@ datasheets and with the fitted ones. The second half is compared with the refere
 outages of all position fixes, which simnav's fault layer lays over the log. The scenario's own faults are left out.
 With ``--simulated`` the logs are voyages of `tests.identification.vessels`, whose datasheets are wrong. With
 ``--exact`` the datasheets that the errors of a voyage were drawn from take the place of the fit: no fit can be expected
-to do better. The last table says on which share of the logs the figures are in the ranges that are asked for.
+to do better. A fit compares positions with the reference of a recording; with ``--reference`` it does so of simulated
+logs, too. The last table says on which share of the logs the figures are in the ranges that are asked for.
 """
 
 from __future__ import annotations
@@ -159,6 +160,7 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument("--simulated", type=int, default=0, help="voyages of each vessel, in place of recordings")
     parser.add_argument("--seed", type=int, default=0, help="the first voyage")
     parser.add_argument("--exact", action="store_true", help="right datasheets in place of fitted ones")
+    parser.add_argument("--reference", action="store_true", help="a fit to simulated logs knows their truth, too")
     parser.add_argument("--together", type=int, default=1, help="logs that the ranges are asked of, taken together")
     parser.add_argument("--toml", action="store_true", help="print the figures that were fitted")
     chosen = parser.parse_args(arguments)
@@ -174,7 +176,7 @@ def main(arguments: list[str] | None = None) -> None:
     for log in logs:
         try:
             before = log.recording(log.scenario)
-            other = log.exact if chosen.exact else _fitted(log, before, chosen.toml)
+            other = log.exact if chosen.exact else _fitted(log, before, chosen)
         except LogError as error:
             print(f"left out: {error}", flush=True)
             continue
@@ -200,9 +202,9 @@ def main(arguments: list[str] | None = None) -> None:
         _print_shares("all", sheets, kept)
 
 
-def _fitted(log: Log, before: Recording, told: bool) -> Scenario:
-    found = identify(log.scenario, before, 0.5 * before.duration)
-    if told:
+def _fitted(log: Log, before: Recording, chosen: argparse.Namespace) -> Scenario:
+    found = identify(log.scenario, before, 0.5 * before.duration, chosen.reference or None)
+    if chosen.toml:
         print(found.toml, *found.remarks, sep="\n")
     return Scenario.from_toml(found.table, source="fitted")
 
