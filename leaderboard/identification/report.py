@@ -141,7 +141,9 @@ class Identification(Shown):
         return innovation_figure(panels, f"{self.scenario}: innovations before and after")
 
 
-def identify(scenario: Scenario, recording: Recording, until: float | None = None) -> Identification:
+def identify(
+    scenario: Scenario, recording: Recording, until: float | None = None, reference: bool | None = None
+) -> Identification:
     """Fit the error model of a log.
 
     Parameters
@@ -152,6 +154,8 @@ def identify(scenario: Scenario, recording: Recording, until: float | None = Non
         One of the scenario.
     until : float, optional
         Readings after this time are not used [s]. Default: 1200 s.
+    reference : bool, optional
+        Whether positions are compared with the recording's truth (`Predictions`). Default: of a log.
 
     Raises
     ------
@@ -168,7 +172,8 @@ def identify(scenario: Scenario, recording: Recording, until: float | None = Non
         )
     fitted = search(scenario, likelihood, given)
     found, changes = estimates(scenario, fitted), replaced(scenario, fitted)
-    used = _used(scenario, Predictions(recording, seconds, scenario.log is not None), fitted, changes)
+    reference = scenario.log is not None if reference is None else reference
+    used = _used(scenario, Predictions(recording, seconds, reference), fitted, changes)
     changes, to_use, given = used.changes, _to_use(scenario, used.changes), used.given
     after = likelihood.innovations(given, heading=False)
     said = remarks(scenario, fitted, found)

@@ -2,12 +2,16 @@
 
     SIMNAV_DATA=... python -m tests.identification.recordings
     python -m tests.identification.recordings --simulated 6
+    python -m tests.identification.recordings --simulated 50 --seed 100 --exact --together 10
 
 For every recorded scenario whose files are there: each recording is split in halves, `simnav log identify` fits the
 datasheets on the first half, and the plain row (`ekf`, `ship-ekf` without an IMU) runs over the whole, with today's
 datasheets and with the fitted ones. The second half is compared with the reference, without an outage, and within
 outages of all position fixes, which simnav's fault layer lays over the log. The scenario's own faults are left out.
-With ``--simulated`` the logs are voyages of `tests.identification.vessels`, whose datasheets are wrong.
+With ``--simulated`` the logs are voyages of `tests.identification.vessels`, whose datasheets are wrong. With
+``--exact`` the datasheets that the errors of a voyage were drawn from take the place of the fit: no fit can be expected
+to do better. A fit compares positions with the reference of a recording; with ``--reference`` it does so of simulated
+logs, too. The last table says on which share of the logs the figures are in the ranges that are asked for.
 """
 
 from __future__ import annotations
@@ -33,7 +37,7 @@ from simnav.source import record
 from simnav.trial import run_trial
 from simnav.types import Array
 
-from .vessels import VESSELS, voyage
+from .vessels import VESSELS, exact, voyage
 
 __all__ = ["Log", "main", "with_outage"]
 
@@ -44,15 +48,20 @@ _FOLDER = Path(__file__).parents[2] / "scenarios" / "recordings"
 _OUTAGE, _EVERY = 60.0, 100.0
 #: The outages begin at so many places of that interval, each in a run of its own.
 _PLACES = 2
+#: What is asked of a log: the NEES over its expectation, the share within the 95 % region in outages, and the RMSE over
+#: today's, with and without outages.
+_NEES, _REGION, _RMSE = (0.7, 1.8), (0.85, 0.99), 1.3
+_ASKED = ("NEES", "in outages: NEES", "within 95 %", "RMSE", "all")
 
 
 @dataclass(frozen=True, eq=False)
 class Log:
-    """A log to be fitted: its scenario, and what makes the recording of a scenario with other datasheets."""
+    """A log to be fitted: its scenario, what makes its recording with other datasheets, and the right ones if known."""
 
     name: str
     scenario: Scenario
     recording: Callable[[Scenario], Recording]
+    exact: Scenario | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,6 +121,12 @@ def _joined(found: list[Errors]) -> Errors:
     return Errors(np.concatenate([e.error for e in found]), np.concatenate([e.nees for e in found]))
 
 
+def _taken(pairs: list[tuple[Errors, Errors]], number: int) -> list[tuple[Errors, Errors]]:
+    """As many logs together; the last ones are left out if they are fewer."""
+    parts = [pairs[k : k + number] for k in range(0, len(pairs) - number + 1, number)]
+    return [(_joined([a for a, _ in part]), _joined([b for _, b in part])) for part in parts]
+
+
 def _recorded(names: list[str], most: int) -> Iterator[Log]:
     for name in names:
         scenario = load(name).model_copy(update={"faults": ()})
@@ -133,7 +148,7 @@ def _simulated(runs: int, first: int, vessels: list[str]) -> Iterator[Log]:
             def with_sheets(scenario: Scenario, one: Recording = recording) -> Recording:
                 return replace(one, instruments=scenario.instruments_sheet())
 
-            yield Log(f"{name} {seed}", told, with_sheets)
+            yield Log(f"{name} {seed}", told, with_sheets, exact(name, seed))
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -144,8 +159,13 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument("--recordings", type=int, default=6, help="of a scenario, at most")
     parser.add_argument("--simulated", type=int, default=0, help="voyages of each vessel, in place of recordings")
     parser.add_argument("--seed", type=int, default=0, help="the first voyage")
+    parser.add_argument("--exact", action="store_true", help="right datasheets in place of fitted ones")
+    parser.add_argument("--reference", action="store_true", help="a fit to simulated logs knows their truth, too")
+    parser.add_argument("--together", type=int, default=1, help="logs that the ranges are asked of, taken together")
     parser.add_argument("--toml", action="store_true", help="print the figures that were fitted")
     chosen = parser.parse_args(arguments)
+    if chosen.exact and not chosen.simulated:
+        parser.error("--exact needs --simulated: of a recording nobody knows the right datasheets")
     warnings.simplefilter("ignore")
     if chosen.simulated:
         logs = _simulated(chosen.simulated, chosen.seed, chosen.logs or list(VESSELS))
@@ -156,27 +176,55 @@ def main(arguments: list[str] | None = None) -> None:
     for log in logs:
         try:
             before = log.recording(log.scenario)
-            found = identify(log.scenario, before, 0.5 * before.duration)
-            after = log.recording(Scenario.from_toml(found.table, source="fitted"))
+            other = log.exact if chosen.exact else _fitted(log, before, chosen)
         except LogError as error:
             print(f"left out: {error}", flush=True)
             continue
-        if chosen.toml:
-            print(found.toml, *found.remarks, sep="\n")
-        for sheets, recording in (("today's", before), ("fitted", after)):
+        assert other is not None
+        for sheets, recording in (("today's", before), ("exact" if chosen.exact else "fitted", log.recording(other))):
             pair = _compared(recording)
             together.setdefault(log.name.rpartition(" ")[0], {}).setdefault(sheets, []).append(pair)
             _print(log.name, sheets, pair)
     print("\nall logs of a vessel together")
     for name, by_sheets in together.items():
         for sheets, pairs in by_sheets.items():
-            _print(name, sheets, (_joined([a for a, _ in pairs]), _joined([b for _, b in pairs])))
+            _print(name, sheets, *_taken(pairs, len(pairs)))
+    print(f"\nshare in the asked ranges, {chosen.together} at a time: {', '.join(_ASKED)}")
+    shares: dict[str, list[list[bool]]] = {}
+    for name, by_sheets in together.items():
+        for sheets, pairs in by_sheets.items():
+            groups = zip(_taken(pairs, chosen.together), _taken(by_sheets["today's"], chosen.together), strict=True)
+            kept = [_kept(pair, today) for pair, today in groups]
+            shares.setdefault(sheets, []).extend(kept)
+            if kept:
+                _print_shares(name, sheets, kept)
+    for sheets, kept in shares.items():
+        _print_shares("all", sheets, kept)
+
+
+def _fitted(log: Log, before: Recording, chosen: argparse.Namespace) -> Scenario:
+    found = identify(log.scenario, before, 0.5 * before.duration, chosen.reference or None)
+    if chosen.toml:
+        print(found.toml, *found.remarks, sep="\n")
+    return Scenario.from_toml(found.table, source="fitted")
+
+
+def _kept(pair: tuple[Errors, Errors], today: tuple[Errors, Errors]) -> list[bool]:
+    """Whether a log's figures are in the ranges of `_ASKED`."""
+    (_, nees, _), (_, away_nees, share) = (e.figures for e in pair)
+    kept = [a <= f <= b for f, (a, b) in ((nees, _NEES), (away_nees, _NEES), (share, _REGION))]
+    kept.append(all(a.figures[0] <= _RMSE * b.figures[0] for a, b in zip(pair, today, strict=True)))
+    return [*kept, all(kept)]
 
 
 def _print(name: str, sheets: str, pair: tuple[Errors, Errors]) -> None:
     (rmse, nees, share), (away_rmse, away_nees, away_share) = (e.figures for e in pair)
     print(f"{name:18s} {sheets:10s} {rmse:7.3g} {nees:8.2f} {share:12.3f} {away_rmse:18.3g} {away_nees:8.2f} "
           f"{away_share:12.3f}", flush=True)  # fmt: skip
+
+
+def _print_shares(name: str, sheets: str, kept: list[list[bool]]) -> None:
+    print(f"{name:18s} {sheets:10s}", *(f"{share:6.2f}" for share in np.mean(kept, axis=0)), f"of {len(kept)}")
 
 
 if __name__ == "__main__":

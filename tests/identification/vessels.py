@@ -3,6 +3,7 @@
 The datasheets of a voyage (`TOLD`) know white noise only. In truth the fixes are coloured, the DVL has a bias, a scale
 and a mounting, the compass a slow error, the IMU is noisier and its biases wander. By how much is drawn by the seed,
 around what was found on logs of real ROVs: fixes 1.5 m over 60 s, a DVL bias of 0.02 m/s, scale 3 %, mounting 4 deg.
+`exact` makes the datasheets that a voyage's errors were drawn from: the best that a filter can be told.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from simnav.scenario import Scenario
 from simnav.scenario.reading import parse
 from simnav.source import record
 
-__all__ = ["VESSELS", "Vessel", "voyage"]
+__all__ = ["VESSELS", "Vessel", "exact", "voyage"]
 
 _BEGIN = """
 version = 1
@@ -201,10 +202,10 @@ sigma_m_s = 0.1
 
 
 class Draw:
-    """What is drawn for a voyage."""
+    """What is drawn for a voyage; with ``sigmas`` the constants are their sigmas."""
 
-    def __init__(self, seed: int):
-        self._rng = np.random.default_rng([5802, seed])
+    def __init__(self, seed: int, sigmas: bool = False):
+        self._rng, self._sigmas = np.random.default_rng([5802, seed]), sigmas
 
     def about(self, size: float, factor: float = 1.6) -> float:
         """A size, up to a factor more or less."""
@@ -213,6 +214,8 @@ class Draw:
     def normal(self, sigma: float, number: int = 1) -> Any:
         """Constants of a sigma."""
         found = self._rng.normal(0.0, sigma, number).tolist()
+        if self._sigmas:
+            found = [sigma] * number
         return found if number > 1 else found[0]
 
 
@@ -297,18 +300,30 @@ VESSELS = {
 }  # fmt: skip
 
 
-def voyage(name: str, seed: int) -> tuple[Scenario, Recording]:
-    """The scenario of a vessel with its datasheets, and a recording of other errors with these datasheets."""
-    vessel = VESSELS[name]
-    first, _, tables = vessel.told.lstrip().partition("\n")
-    told = parse(f"{first}{_BEGIN}{tables}", source=name)
-    table: dict[str, Any] = told.to_toml()
-    for instrument, figures in vessel.true(Draw(seed)).items():
+def _told(name: str) -> Scenario:
+    first, _, tables = VESSELS[name].told.lstrip().partition("\n")
+    return parse(f"{first}{_BEGIN}{tables}", source=name)
+
+
+def _other(name: str, draw: Draw, constant: str) -> Scenario:
+    """The scenario of a vessel with the figures that are drawn; ``constant`` begins the keys of constant errors."""
+    table: dict[str, Any] = _told(name).to_toml()
+    for instrument, figures in VESSELS[name].true(draw).items():
         sheet = table["instruments"][instrument]
         for key, figure in figures.items():
             if isinstance(figure, dict):
                 sheet[key] |= figure
             else:
-                sheet[key] = figure
-    recording = record(Scenario.from_toml(table, source="true"), seed)
+                sheet[key.replace("fixed_", constant)] = figure
+    return Scenario.from_toml(table, source="true")
+
+
+def exact(name: str, seed: int) -> Scenario:
+    """The scenario of a voyage with datasheets that are right: sizes as they are, constant errors by their sigma."""
+    return _other(name, Draw(seed, sigmas=True), "")
+
+
+def voyage(name: str, seed: int) -> tuple[Scenario, Recording]:
+    """The scenario of a vessel with its datasheets, and a recording of other errors with these datasheets."""
+    told, recording = _told(name), record(_other(name, Draw(seed), "fixed_"), seed)
     return told, replace(recording, instruments=told.instruments_sheet(), actual=None)
