@@ -2,10 +2,9 @@
 
 A reading of a stream (which axis is which, which sign, which unit, how late) is a hypothesis. The likelihood of each is
 that of all comparisons in which the stream takes part (`simnav.log.comparisons`), over that of the reading which the
-scenario has. The reading as it is has the prior probability one half; all others of the stream share the rest. Readings
-that do not also leave far smaller differences are left out. The most likely reading of all streams is taken, the
-streams are read with it, and the search begins anew, until no other reading is far more likely: so two mistakes are
-found as well as one, if each of them is found beside the other.
+scenario has. The reading as it is has the prior probability one half; all others of the stream share the rest. The most
+likely reading of all streams is taken, the streams are read with it, and the search begins anew, until no other reading
+is far more likely: so two mistakes are found as well as one, if one of them is found beside the other.
 """
 
 from __future__ import annotations
@@ -45,9 +44,8 @@ _FAR, _PART, _TELLING = 12.0, 0.5, 3.0
 _AGAINST = -40.0
 #: Delays that are tried [s]; `simnav.log.alignment` finds shorter ones.
 _DELAYS = np.arange(0.5, 5.01, 0.5)
-#: Readings are told apart by their log likelihoods, less `_CHANGE` for each change, and where these differ by less than
-#: `_SAME`, by the number of changes.
-_SAME, _CHANGE = 1.0, 0.5
+#: Readings whose log likelihoods differ by less are told apart by the number of changes.
+_SAME = 1.0
 #: Mistakes that are looked for, one after the other.
 _ROUNDS = 4
 #: The mean specific force of a vessel points up by at least this [m/s^2].
@@ -209,22 +207,22 @@ def _best(log: RecordedSpec, streams: Streams) -> tuple[Reading, ProbableReading
 
 def _told(stream: str, tried: list[tuple[Reading, float, bool]]) -> tuple[Reading, ProbableReading] | None:
     """The likeliest reading of one stream, with its probability, if it is far more likely than the present one."""
-    likely = [(reading, ratio) for reading, ratio, much in tried if much and ratio > _FAR]
-    if not likely:
-        return None
-    ratios = np.array([ratio for _, ratio in likely])
+    ratios = np.array([ratio for _, ratio, _ in tried])
     top = float(ratios.max())
-    best = max(ratio - _CHANGE * each.number for each, ratio in likely)
-    alike = [t for t in likely if t[1] - _CHANGE * t[0].number > best - _SAME]
-    reading, ratio = min(alike, key=lambda t: (t[0].number, -t[1]))
+    if top < _FAR:
+        return None
+    alike = [t for t in tried if t[1] > top - _SAME]
+    reading, ratio, much = min(alike, key=lambda t: (t[0].number, -t[1]))
     # The delay next to the best one is another figure of the same reading.
     others = [t for t in alike if t[0].number == reading.number and not (reading.delay and t[0].delay)]
-    weight, present = np.exp(ratios - top) / len(tried), float(np.exp(-top))
-    same = np.array([bool(reading.delay) and t[0].delay * reading.delay > 0.0 for t in likely])
-    total = float(weight.sum()) + present
+    if not much:
+        return None
+    weight = np.exp(ratios - top) / len(tried)
+    same = np.array([bool(reading.delay) and t[0].delay * reading.delay > 0.0 for t in tried])
+    total = float(weight.sum() + np.exp(-top))
     own = float(weight[same].sum()) if same.any() else float(np.exp(ratio - top)) / len(tried)
     changes = tuple((table, key, json.dumps(value)) for table, key, value in reading.changes)
-    return reading, ProbableReading(stream, changes, reading.what, ratio, own / total, present / total,
+    return reading, ProbableReading(stream, changes, reading.what, ratio, own / total, float(np.exp(-top)) / total,
                                     max(0, len(others) - 1))  # fmt: skip
 
 
