@@ -18,9 +18,7 @@ Tracking and Navigation*, Wiley, 2001, section 10.3.2.
 from __future__ import annotations
 
 from dataclasses import replace
-from math import sqrt
-
-import numpy as np
+from math import isfinite, nan, sqrt
 
 from simnav.estimates import Estimates
 from simnav.steps import Steps
@@ -80,27 +78,25 @@ class RangeTest:
         -------
         Estimate
         """
-        if estimate.covariance is not None:
-            self._add(measurements, estimate.covariance)
+        self._add(measurements, estimate.covariance)
         if not self.curved:
             return estimate
         return replace(estimate, diagnostics={**estimate.diagnostics, "inconsistent": 1.0})
 
     def judge_all(self, steps: Steps, estimates: Estimates) -> None:
         """Judge the estimates of several steps; they are changed."""
-        if estimates.covariance is None:
-            return
         for k, measurements in enumerate(steps):
-            self._add(measurements, estimates.covariance[k])
+            self._add(measurements, None if estimates.covariance is None else estimates.covariance[k])
             if self.curved:
                 estimates.diagnostics["inconsistent"][k] = 1.0
 
-    def _add(self, measurements: Measurements, covariance: Array) -> None:
-        """Add the ranges of a step."""
-        spread, fading = float(covariance[0, 0] + covariance[1, 1]), 1.0 - 1.0 / MEMORY
-        for m in measurements.aids:
+    def _add(self, measurements: Measurements, covariance: Array | None) -> None:
+        """Add the ranges of a step; without a finite covariance there is nothing to add."""
+        spread = nan if covariance is None else float(covariance[0, 0] + covariance[1, 1])
+        fading = 1.0 - 1.0 / MEMORY
+        for m in measurements.aids if isfinite(spread) else ():
             sigma, distance = self._sigma.get(m.instrument), float(m.value[0])
-            if sigma is None or not distance > 0.0 or not np.isfinite(spread):
+            if sigma is None or not distance > 0.0:
                 continue
             self._sum = fading * self._sum + min(spread / (2.0 * distance * sigma), BOUND)
             self._variance = fading**2 * self._variance + 1.0
