@@ -13,6 +13,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from scipy.ndimage import uniform_filter1d
 
 from simnav.geometry.earth import displace, earth_rate, gravity, relative_position
 from simnav.geometry.rotation import dcm_from_rotation_vector, dcm_from_rpy, rotation_vector_from_dcm, wrap_angle
@@ -33,6 +34,10 @@ GAP = 3.0
 COURSE_FROM, _COURSE_OVER = 0.7, 8.0
 #: Over so many seconds a heading is differenced.
 _TURN_OVER = 4.0
+#: By how many times its interpolation error the usual size of a difference is larger.
+_BETWEEN = 2.2
+#: Readings of which a mean is taken for the scale.
+_FEW = 9
 #: Where in a spacing series are read, to average them.
 _PHASES = np.array([-0.375, -0.125, 0.125, 0.375])
 #: Prior standard deviations of parameters of small effect.
@@ -159,6 +164,11 @@ class Streams:
         """The same streams, with another series of one part of the reference."""
         return self.altered(**{part: replace(getattr(self, part), **changes)})
 
+    def series(self, name: str) -> Series:
+        """The readings of an instrument, or of a part of the reference."""
+        part = name.removeprefix("reference.")
+        return self.instruments[name][1] if part == name else getattr(self, part)
+
     @cached_property
     def known(self) -> dict[tuple[Any, ...], Array]:
         """What the reference says at times at which it was asked already."""
@@ -247,6 +257,21 @@ class Streams:
 
         return self._once("moved", time, mean, span)
 
+    def between(self, time: Array) -> float:
+        """Variance of the error with which the stated velocity is interpolated at n times [m^2/s^2].
+
+        Each of its values is interpolated from its neighbours by a cubic. The reference of a vessel in waves that has a
+        value a second does not say how she moves between them.
+        """
+        if self.velocity is None or len(self.velocity.time) < 8:
+            return 0.0
+        v, stated = self.velocity.value, self.velocity.time - self.late
+        error = v[3:-3] - (9.0 * (v[2:-4] + v[4:-2]) - (v[:-6] + v[6:])) / 16.0
+        after = np.clip(np.searchsorted(stated, time), 1, len(stated) - 1)
+        part = np.clip((time - stated[after - 1]) / (stated[after] - stated[after - 1]), 0.0, 1.0)
+        near = float(np.mean((4.0 * part * (1.0 - part)) ** 2))
+        return near * float(np.nan_to_num(np.nanmedian(error**2, axis=0)).max()) * 2.2
+
     def attitudes(self, time: Array) -> Array:
         """(n, 3) roll, pitch, yaw of the reference [rad]."""
         return self._once("attitude", time, lambda: wrap_angle(self._part("attitude", time)))
@@ -291,6 +316,17 @@ def _skews(vector: Array) -> Array:
     x, y, z = vector.T
     zero = np.zeros_like(x)
     return np.moveaxis(np.array([[zero, -z, y], [z, zero, -x], [-y, x, zero]]), -1, 0)
+
+
+def _scaled(value: Array) -> Array:
+    """(n, d, 1) derivatives by the scale of an instrument: its readings, as means over a few.
+
+    With the readings themselves a scale that makes the noise smaller would be fitted to it.
+    """
+    known = np.isfinite(value)
+    count = uniform_filter1d(known.astype(np.float64), _FEW, axis=0, mode="nearest")
+    mean = uniform_filter1d(np.where(known, value, 0.0), _FEW, axis=0, mode="nearest")
+    return np.asarray(np.where(known, mean / np.maximum(count, 1e-9), np.nan))[:, :, None]
 
 
 def _constant(n: int, d: int) -> Array:
@@ -474,7 +510,7 @@ def _velocity_and_positions(s: Streams) -> Residual | None:
     steps = [s.given_velocities(time + k * 0.25 * span) for k in (-2, -1, 0, 1, 2)]
     mean = (steps[0] + 4.0 * steps[1] + 2.0 * steps[2] + 4.0 * steps[3] + steps[4]) / 12.0  # Simpson's rule
     moved = s.moved(time, span)
-    return _residual(mean - moved, 2.0 * _SPEED, (np.nan_to_num(mean)[:, :, None], _SCALE))
+    return _residual(mean - moved, 2.0 * _SPEED, (np.nan_to_num(_scaled(mean)), _SCALE))
 
 
 def _picked(series: Series, begin: float) -> tuple[Array, Array]:
@@ -513,9 +549,9 @@ def _body_velocity(s: Streams, name: str) -> Residual | None:
         return None
     dcm, rate = turned
     own = np.einsum("nji,nj->ni", dcm, s.velocities(time)) + np.cross(rate, arm)
-    size = _SPEED if s.velocity is not None else 2.0 * _SPEED
+    size = float(np.hypot(_SPEED, _BETWEEN * s.between(time) ** 0.5)) if s.velocity is not None else 2.0 * _SPEED
     return _residual(value - own, size, (_constant(len(time), 3), _DVL_BIAS), (_skews(value), _MOUNTING),
-                     (_skews(rate), _ARM), (value[:, :, None], _SCALE))  # fmt: skip
+                     (_skews(rate), _ARM), (_scaled(value), _SCALE))  # fmt: skip
 
 
 def _velocity(s: Streams, name: str) -> Residual | None:
@@ -557,7 +593,7 @@ def _water_speed(s: Streams, name: str) -> Residual | None:
         return None
     ahead = velocity[:, 0] * np.cos(pose[:, 2]) + velocity[:, 1] * np.sin(pose[:, 2])
     return _residual(value - ahead[:, None], 2.0 * _SPEED, (_constant(len(time), 1), 0.7),
-                     (value[:, :, None], 0.1))  # fmt: skip
+                     (_scaled(value), 0.1))  # fmt: skip
 
 
 def _depth(s: Streams, name: str) -> Residual | None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from simnav.log.comparisons import Streams
@@ -20,6 +20,7 @@ class Reading:
     """A hypothesis: the streams read so, the streams that it alters, how many changes it is, and what to write.
 
     With nothing to write, the stream is no such instrument. Comparisons with the stream ``apart`` say nothing of it.
+    The reading multiplies the values of the stream by ``times``; ``usual`` are axes in which many instruments speak.
     """
 
     stream: str
@@ -30,6 +31,21 @@ class Reading:
     changes: tuple[tuple[str, str, Any], ...]
     delay: float = 0.0
     apart: str = ""
+    times: float = 1.0
+    usual: bool = False
+    mistakes: int = 1
+
+    def late(self, other: Reading) -> Reading:
+        """This reading, and also the delay of another one of the same stream."""
+        return replace(
+            other,
+            alter=lambda s: other.alter(self.alter(s)),
+            number=self.number + other.number,
+            what=f"{self.what}, and {other.what}",
+            changes=(*self.changes, *other.changes),
+            times=self.times,
+            mistakes=self.mistakes + other.mistakes,
+        )
 
 
 def flip(column: int | str) -> int | str:

@@ -69,16 +69,19 @@ class Fit:
     penalty: float
 
 
-def effective_samples(value: Array) -> float:
+def effective_samples(value: Array, white: float = 0.0) -> float:
     """Number of independent samples that say as much about the mean square as n correlated ones.
 
     Parameters
     ----------
     value : (n,) array
         In the order of time. Its mean is not taken out: a residual that is constant is one sample.
+    white : float
+        Variance of white noise that is taken to be added: of a residual that is far below it, it does not matter
+        whether it is slow.
     """
     n = len(value)
-    total = float(value @ value)
+    total = float(value @ value) + n * white
     if n < 4 or total <= 0.0:
         return float(n)
     spectrum = np.fft.rfft(value, 2 * n)
@@ -106,10 +109,10 @@ def fit(residual: Residual) -> Fit:
             here = left[known[:, i], i]
             if not len(here):
                 continue
-            limit = max(_FAR * _NORMAL * float(np.median(np.abs(here))), 1e-12)
+            limit = _FAR * max(_NORMAL * float(np.median(np.abs(here))), residual.size[i])
             clipped = np.clip(here, -limit, limit)
             if turn != 1:
-                samples[i] = effective_samples(clipped)
+                samples[i] = effective_samples(clipped, float(residual.size[i]) ** 2)
             mean_square[i] = float(np.mean(clipped**2))
             scale = _NU * residual.size[i] ** 2 + samples[i] * mean_square[i]
             weight[known[:, i], i] = (samples[i] + _NU) * samples[i] / (scale * count[i])

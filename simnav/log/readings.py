@@ -13,7 +13,7 @@ import itertools
 import json
 import warnings
 from collections.abc import Callable, Collection, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -25,7 +25,7 @@ from simnav.log.channel import Series, read_channel, skip_of
 from simnav.log.comparisons import COURSE_FROM, Inertial, Streams, comparisons
 from simnav.log.hypotheses import FLIPS, Reading, flip, shown, with_series
 from simnav.log.imu_series import read_imu
-from simnav.log.likelihood import Fit, fit, log_ratios
+from simnav.log.likelihood import Fit, Residual, fit, log_ratios
 from simnav.log.units import DIMENSIONS, factor
 from simnav.spec import SpecError
 from simnav.types import KINDS, Array
@@ -40,16 +40,34 @@ __all__ = ["ProbableReading", "probable_readings"]
 #: product of the mean squares of all components with a log likelihood ratio above the third figure: of many samples a
 #: slight difference is significant, too, but may be one of the models.
 _FAR, _PART, _TELLING = 12.0, 0.5, 3.0
+#: A mean square below this part of the square of its usual size says nothing.
+_FLOOR = 0.1
 #: What speaks so much against a reading is not made good by other comparisons, which are left out.
 _AGAINST = -40.0
 #: Delays that are tried [s]; `simnav.log.alignment` finds shorter ones.
 _DELAYS = np.arange(0.5, 5.01, 0.5)
 #: Readings whose log likelihoods differ by less are told apart by the number of changes.
 _SAME = 1.0
+#: So many of the likeliest readings of a stream are also tried with each delay, and those with usual axes.
+_WITH_DELAYS = 3
+#: Part of the prior probability that each further mistake leaves.
+_TWO = 0.1
 #: Mistakes that are looked for, one after the other.
 _ROUNDS = 4
 #: The mean specific force of a vessel points up by at least this [m/s^2].
 _UPRIGHT = 4.0
+#: Axes that are usual besides forward, starboard, down: forward, port, up; starboard, forward, up; and turned about the
+#: vertical by a half or a quarter.
+_USUAL = tuple(
+    tuple(map(tuple, axes))
+    for axes in (
+        np.diag([1.0, -1.0, -1.0]),
+        np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]]),
+        np.diag([-1.0, -1.0, 1.0]),
+        np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]),
+        np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]),
+    )
+)
 #: The 48 matrices that permute axes and change signs.
 _AXES = tuple(
     np.eye(3)[list(order)] * np.array(signs)[:, None]
@@ -102,6 +120,15 @@ class ProbableReading:
             f"{self.what}: the other streams say so with probability {self.shown}{alike}; "
             f"as it is read now it has {self.present:.1g}; {right}"
         )
+
+
+@dataclass(frozen=True, eq=False)
+class _Tried:
+    """A reading, the logarithm of its likelihood over that of the present one, and of the part of squares it leaves."""
+
+    reading: Reading
+    ratio: float
+    left: float
 
 
 def probable_readings(scenario: Scenario, recording: str) -> list[ProbableReading]:
@@ -175,55 +202,87 @@ def _read(scenario: Scenario, log: RecordedSpec, recording: str, unfit: Collecti
 def _best(log: RecordedSpec, streams: Streams) -> tuple[Reading, ProbableReading] | None:
     """The reading that is most likely by far, if there is one."""
     compared = comparisons(streams)
-    present: dict[tuple[str, ...], Fit] = {}
-    for parts, compare in compared.items():
-        residual = compare(streams)
-        if residual is not None:
-            present[parts] = fit(residual)
-    readings: dict[str, list[tuple[Reading, float, bool]]] = {}
+    present = {
+        parts: fit(residual) for parts, compare in compared.items() if (residual := compare(streams)) is not None
+    }
+    readings: dict[str, list[_Tried]] = {}
     for reading in _readings(log, streams):
-        involved = [p for p in present if set(p) & set(reading.parts) and reading.apart not in p]
-        if not involved:
-            continue
-        other = reading.alter(streams)
-        ratio, left = 0.0, 0.0
-        for parts in involved:
-            residual = compared[parts](other) if ratio > _AGAINST else None
-            if residual is None:
-                continue
-            fitted = fit(residual)
-            each = log_ratios(fitted, present[parts])
-            ratio += float(each.sum()) - fitted.penalty + present[parts].penalty
-            before, after = (f.mean_square + 0.1 * f.size**2 for f in (present[parts], fitted))
-            left += float(np.sum(np.log(after / before)[np.abs(each) > _TELLING]))
-        readings.setdefault(reading.stream, []).append((reading, ratio, left < np.log(_PART)))
+        if (one := _tried(reading, streams, compared, present)) is not None:
+            readings.setdefault(reading.stream, []).append(one)
     likeliest: tuple[Reading, ProbableReading] | None = None
     for stream, tried in readings.items():
+        delays = [t.reading for t in tried if t.reading.delay]
+        others = sorted((t for t in tried if not t.reading.delay), key=lambda t: -t.ratio)
+        others = [t for k, t in enumerate(others) if k < _WITH_DELAYS or t.reading.usual]
+        for other, delay in itertools.product(others, delays):
+            if (one := _tried(other.reading.late(delay), streams, compared, present)) is not None:
+                tried.append(one)
         told = _told(stream, tried)
         if told is not None and (likeliest is None or told[1].log_ratio > likeliest[1].log_ratio + _SAME):
             likeliest = told
     return likeliest
 
 
-def _told(stream: str, tried: list[tuple[Reading, float, bool]]) -> tuple[Reading, ProbableReading] | None:
+def _tried(
+    reading: Reading,
+    streams: Streams,
+    compared: Mapping[tuple[str, ...], Callable[[Streams], Residual | None]],
+    present: Mapping[tuple[str, ...], Fit],
+) -> _Tried | None:
+    """A reading beside the present one; None where nothing is compared with its stream.
+
+    A smaller unit makes the noise of the stream smaller, which is no merit: residuals are then compared in the present
+    unit. A larger unit makes it larger, which is no fault: it is taken as large as in the present unit.
+    """
+    involved = [p for p in present if set(p) & set(reading.parts) and reading.apart not in p]
+    if not involved:
+        return None
+    other = reading.alter(streams)
+    square = reading.times**2
+    noise = _noise(other.series(reading.stream).value) / square if square > 1.0 else 0.0
+    ratio, left = 0.0, 0.0
+    for parts in involved:
+        residual = compared[parts](other) if ratio > _AGAINST else None
+        if residual is None:
+            continue
+        fitted = fit(residual)
+        own = np.minimum(noise, np.minimum(present[parts].mean_square, fitted.mean_square / square))
+        mean_square = fitted.mean_square / square if square < 1.0 else fitted.mean_square - own * (square - 1.0)
+        fitted = replace(fitted, mean_square=mean_square)
+        each = log_ratios(fitted, present[parts])
+        ratio += float(each.sum()) - fitted.penalty + present[parts].penalty
+        before, after = (f.mean_square + _FLOOR * f.size**2 for f in (present[parts], fitted))
+        left += float(np.sum(np.log(after / before)[np.abs(each) > _TELLING]))
+    return _Tried(reading, ratio, left)
+
+
+def _noise(value: Array) -> float:
+    """Variance of the noise of readings, from their second differences: of the component that has most of it."""
+    second = np.diff(value, 2, axis=0)
+    second = second[np.isfinite(second).all(axis=1)]
+    return float(np.median(np.abs(second), axis=0).max() ** 2 * 1.4826**2 / 6.0) if len(second) else 0.0
+
+
+def _told(stream: str, tried: list[_Tried]) -> tuple[Reading, ProbableReading] | None:
     """The likeliest reading of one stream, with its probability, if it is far more likely than the present one."""
-    ratios = np.array([ratio for _, ratio, _ in tried])
-    top = float(ratios.max())
-    if top < _FAR:
+    smaller = [t for t in tried if t.left <= 0.0]
+    if not smaller or (top := max(t.ratio for t in smaller)) < _FAR:
         return None
-    alike = [t for t in tried if t[1] > top - _SAME]
-    reading, ratio, much = min(alike, key=lambda t: (t[0].number, -t[1]))
+    alike = [t for t in smaller if t.ratio > top - _SAME]
+    best = min(alike, key=lambda t: (t.reading.number, -t.ratio))
+    if best.left >= np.log(_PART):
+        return None
+    reading = best.reading
     # The delay next to the best one is another figure of the same reading.
-    others = [t for t in alike if t[0].number == reading.number and not (reading.delay and t[0].delay)]
-    if not much:
-        return None
-    weight = np.exp(ratios - top) / len(tried)
-    same = np.array([bool(reading.delay) and t[0].delay * reading.delay > 0.0 for t in tried])
-    total = float(weight.sum() + np.exp(-top))
-    own = float(weight[same].sum()) if same.any() else float(np.exp(ratio - top)) / len(tried)
+    others = [t for t in alike if t.reading.number == reading.number and not (reading.delay and t.reading.delay)]
+    delays = len({t.reading.delay for t in tried}) - 1  # all together are one reading
+    prior = np.array([(1.0 / delays if t.reading.delay else 1.0) * _TWO ** (t.reading.mistakes - 1) for t in smaller])
+    weight = prior * np.exp(np.array([t.ratio for t in smaller]) - top) / len(tried)
+    same = np.array([t is best or t.reading.delay * reading.delay > 0.0 for t in smaller])
+    own, total = float(weight[same].sum()), float(weight.sum() + np.exp(-top))
     changes = tuple((table, key, json.dumps(value)) for table, key, value in reading.changes)
-    return reading, ProbableReading(stream, changes, reading.what, ratio, own / total, float(np.exp(-top)) / total,
-                                    max(0, len(others) - 1))  # fmt: skip
+    return reading, ProbableReading(stream, changes, reading.what, best.ratio, own / total,
+                                    float(np.exp(-top)) / total, max(0, len(others) - 1))  # fmt: skip
 
 
 def _readings(log: RecordedSpec, s: Streams) -> Iterator[Reading]:
@@ -302,7 +361,7 @@ def _of_imu(log: RecordedSpec, s: Streams) -> Iterator[Reading]:
         changes = [("log.imu", "angular_rate", both[0]), ("log.imu", "specific_force", both[1])]
         yield Reading("imu", ("gyroscope", "accelerometer"), read(gyroscope=matrix, accelerometer=matrix),
                        _changed(matrix) + 0.5, f"the IMU's forward, starboard, down are {shown(both[0])} and "
-                       f"{shown(both[1])}", tuple(changes))  # fmt: skip
+                       f"{shown(both[1])}", tuple(changes), usual=tuple(map(tuple, matrix)) in _USUAL)  # fmt: skip
     channels = [*log.instruments.values(), log.reference.position, log.reference.velocity, log.reference.attitude]
     shared = any(c is not None and c.file == imu.file for c in channels)
     file = log.files[imu.file]
@@ -387,7 +446,8 @@ def _of_vector(
                 changes.append((table, "units", [units[j] for j in np.argmax(np.abs(matrix), axis=1)]))
             what = f"{name!r} has {names} in {shown(new)}" + (f", in {unit}" if unit else "")
             changed = with_series(name, value=times * value)
-            yield Reading(name, (name,), changed, number, what, tuple(changes))
+            usual = times == 1.0 and tuple(map(tuple, matrix)) in _USUAL
+            yield Reading(name, (name,), changed, number, what, tuple(changes), times=times, usual=usual)
 
 
 def _of_heading(name: str, table: str, where: LogInstrumentSpec, series: Series) -> Iterator[Reading]:
@@ -442,11 +502,12 @@ def _of_scalar(name: str, table: str, where: LogInstrumentSpec, series: Series) 
                 continue
             changes: list[tuple[str, str, Any]] = [(table, "columns", [flip(where.columns[0])])] if sign < 0.0 else []
             changes += [(table, "units", unit)] if unit != present else []
-            value = sign * series.value * factor(unit) / factor(present)
+            times = factor(unit) / factor(present)
+            value = sign * times * series.value
             text = f"{name!r} is {'minus ' if sign < 0.0 else ''}{where.columns[0]}"
             text += f" in {unit}" if unit != present else ""
             yield Reading(name, (name,), with_series(name, value=value),
-                           float(len(changes)), text, tuple(changes))  # fmt: skip
+                           float(len(changes)), text, tuple(changes), times=times)  # fmt: skip
 
 
 def _of_positions(log: RecordedSpec, s: Streams) -> Iterator[Reading]:
