@@ -319,7 +319,10 @@ def draft(streams: Sequence[Stream], name: str = "my-log", file: str | None = No
     if not known:  # in any of them may be positions
         used += [Guess(s, "", (), ()) for s in streams]
     keys = _file_keys(used)
-    span = float(position.stream.time[-1] - position.stream.time[0])
+    time = position.stream.time
+    if known and len(time) == len(position.stream.table):
+        time = time[~position.without_fix]
+    span = float(np.ptp(time)) if len(time) else 0.0
     lines = [
         "# A scenario to begin with. Check everything that is marked: simnav cannot know it.",
         f"# Then: simnav check {file or f'{name}.toml'}; simnav run {file or f'{name}.toml'}",
