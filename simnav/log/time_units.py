@@ -46,8 +46,9 @@ def other_unit(unit: str, time: Array, others: Iterable[Array], *, inertial: boo
         A unit of time, with which the stream and another one have the same times, or an IMU a possible rate; None
         where the unit fits, or nothing tells another one.
     """
-    spacing = float(np.median(np.diff(time))) if len(time) > 1 else 0.0
-    if unit not in _UNITS or not spacing > 0.0:
+    with np.errstate(over="ignore", invalid="ignore"):
+        spacing = float(np.median(np.diff(time))) if len(time) > 1 else 0.0
+    if unit not in _UNITS or not 0.0 < spacing < np.inf:
         return None
     low, high = _OF_IMU if inertial else _OF_OTHERS
     times = {u: time * (factor(u) / factor(unit)) for u in _UNITS if u != unit}
