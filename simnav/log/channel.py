@@ -524,14 +524,14 @@ def _check_range(
 ) -> None:
     """LogError where an angle is larger than it can be in radians, or a cell than anything of its kind."""
     for i, component in enumerate(kind.components):
-        cells = i < len(columns) == len(kind.components) and math.isfinite(component.limit)
+        cells = i < len(columns) == len(kind.components)
+        scale = factor(units[i]) if cells else 1.0
         if component.unit != "deg":
             if cells:
-                check_cells(value[:, i], component.limit, factor(units[i]), columns[i], table, rows, component.name)
+                check_cells(value[:, i], component.limit, scale, columns[i], table, rows, component.name)
             continue
         limit = 2.0 * math.pi if component.cyclic else component.limit
         if cells:  # in no unit of angles
-            scale = factor(units[i])
             none = _LARGEST_DEGREES if scale == 1.0 else math.radians(_LARGEST_DEGREES)
             check_cells(value[:, i], none, scale, columns[i], table, rows, component.name)
         bad = np.flatnonzero(np.abs(value[:, i]) > limit + 1e-9)
@@ -545,7 +545,12 @@ def _check_range(
                 )
             raise LogError(
                 f"{table.source}, line {table.line[rows[bad[0]]]}, column {columns[i]!r}: {component.name} would be "
-                f"{value[bad[0], i]:.6g} rad; is its unit 'deg'" + (", or '1e-7 deg'?" if huge else "?")
+                f"{value[bad[0], i]:.6g} rad; "
+                + (
+                    "is its unit 'deg'" + (", or '1e-7 deg'?" if huge else "?")
+                    if huge or scale == 1.0 or not kind.geodetic
+                    else "it may be degrees and minutes, like 5412.5 for 54 deg 12.5': a table should have degrees"
+                )
             )
 
 

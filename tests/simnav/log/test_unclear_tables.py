@@ -167,12 +167,25 @@ def test_one_cell_that_is_impossible_is_named(tiny):
     assert "line 7, column 'h': 1e+30 is no possible height" in errors(tiny)["reference.position"]
     tiny.replace('columns = ["lat", "lon", "h"]', 'where = \'-20000 < `h` < 20000\'\ncolumns = ["lat", "lon", "h"]')
     assert "reference.position" not in errors(tiny)
-    tiny.edit("truth1.csv", 7, "5005.0,9999,11.5,5,2,-1e30,0,0,0,0")
+    tiny.edit("truth1.csv", 7, "5005.0,9999,11.5,5,2,-1e30,0,0,0,1e30")
     found = errors(tiny)
     assert "line 7, column 'lat': 9999 is no possible latitude" in found["reference.position"]
+    assert "line 7, column 'yaw': 1e+30 is no possible yaw" in found["reference.attitude"]
     assert "line 7, column 've': -1e+30 is no possible velocity_east" in found["reference.velocity"]
     tiny.edit("imu1.csv", 7, "5000120.0,0,0,1e30,0,0,0")
     assert "line 7, column 'az': 1e+30 is no possible specific force" in errors(tiny)["imu"]
+
+
+def test_degrees_and_minutes_are_told(tiny):
+    path = tiny.folder / "truth1.csv"
+    header, *rows = path.read_text().splitlines()
+    path.write_text(
+        "\n".join([header, *(",".join([c.split(",")[0], "4547.9", *c.split(",")[2:]]) for c in rows)]) + "\n"
+    )
+    assert (
+        "column 'lat': latitude would be 79.3758 rad; it may be degrees and minutes"
+        in errors(tiny)["reference.position"]
+    )
 
 
 def test_one_time_that_is_impossible_is_named():
