@@ -27,7 +27,7 @@ from simnav.log.nmea import read_nmea
 from simnav.log.reader import READERS
 from simnav.log.table import LogError, LogWarning, Table, utc_seconds
 from simnav.log.text_forms import form_of_text
-from simnav.log.time_units import other_unit
+from simnav.log.time_units import MONTH, other_unit
 from simnav.log.units import dimension, factor, spelt, units_row
 from simnav.types import Array
 
@@ -43,6 +43,8 @@ _TIME = re.compile(r"^#?\s*(time|times|timestamp|stamp|t|utc|sec|secs|seconds|ep
 _DATE = re.compile(r"^\s*(date|day|%?\s*ymd)\b", re.I)
 #: Times of this size are in this unit.
 _LARGE = ((1e17, "ns"), (1e14, "us"), (1e11, "ms"))
+#: Where all streams have less than a row in this time [s], their times are in a smaller unit.
+_RARE = 100.0
 #: Columns of an IMU.
 _INERTIAL = re.compile(
     r"(?:^|[./_ ])(a|g|w|acc|gyro?|accel|omega|angular_(rate|velocity)|specific_force|(linear_)?acceleration)[_ .]?"
@@ -188,7 +190,9 @@ def streams_of(path: Path) -> list[Stream]:
 def _timed(stream: Stream, others: Sequence[Array] = ()) -> Stream:
     """The stream with its times in the unit in which they probably are."""
     unit = stream.keys.get("time_unit", "s" if stream.form in _OF_ARRAYS else "")
-    found = other_unit(unit, stream.time, others, inertial=_is_inertial(stream))
+    every = [float(np.median(np.diff(t))) for t in (stream.time, *others) if len(t) > 1]
+    longest = 0.0 if len(every) > 1 and min(every) > _RARE else MONTH
+    found = other_unit(unit, stream.time, others, inertial=_is_inertial(stream), longest=longest)
     if found is None:
         return stream
     note = f"its times are taken for {found}: as {unit} they would be {described(stream.time)}"

@@ -10,7 +10,7 @@ from simnav.log.files import FileSpec
 from simnav.log.units import DIMENSIONS, factor
 from simnav.types import Array
 
-__all__ = ["SLOWEST_IMU", "other_unit", "unit_to_write"]
+__all__ = ["MONTH", "SLOWEST_IMU", "other_unit", "unit_to_write"]
 
 #: Units that loggers count in, each a thousandth of the one before.
 _UNITS = DIMENSIONS["time"][:4]
@@ -23,10 +23,12 @@ _APART, _ALIKE = 0.01, 0.5
 #: Times since 1970 are seconds between these.
 _SINCE_1970 = 1e9, 1e10
 #: A log that seems to last longer, with less than a row a minute, is read in a wrong unit [s].
-_MONTH, _MINUTE = 30.0 * 86400.0, 60.0
+MONTH, _MINUTE = 30.0 * 86400.0, 60.0
 
 
-def other_unit(unit: str, time: Array, others: Iterable[Array], *, inertial: bool) -> str | None:
+def other_unit(
+    unit: str, time: Array, others: Iterable[Array], *, inertial: bool, longest: float = MONTH
+) -> str | None:
     """The unit in which times probably are, if it is another one than that in which they were read.
 
     Parameters
@@ -39,6 +41,8 @@ def other_unit(unit: str, time: Array, others: Iterable[Array], *, inertial: boo
         Times of the other streams of the log [s].
     inertial : bool
         Whether the stream is of an IMU.
+    longest : float
+        A log with less than a row a minute is no longer than this [s].
 
     Returns
     -------
@@ -61,8 +65,8 @@ def other_unit(unit: str, time: Array, others: Iterable[Array], *, inertial: boo
     stamped = _SINCE_1970[0] < abs(time[0]) < _SINCE_1970[1] and spacing < 10.0
     if inertial and not stamped and (spacing >= 1.0 / SLOWEST_IMU or spacing < 1.0 / high):
         return next(iter(times), None)
-    if not inertial and spacing > _MINUTE and time[-1] - time[0] > _MONTH:
-        return next((u for u, t in times.items() if t[-1] - t[0] < _MONTH), None)
+    if not inertial and spacing > _MINUTE and time[-1] - time[0] > longest:
+        return next((u for u, t in times.items() if t[-1] - t[0] < MONTH), None)
     return None
 
 

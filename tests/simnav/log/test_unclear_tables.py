@@ -78,6 +78,16 @@ def test_a_file_in_another_unit_than_the_others_fails_the_check(tiny):
     )
 
 
+def test_a_log_in_which_all_is_rare_is_in_milliseconds(tmp_path):
+    for name, columns in (("fixes", "lat,lon"), ("compass", "heading_deg,quality")):
+        rows = "".join(f"{1000 * k},{50 + 1e-5 * k},{10.0}\n" for k in range(60))
+        (tmp_path / f"{name}.csv").write_text(f"time,{columns}\n{rows}")
+    streams, _ = inspect_log([tmp_path])
+    assert [s.keys["time_unit"] for s in streams] == ["ms", "ms"]
+    (alone,), _ = inspect_log([tmp_path / "fixes.csv"])  # nothing tells
+    assert alone.keys["time_unit"] == "s"
+
+
 def test_times_that_fit_have_no_other_unit():
     second, hour = np.arange(0.0, 120.0), np.arange(0.0, 3600.0)
     assert other_unit("s", second, [hour], inertial=False) is None
