@@ -15,9 +15,11 @@ from simnav.kinds import KINDS
 from simnav.leaderboard.campaign.request import requests
 from simnav.log.channel import list_recordings
 from simnav.log.check import check_log
-from simnav.log.draft import draft, guesses, rewritten
+from simnav.log.draft import draft, guesses
+from simnav.log.draft_readings import rewritten
 from simnav.log.inspection import Stream
 from simnav.log.readings import probable_readings
+from simnav.log.spec import TO_FILL_IN
 from simnav.log.table import LogError
 from simnav.scenario import parse
 from simnav.source import open_source
@@ -52,7 +54,7 @@ class Inspection:
     draft : str
         A scenario to begin with, as TOML; empty where none was asked for.
     readings : tuple of simnav.log.readings.ProbableReading
-        What the draft reads otherwise than by names and sizes, because the streams say so.
+        How the streams are probably read otherwise than by names and sizes; the draft has those that are sure.
     missing : str
         One sentence that says what a person must add before the draft can be run; empty where nothing is missing.
     run : RunReport or None
@@ -94,9 +96,9 @@ class _Drafted:
 def drafted(streams: Sequence[Stream], name: str, file: str) -> _Drafted:
     """A scenario to begin with, with the readings of its streams that are far more likely, and their probability."""
     text = draft(streams, name, file)
-    if not text.count("[log.reference.position]"):
+    if not streams or TO_FILL_IN in text:
         return _Drafted(text, None, (), (
-            "no columns hold latitude and longitude, so there is no reference: add a file that has them, or write "
+            "no columns hold latitude and longitude, so there is no reference: add a file that has them, or fill in "
             "[log.reference.position] for positions in metres, with [log.origin]"
         ))  # fmt: skip
     try:

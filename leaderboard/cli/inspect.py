@@ -11,6 +11,7 @@ from simnav.leaderboard.logs import inspect_log
 from simnav.leaderboard.ranking import tables
 from simnav.log.check import described
 from simnav.log.draft import guesses
+from simnav.log.draft_readings import SURE
 from simnav.log.inspection import track_of
 
 from .commands import InspectCommand
@@ -46,7 +47,8 @@ def show(out: Output, request: InspectCommand) -> None:
         for sentence in looked.unknown:
             out.remark(sentence)
     for reading in looked.readings:
-        out.remark(f"read so, against its names and sizes: {reading.what} (probability {reading.shown})")
+        so = "read so" if reading.probability >= SURE else "perhaps, and only a comment of the scenario"
+        out.remark(f"{so}, against its names and sizes: {reading.what} (probability {reading.shown})")
     if run is not None:
         out.print(*run.shown())
         for e in run.estimators:

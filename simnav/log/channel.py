@@ -29,9 +29,11 @@ from simnav.types import KINDS, Array
 
 __all__ = [
     "Series",
+    "check_cells",
     "geodetic_from_local",
     "list_recordings",
     "locate",
+    "no_fix",
     "open_file",
     "read_channel",
     "skip_of",
@@ -59,6 +61,10 @@ _GTSAM = "gtsam:"
 _TURN = 2.0 * math.pi
 #: No angle in degrees is as large as this, taken as one in radians.
 _DEGREES = 1e3
+#: An angle that is larger is none in degrees.
+_LARGEST_DEGREES = 361.0
+#: No position is so far from its origin [m].
+_FAR = 1e8
 #: A quaternion has the length 1, within this.
 _UNIT_LENGTH = 0.1
 
@@ -269,11 +275,19 @@ def read_channel(spec: RecordedSpec, channel: ChannelSpec, what: str, recording:
             f"{table.source}: {what} needs {len(names)} columns ({', '.join(names)}){other}, but {len(columns)} are "
             "given"
         )
+    if kind.geodetic and channel.frame == "geodetic":
+        rows = _fixes(table, columns, rows, what)
+    given_rows = len(rows)
     if channel.drop_repeated:  # before rows are chosen: else the reference has the fix of the estimator once more
         rows = _fresh(table, columns, rows)
     rows = rows[channel.first :: channel.every] if channel.hold_out is None else rows[:: channel.every]
     if channel.hold_out is not None:
         rows = np.delete(rows, np.s_[channel.first :: channel.hold_out])
+    if given_rows and not len(rows):
+        raise LogError(
+            f"{table.source}: of its {given_rows} {'row' if given_rows == 1 else 'rows'} with {what} every = "
+            f"{channel.every} and hold_out = {channel.hold_out} leave none; more rows are wanted"
+        )
     units = (
         (channel.units,) * len(columns) if isinstance(channel.units, str) else channel.units or ("1",) * len(columns)
     )
@@ -305,8 +319,10 @@ def read_channel(spec: RecordedSpec, channel: ChannelSpec, what: str, recording:
     if channel.frame != "geodetic" and kind.geodetic:
         if spec.origin is None:
             raise LogError(f"{table.source}: frame = {channel.frame!r} of {what} needs [log.origin]")
+        for i, (column, unit) in enumerate(zip(columns, units, strict=True)):
+            check_cells(value[:, i], _FAR, factor(unit), column, table, rows, "position")
         value = geodetic_from_local(value, spec.origin, channel.frame)[:, : len(names)]
-    _check_range(value, kind, columns, table, rows)
+    _check_range(value, kind, columns, units, table, rows)
     if channel.frame != "geodetic" and not kind.geodetic:
         value = _of_frame(value, kind, channel.frame, f"{table.source}: frame = {channel.frame!r}")
     if channel.variation is not None or channel.variation_model is not None:
@@ -333,6 +349,35 @@ def _angles(quaternion: Array, columns: Sequence[Column], table: Table, rows: ND
             "(scalar, x, y, z)?"
         )
     return rpy_from_dcm(dcm_from_quaternion(quaternion / length[:, None]))
+
+
+def no_fix(place: Array) -> NDArray[np.bool_]:
+    """Which of (n, 2) latitudes and longitudes, in any unit, are no fixes.
+
+    A receiver without a fix writes latitude 0 and longitude 0. A vessel that comes there also has fixes beside it.
+    """
+    zero = (place == 0.0).all(axis=1)
+    away = np.abs(place[~zero]).sum(axis=1)
+    away = away[np.isfinite(away)]
+    return np.asarray(zero & bool(not len(away) or away.min() > 0.5 * np.median(away)), dtype=np.bool_)
+
+
+def _fixes(table: Table, columns: Sequence[Column], rows: NDArray[np.int64], what: str) -> NDArray[np.int64]:
+    """The rows that are fixes."""
+    if any(isinstance(c, str) and c.startswith("=") for c in columns[:2]):
+        return rows
+    none = no_fix(np.stack([table.column(c)[1][rows] for c in columns[:2]], axis=-1))
+    if not none.any():
+        return rows
+    if none.all():
+        raise LogError(f"{table.source}: all {len(rows)} rows have latitude 0 and longitude 0: the receiver had no fix")
+    warnings.warn(
+        f"{table.source}: {none.sum()} of {len(rows)} rows of {what} have latitude 0 and longitude 0, so they are no "
+        f"fixes and left out, the first is line {table.line[rows[none][0]]}",
+        LogWarning,
+        3,
+    )
+    return rows[~none]
 
 
 def _fresh(table: Table, columns: Sequence[Column], rows: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -441,14 +486,54 @@ def _check_units(
             raise LogError(f"{source}, column {column!r}: {component.name} of {what} in {unit!r}; {right}")
 
 
-def _check_range(
-    value: Array, kind: Kind, columns: tuple[int | str, ...], table: Table, rows: NDArray[np.int64]
+def check_cells(
+    value: Array, limit: float, scale: float, column: Column, table: Table, rows: NDArray[np.int64], name: str
 ) -> None:
-    """LogError where an angle is larger than it can be in radians."""
+    """LogError where a few of n values are larger than possible: single cells, and no wrong unit of all.
+
+    Parameters
+    ----------
+    value : (n,) array
+        In SI units.
+    limit : float
+        The largest possible one (SI).
+    scale : float
+        Factor of the unit of the cells to SI.
+    column, table, rows, name
+        For messages: the column, its table, which rows the values are of, and what they are.
+    """
+    bad = np.flatnonzero(np.abs(value) > limit)
+    if not 0 < 2 * bad.size <= len(value):
+        return
+    plain, most = str(column).removeprefix("-"), abs(limit / scale)
+    cell = value[bad[0]] / scale * (-1.0 if plain != str(column) else 1.0)
+    more = f" and {bad.size - 1} more" if bad.size > 1 else ""
+    raise LogError(
+        f"{table.source}, line {table.line[rows[bad[0]]]}{more}, column {plain!r}: {cell:.6g} is no "
+        f"possible {name}, the other rows have one; leave it out: where = '-{most:.6g} < `{plain}` < {most:.6g}'"
+    )
+
+
+def _check_range(
+    value: Array,
+    kind: Kind,
+    columns: tuple[int | str, ...],
+    units: tuple[str, ...],
+    table: Table,
+    rows: NDArray[np.int64],
+) -> None:
+    """LogError where an angle is larger than it can be in radians, or a cell than anything of its kind."""
     for i, component in enumerate(kind.components):
+        cells = i < len(columns) == len(kind.components)
+        scale = factor(units[i]) if cells else 1.0
         if component.unit != "deg":
+            if cells:
+                check_cells(value[:, i], component.limit, scale, columns[i], table, rows, component.name)
             continue
         limit = 2.0 * math.pi if component.cyclic else component.limit
+        if cells:  # in no unit of angles
+            none = _LARGEST_DEGREES if scale == 1.0 else math.radians(_LARGEST_DEGREES)
+            check_cells(value[:, i], none, scale, columns[i], table, rows, component.name)
         bad = np.flatnonzero(np.abs(value[:, i]) > limit + 1e-9)
         if bad.size:
             huge = abs(value[bad[0], i]) > _DEGREES
@@ -460,7 +545,12 @@ def _check_range(
                 )
             raise LogError(
                 f"{table.source}, line {table.line[rows[bad[0]]]}, column {columns[i]!r}: {component.name} would be "
-                f"{value[bad[0], i]:.6g} rad; is its unit 'deg'" + (", or '1e-7 deg'?" if huge else "?")
+                f"{value[bad[0], i]:.6g} rad; "
+                + (
+                    "is its unit 'deg'" + (", or '1e-7 deg'?" if huge else "?")
+                    if huge or scale == 1.0 or not kind.geodetic
+                    else "it may be degrees and minutes, like 5412.5 for 54 deg 12.5': a table should have degrees"
+                )
             )
 
 

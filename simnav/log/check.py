@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -14,6 +14,7 @@ from simnav.log.imu_series import read_imu
 from simnav.log.readings import probable_readings
 from simnav.log.source import LogSource
 from simnav.log.table import LogError
+from simnav.log.time_units import unit_to_write
 from simnav.spec import SpecError
 from simnav.types import Array
 
@@ -96,14 +97,13 @@ def check_log(scenario: Scenario) -> LogCheck:
         return LogCheck(scenario.id, (LogFinding("", "recordings", "error", str(error)),))
     found: list[LogFinding] = []
     for seed, recording in enumerate(names):
-        broken = False
+        before, made = len(found), dict[str, Any]()
         for part, read in _parts(scenario, recording):
-            findings = list(_read(recording, part, read))
-            broken = broken or any(f.level == "error" for f in findings)
-            found += findings
-        if not broken:
+            found += _read(recording, part, read, made)
+        found += _of_clocks(scenario, recording, made)
+        if not any(f.level == "error" for f in found[before:]):
             known = {f.sentence for f in found}
-            run = _read(recording, "run", lambda seed=seed: LogSource(scenario, seed))  # type: ignore[misc]
+            run = _read(recording, "run", lambda seed=seed: LogSource(scenario, seed), {})  # type: ignore[misc]
             found += [f for f in run if f.sentence not in known]
             if not any(f.level == "error" for f in found if f.recording == recording):
                 found += [
@@ -132,8 +132,31 @@ def _parts(scenario: Scenario, recording: str) -> Iterator[tuple[str, Callable[[
             )
 
 
-def _read(recording: str, part: str, read: Callable[[], Any]) -> Iterator[LogFinding]:
-    """The findings about one part: what it holds or why it cannot be read, and all warnings."""
+def _of_clocks(scenario: Scenario, recording: str, parts: Mapping[str, Any]) -> Iterator[LogFinding]:
+    """A finding for each file whose times would be those of the other parts in another unit."""
+    log = scenario.log
+    assert log is not None
+    times = {name: p.time if isinstance(p, Series) else p.edge for name, p in parts.items()}
+    said: set[str] = set()
+    for name, time in times.items():
+        channel = log.imu if name == "imu" else log.instruments.get(name)
+        if name.startswith("reference."):
+            channel = getattr(log.reference, name.partition(".")[2])
+        assert channel is not None
+        key = str(channel.file)
+        others = [t for n, t in times.items() if n != name]
+        right = "" if key in said else unit_to_write(log.files[key], time, others, inertial=name == "imu")
+        if right:
+            said.add(key)
+            yield LogFinding(
+                recording, name, "error",
+                f"{parts[name].source}: its times, {time[0]:.3f} to {time[-1]:.3f} s, are not those of the other "
+                f"instruments, but would be with {right} of its file: write that",
+            )  # fmt: skip
+
+
+def _read(recording: str, part: str, read: Callable[[], Any], parts: dict[str, Any]) -> Iterator[LogFinding]:
+    """The findings about one part: what it holds or why it cannot be read, and all warnings; what it holds by name."""
     with warnings.catch_warnings(record=True) as said:
         warnings.simplefilter("always")
         try:
@@ -145,6 +168,7 @@ def _read(recording: str, part: str, read: Callable[[], Any]) -> Iterator[LogFin
         yield LogFinding(recording, part, "note", " ".join(str(warning.message).split()))
     if made is None:
         return
+    parts[part] = made
     if isinstance(made, LogSource):
         yield LogFinding(recording, part, "ok", f"{made.duration:g} s; {made.note}".rstrip("; "))
     elif isinstance(made, Series):

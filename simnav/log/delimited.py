@@ -20,10 +20,10 @@ from simnav.log.kept import kept
 from simnav.log.reader import Rows, register_reader
 from simnav.log.table import LogError, LogWarning, Table, utc_seconds
 from simnav.log.text_forms import form_of_text
-from simnav.log.units import factor
+from simnav.log.units import factor, units_row
 from simnav.types import Array
 
-__all__ = ["date_and_time", "read_csv", "rows_of"]
+__all__ = ["date_and_time", "lines_above", "read_csv", "rows_of"]
 
 _DELIMITERS = (",", ";", "\t", " ")
 _MISSING = ["", "nan", "NaN", "NAN", "NA", "null"]
@@ -32,17 +32,15 @@ _DECIMAL_COMMA = re.compile(rb'\s*"?[+-]?\d+,\d+(?:[eE][+-]?\d+)?"?\s*')
 _DECIMAL_POINT = re.compile(rb'\s*"?[+-]?\d+\.\d+(?:[eE][+-]?\d+)?"?\s*')
 #: So many bytes tell whether numbers have decimal commas.
 _HEAD = 4096
+#: So many lines show where a table begins, if so many of them are its header and rows.
+_SEEN, _LEAST = 200, 4
 #: Arrow's words for a cell that does not fit the type of its column: the number of the column, and the type.
 _NOT_OF_TYPE = re.compile(r"In CSV column #(\d+): .*?conversion error to (\w+)", re.DOTALL)
 
 
 @register_reader("csv", title="a table")
 def _read(path: Path, file: FileSpec, sentence: str | None, talker: str | None) -> Rows:
-    table = read_csv(path, file.comment)
-    if len(table) <= file.skip_rows:
-        raise LogError(f"{table.source}: {len(table)} rows, of which skip_rows = {file.skip_rows} leaves none")
-    table = table.without_first(file.skip_rows)  # before anything is taken for a number: it may be a row of units
-    return rows_of(table, file)
+    return rows_of(read_csv(path, file.comment, file.skip_lines, file.skip_rows), file)
 
 
 def rows_of(table: Table, file: FileSpec) -> Rows:
@@ -118,7 +116,7 @@ def _time(table: Table, file: FileSpec, column: str) -> Array:
 
 
 @kept(64)
-def read_csv(path: Path, comment: str = "") -> Table:
+def read_csv(path: Path, comment: str = "", skip_lines: int = 0, skip_rows: int = 0) -> Table:
     """Read a table of numbers with or without a header, separated by comma, semicolon, tab or blank.
 
     With semicolons or tabs between them, numbers may have a decimal comma. The result is kept for the life of the
@@ -130,6 +128,8 @@ def read_csv(path: Path, comment: str = "") -> Table:
         The file: text in UTF-8, UTF-16 or Latin-1.
     comment : str
         Lines that begin with it are left out, wherever they stand.
+    skip_lines, skip_rows : int
+        Lines above the header, and rows below it, that are left out: see `simnav.log.files.FileSpec`.
 
     Raises
     ------
@@ -140,25 +140,26 @@ def read_csv(path: Path, comment: str = "") -> Table:
 
     refuse_binary(path, "csv")
     content, mark = _utf8(path), comment.encode()
-    first, blank = "", 0
-    for raw in io.BytesIO(content):
-        if raw.strip() and not _marked(raw, mark):
-            first = raw.decode()
-            break
-        blank += 1
-    first = first.strip("\r\n")
+    if nuls := content.count(b"\0"):
+        line = content.count(b"\n", 0, content.index(b"\0")) + 1
+        raise LogError(
+            f"{path}, line {line}: it has {'a NUL byte' if nuls == 1 else f'the first of {nuls} NUL bytes'}, which a "
+            "logger leaves that loses its power; take such lines out of the file"
+        )
+    below = io.BytesIO(content)
+    first, blank = _next_line(below, mark, skip_lines)
     if not first.strip():
-        raise LogError(f"{path}: the file is empty")
-    delimiter = next((d for d in _DELIMITERS if d in first), ",")
-    if delimiter == "," and ";" in first and all(_is_number(c.replace(",", ".", 1)) for c in first.split(";")):
-        delimiter = ";"  # numbers with decimal commas
+        raise LogError(f"{path}: the file is empty" + (f" below skip_lines = {skip_lines}" if skip_lines else ""))
+    delimiter = _delimiter(first)
     blanks = delimiter == " "
-    cells = [c.strip().strip('"') for c in (first.split() if blanks else first.split(delimiter))]
-    header = not any(_is_number(c.replace(",", ".", 1)) for c in cells)
+    cells = _cells(first, delimiter)
+    header = not any(map(_is_a_number, cells))
     names = cells if header else [str(i) for i in range(1, len(cells) + 1)]
     if len(set(names)) != len(names):
         raise LogError(f"{path}, line {blank + 1}: two columns share a name: {', '.join(names)}")
     begin = blank + int(header)  # lines before the data
+    for _ in range(skip_rows):
+        begin += _next_line(below, mark, 0, empty=True)[1] + 1
     start = 0
     for _ in range(begin):
         start = content.find(b"\n", start) + 1 or len(content)
@@ -200,6 +201,67 @@ def read_csv(path: Path, comment: str = "") -> Table:
     if numbers is None:
         numbers = np.arange(begin + 1, begin + 1 + count)
     return Table(str(path), columns, numbers[:count])
+
+
+def lines_above(path: Path, comment: str = "") -> int | None:
+    """How many lines of other text stand above the header of a table.
+
+    The first lines of the file show the table by their number of cells: it reaches up from the last of them. Above its
+    numbers must be a line of names, or no line with as many cells.
+
+    Parameters
+    ----------
+    path : Path
+        A file of text.
+    comment : str
+        Lines that begin with it do not count.
+
+    Returns
+    -------
+    int or None
+        0 also where it is not clear; None where no line looks like a row of a table.
+    """
+    mark = comment.encode()
+    head = [line.decode() for line in _utf8(path).split(b"\n")[:_SEEN]]
+    shown = [(n, line) for n, line in enumerate(head[:-1]) if line.strip() and not _marked(line.encode(), mark)]
+    if not shown:
+        return None
+    delimiter = _delimiter(shown[-1][1])
+    rows = [(n, _cells(line, delimiter)) for n, line in shown]
+    width = len(rows[-1][1])
+    if not any(len(cells) > 1 and any(map(_is_a_number, cells)) for _, cells in rows):
+        return None
+    first = next((k for k in range(len(rows) - 1, -1, -1) if len(rows[k][1]) != width), -1) + 1
+    named = next((k for k in range(first, len(rows)) if any(map(_is_a_number, rows[k][1]))), len(rows))
+    if width < 2 or len(rows) < _LEAST or len(rows) - named < _LEAST - 1:
+        return 0
+    texts = named - first  # names, a row of units, and a line above that has as many cells by chance
+    if not texts:
+        return 0 if any(len(cells) == width for _, cells in rows[:first]) else rows[first][0]
+    of_units = texts > 1 and units_row(rows[named - 1][1]) is not None
+    return rows[named - 1 - int(of_units)][0]
+
+
+def _delimiter(line: str) -> str:
+    """What separates the cells of a line."""
+    found = next((d for d in _DELIMITERS if d in line.strip()), ",")
+    if found == "," and ";" in line and all(map(_is_a_number, line.split(";"))):
+        return ";"  # numbers with decimal commas
+    return found
+
+
+def _cells(line: str, delimiter: str) -> list[str]:
+    return [c.strip().strip('"') for c in (line.split() if delimiter == " " else line.split(delimiter))]
+
+
+def _next_line(lines: Iterable[bytes], mark: bytes, skip: int, *, empty: bool = False) -> tuple[str, int]:
+    """The next line that counts, and how many stand before it."""
+    before = 0
+    for raw in lines:
+        if before >= skip and (empty or raw.strip()) and not _marked(raw, mark):
+            return raw.decode().strip("\r\n"), before
+        before += 1
+    return "", before
 
 
 def _decimal_commas(head: bytes, delimiter: str) -> bool:
@@ -259,9 +321,10 @@ def _end_of_rows(content: bytes, start: int, path: Path, delimiter: str, width: 
     return cut + 1
 
 
-def _is_number(cell: str) -> bool:
+def _is_a_number(cell: str) -> bool:
+    """Whether a cell is a number, also with a decimal comma."""
     try:
-        float(cell)
+        float(cell.replace(",", ".", 1))
     except ValueError:
         return False
     return True
@@ -296,9 +359,11 @@ def _ragged(path: Path, lines: Iterable[tuple[int, bytes]], delimiter: str, widt
         line = raw.decode().rstrip("\r")
         count = len(line.split()) if delimiter == " " else line.count(delimiter) + 1
         if line.strip() and count != width:
-            form = form_of_text(path)
+            form, above = form_of_text(path), lines_above(path)
             right = (
-                "lines that are no data are left out by 'comment', the mark that they begin with"
+                ("no header of a table is found; " if above is None else "")
+                + "lines that are no data are left out by 'comment', the mark that they begin with"
+                + (f"; the table seems to begin in line {above + 1}: write skip_lines = {above}" if above else "")
                 if form is None
                 else f"it looks like a file of format = {form!r}"
             )

@@ -10,14 +10,16 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from simnav.log.channel import no_fix
 from simnav.log.inspection import WITH_TOPICS, Stream
-from simnav.log.readings import ProbableReading
-from simnav.log.units import dimension
+from simnav.log.spec import TO_FILL_IN
+from simnav.log.units import dimension, spelt
 from simnav.log.variation import dated
 from simnav.types import Array
 
-__all__ = ["Guess", "draft", "guesses", "rewritten"]
+__all__ = ["Guess", "draft", "guesses"]
 
 _AXES = r"(?:_|\.|\[|\s|-)?"
 _LABEL = {
@@ -34,6 +36,12 @@ _PHONE = {"angular_rate": ("y", "x", "-z"), "specific_force": ("y", "x", "-z")}
 _MEASURED = {"dataflash": r"GPS", "ulog": r"sensor_gps|vehicle_gps_position"}
 #: Fixes of autopilots that count.
 _FIXED = {"Status": "Status >= 3", "fix_type": "fix_type >= 3"}
+_WITHOUT = (
+    "# No columns with latitude and longitude were found in {} streams. A scenario needs\n"
+    "# positions as a reference: see docs/how-to/use-your-own-log.md.\n"
+)
+#: Latitudes and longitudes of this size are in 1e-7 degrees.
+_SCALED = 1e5
 #: An IMU whose specific force is so far from the vertical is not level [rad].
 _TILTED = np.radians(15.0)
 #: Specific force of a vessel, on the mean [m/s^2].
@@ -84,15 +92,6 @@ _COMPASSES = {"HDT": 2, "THS": 2, "HDG": 1, "HDM": 1}
 _EVERY = 10
 #: From this share of repeated values on they are left out.
 _MANY = 0.3
-#: Units as headers write them, in brackets or after an underscore at the end, where they are not those of `LOG_UNITS`.
-_SPELT = {
-    "dps": "deg_s", "deg/s": "deg_s", "deg/sec": "deg_s", "degs": "deg_s", "\N{DEGREE SIGN}/s": "deg_s",
-    "rad/s": "rad_s", "rad/sec": "rad_s", "rads": "rad_s", "rps": "rad_s",
-    "rad s^-1": "rad_s", "m s^-2": "m_s2", "m s^-1": "m_s",
-    "m/s2": "m_s2", "m/s^2": "m_s2", "m/s/s": "m_s2", "m/s\N{SUPERSCRIPT TWO}": "m_s2", "mps2": "m_s2", "ms2": "m_s2",
-    "m/s": "m_s", "mps": "m_s", "km/h": "km_h", "kmh": "km_h", "kt": "kn", "kts": "kn", "knots": "kn",
-    "degrees": "deg", "\N{DEGREE SIGN}": "deg", "e7": "1e-7 deg", "dege7": "1e-7 deg",
-}  # fmt: skip
 #: Names of increments.
 _INCREMENTS = re.compile(r"\b(d_?theta|d_?vel|delta_?(theta|angle|vel))", re.I)
 _UNIT = re.compile(r"(?:\[([^\]]+)\]|\(([^)]+)\)|_((?:deg|rad|m|cm|mm)_s2?|[^_\W]+))\s*$")
@@ -124,10 +123,17 @@ class Guess:
     columns: tuple[str, ...]
     units: tuple[str, ...]
 
+    @property
+    def without_fix(self) -> NDArray[np.bool_]:
+        """(n,) which rows of a position are no fixes."""
+        return no_fix(np.stack([self.stream.table.column(c)[1] for c in self.columns[:2]], axis=-1))
+
     def sentence(self) -> str:
         """As text."""
         pairs = ", ".join(f"{c} [{u}]" for c, u in zip(self.columns, self.units, strict=True))
-        return f"{self.quantity.replace('_', ' ')}: {pairs}"
+        none = int(np.sum(self.without_fix)) if self.quantity == "position" else 0
+        left = f"; {none} with latitude 0 and longitude 0 are no fixes" if none else ""
+        return f"{self.quantity.replace('_', ' ')}: {pairs}{left}"
 
 
 def guesses(stream: Stream) -> Iterator[Guess]:
@@ -143,11 +149,16 @@ def guesses(stream: Stream) -> Iterator[Guess]:
             continue
         values = np.stack([stream.table.column(n)[1] for n in found], axis=-1)
         values = values[np.isfinite(values).all(axis=1)]
+        if quantity == "position":
+            values = values[~no_fix(values[:, :2])]
         if not len(values) or (quantity == "quaternion" and not _turns(values)):
             continue
         columns, units = _signed(quantity, found, values), _units(stream, quantity, values)
         if stream.form != "nmea":
-            told = [_named(name, what) for name, what in zip(found, _DIMENSIONS[quantity], strict=False)]
+            told = [_told(stream, name, what) for name, what in zip(found, _DIMENSIONS[quantity], strict=False)]
+            if units[0] == "1e-7 deg":  # no matter that a name says degrees
+                size = np.median(np.abs(values[:, :2]), axis=0)
+                told[:2] = [u if s < _SCALED else units[0] for u, s in zip(told, size, strict=False)]
             units = *(a or b for a, b in zip(told, units, strict=False)), *units[len(found) :]
         yield Guess(stream, quantity, columns, units)
     numbered = [n for n in (f"q_{i}" for i in range(1, 5)) if n in names]  # PX4: scalar first
@@ -184,7 +195,7 @@ def _bare(stream: Stream, names: Sequence[str]) -> Guess | None:
     if not len(values) or (quantity == "specific_force" and np.linalg.norm(values.mean(axis=0)) < 0.5):
         return None  # gravity was taken out
     units = _units(stream, quantity, values)
-    units = tuple(_named(n, _DIMENSIONS[quantity][0]) or u for n, u in zip(columns, units, strict=True))
+    units = tuple(_told(stream, n, _DIMENSIONS[quantity][0]) or u for n, u in zip(columns, units, strict=True))
     if stream.form == "csv" and quantity in _PHONE:
         own = dict(zip("xyz", columns, strict=True))
         axes = tuple(f"-{own[a[1:]]}" if a.startswith("-") else own[a] for a in _PHONE[quantity])
@@ -192,13 +203,16 @@ def _bare(stream: Stream, names: Sequence[str]) -> Guess | None:
     return Guess(stream, quantity, _signed(quantity, columns, values), units)
 
 
-def _named(name: str, what: str) -> str | None:
-    """The unit that the name of a column says, if it is one of what is measured."""
+def _told(stream: Stream, name: str, what: str) -> str | None:
+    """The unit that a row of units or the name of a column says, if it is one of what is measured."""
+    unit = stream.units.get(name, "")
+    if unit and dimension(unit) == what:
+        return unit
     match = _UNIT.search(name.strip())
     if match is None:
         return None
     text = next(g for g in match.groups() if g is not None).strip()
-    unit = _SPELT.get(text.lower(), "" if " " in text else text)
+    unit = spelt(text)
     return unit if dimension(unit) == what else None
 
 
@@ -231,7 +245,7 @@ def _units(stream: Stream, quantity: str, values: Array) -> tuple[str, ...]:
         return ("1",) * (3 if quantity in ("position", "velocity") else width)
     if quantity == "position":
         angle = "rad" if np.abs(values[:, 0]).max() < 1.58 and np.abs(values[:, 1]).max() < 3.15 else "deg"
-        if np.abs(values[:, :2]).max() > 361.0:
+        if np.median(np.abs(values[:, :2]).max(axis=1)) > _SCALED:
             angle = "1e-7 deg"
         return angle, angle, "mm" if angle == "1e-7 deg" and stream.form == "ulog" else "m"
     if quantity == "quaternion":
@@ -286,11 +300,12 @@ def draft(streams: Sequence[Stream], name: str = "my-log", file: str | None = No
             best[guess.quantity] = guess
     fixes = best.get("position")
     position = fixes if reference is None else reference["position"]
+    if position is None and not streams:
+        return _WITHOUT.format(0)
+    known = position is not None
     if position is None:
-        return (
-            f"# No columns with latitude and longitude were found in {len(streams)} streams. A scenario needs\n"
-            "# positions as a reference: see docs/how-to/use-your-own-log.md.\n"
-        )
+        longest = max(streams, key=lambda s: float(np.ptp(s.time)) if len(s.time) else 0.0)
+        position = Guess(longest, "position", (TO_FILL_IN,), ("deg", "deg", "m"))
     rate, force = best.get("angular_rate"), best.get("specific_force")
     if rate is not None and force is not None and rate.stream is not force.stream:  # rather both of one stream
         both = [(r, f) for r in found for f in found if r.stream is f.stream
@@ -301,8 +316,13 @@ def draft(streams: Sequence[Stream], name: str = "my-log", file: str | None = No
     used = [position, *(g for q, g in best.items() if q in _INSTRUMENTS), *([attitude] if attitude is not None else [])]
     if rate is not None and force is not None:
         used += [rate, force]
+    if not known:  # in any of them may be positions
+        used += [Guess(s, "", (), ()) for s in streams]
     keys = _file_keys(used)
-    span = float(position.stream.time[-1] - position.stream.time[0])
+    time = position.stream.time
+    if known and len(time) == len(position.stream.table):
+        time = time[~position.without_fix]
+    span = float(np.ptp(time)) if len(time) else 0.0
     lines = [
         "# A scenario to begin with. Check everything that is marked: simnav cannot know it.",
         f"# Then: simnav check {file or f'{name}.toml'}; simnav run {file or f'{name}.toml'}",
@@ -339,7 +359,8 @@ def draft(streams: Sequence[Stream], name: str = "my-log", file: str | None = No
                   'quality = "Q"                  # only fixed and float solutions are scored']  # fmt: skip
     lines += ["", *_channel("log.reference.position", position, keys)]
     if reference is None:
-        lines.append(f"hold_out = {_EVERY}                  # ... and the others to compare with")
+        if known:
+            lines.append(f"hold_out = {_EVERY}                  # ... and the others to compare with")
         if attitude is not None:
             lines += ["", *_channel("log.reference.attitude", attitude, keys)]
     else:
@@ -357,7 +378,7 @@ def draft(streams: Sequence[Stream], name: str = "my-log", file: str | None = No
             hertz *= 1.0 - (_repeated(guess) if _stale(guess) else 0.0)
             hertz = hertz / _EVERY if quantity == "position" and reference is None else hertz
             lines += ["", f"[instruments.{label}]", kind, f"rate_hz = {_round(hertz)}", f"{sigma}   # check"]
-    return "\n".join(lines) + "\n"
+    return ("" if known else _WITHOUT.format(len(streams))) + "\n".join(lines) + "\n"
 
 
 def _solution(found: Sequence[Guess]) -> dict[str, Guess] | None:
@@ -380,7 +401,7 @@ def _of_angles(level: Guess, heading: Guess) -> Guess:
     """Roll, pitch and yaw of one stream, in one unit where no name says another: small angles do not tell theirs."""
     columns, units = level.columns + heading.columns, level.units + heading.units
     one = "deg" if "deg" in units else "rad"
-    told = tuple(_named(c, "angle") or one for c in columns) if level.stream.form != "nmea" else units
+    told = tuple(_told(level.stream, c, "angle") or one for c in columns) if level.stream.form != "nmea" else units
     return Guess(level.stream, "attitude", columns, told)
 
 
@@ -461,6 +482,13 @@ def _toml(value: Any) -> str:
 
 def _channel(table: str, guess: Guess, keys: _Keys) -> list[str]:
     stream = guess.stream
+    if guess.columns == (TO_FILL_IN,):
+        return [
+            f"[{table}]",
+            f'file = "{TO_FILL_IN}"                # the name in [log.files] of the file that has positions',
+            f'columns = ["{TO_FILL_IN}"]           # its columns of latitude, longitude and height',
+            f"units = {_toml(guess.units)}   # check",
+        ]
     lines = [f"[{table}]", f'file = "{_key_of(keys, guess)}"']
     if stream.sentence is not None and stream.form not in WITH_TOPICS:
         lines.append(f"sentence = {_toml(stream.sentence)}")
@@ -475,6 +503,8 @@ def _channel(table: str, guess: Guess, keys: _Keys) -> list[str]:
         lines.append('frame = "enu"                   # check: ROS has axes forward, left, up in east, north, up')
     if guess.quantity == "position" and stream.form in _MEASURED:
         lines += [f"where = {_toml(good)}" for name, good in _FIXED.items() if name in stream.table.names]
+    if guess.quantity == "position" and (none := int(np.sum(guess.without_fix))):
+        lines.append(f"# rows with latitude 0 and longitude 0 are no fixes, and left out: {none}")
     if _stale(guess):
         lines.append("drop_repeated = true            # check: many values are those of the row before")
     if columns == ["heading_magnetic"]:
@@ -503,6 +533,8 @@ def _worth(guess: Guess) -> tuple[int, int]:
 def _repeated(guess: Guess) -> float:
     """The share of rows whose values are those of the row before."""
     values = np.stack([guess.stream.table.column(c)[1] for c in guess.columns], axis=-1)
+    if guess.quantity == "position":
+        values = values[~guess.without_fix]
     return float(np.mean(np.all(np.diff(values, axis=0) == 0.0, axis=1))) if len(values) > 1 else 0.0
 
 
@@ -554,28 +586,3 @@ def _mounting(force: Guess) -> list[str]:
         f"mounting_deg = [{roll:.1f}, {pitch:.1f}, 0.0]   # check: level by its specific force; the third, its heading "
         "in the vessel, is not known"
     ]
-
-
-def rewritten(text: str, readings: Sequence[ProbableReading]) -> str:
-    """A draft with other readings of its streams, each with its probability.
-
-    Parameters
-    ----------
-    text : str
-        From `draft`.
-    readings : sequence of ProbableReading
-        What is far more likely than what the draft says.
-    """
-    lines = text.splitlines()
-    for reading in readings:
-        if not reading.changes:
-            first = lines.index(f"[log.instruments.{reading.stream}]") + 1
-            lines.insert(first, f"# check: {reading.what}, so with probability {reading.shown}: take it out")
-        for table, key, value in reading.changes:
-            first = lines.index(f"[{table}]") + 1
-            ends = (k for k in range(first, len(lines)) if not lines[k] or lines[k].startswith("["))
-            last = next(ends, len(lines))
-            new = f"{key} = {value}   # check: so with probability {reading.shown}"
-            at = next((k for k in range(first, last) if lines[k].partition("=")[0].strip() == key), None)
-            lines[first if at is None else at : first if at is None else at + 1] = [new]
-    return "\n".join(lines) + "\n"

@@ -40,6 +40,8 @@ class FileSpec(Spec):
         Multiplies the times.
     offset : float or tuple of float
         Added to the times, after ``scale`` or ``spacing`` [s]; one for each recording, or one for all.
+    skip_lines : int
+        CSV: lines above the header to leave out, or above the first row of a table without one.
     skip_rows : int
         CSV: rows after the header to leave out at the beginning, for example one of units.
     comment : str
@@ -59,6 +61,7 @@ class FileSpec(Spec):
     spacing: Positive | None = quantity("s", None)
     scale: Positive = 1.0
     offset: float | tuple[float, ...] = quantity("s", 0.0)
+    skip_lines: Annotated[int, Field(ge=0)] = 0
     skip_rows: Annotated[int, Field(ge=0)] = 0
     comment: str = ""
     same_time: SameTime | None = None
@@ -67,7 +70,7 @@ class FileSpec(Spec):
     @model_serializer(mode="wrap")
     def _without_empty(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
         """See `simnav.spec.without_later`."""
-        return without_later(handler(self), {"options": {}, "same_time": None})
+        return without_later(handler(self), {"options": {}, "same_time": None, "skip_lines": 0})
 
     @model_validator(mode="after")
     def _check(self) -> Self:

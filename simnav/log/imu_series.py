@@ -7,11 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from simnav.log.channel import open_file, turn_to_vessel
+from simnav.log.channel import check_cells, open_file, turn_to_vessel
 from simnav.log.files import Column
 from simnav.log.spec import LogImuSpec, RecordedSpec
 from simnav.log.table import LogError, LogWarning
-from simnav.log.units import factor
+from simnav.log.time_units import SLOWEST_IMU, unit_to_write
+from simnav.log.units import dimension, factor
 from simnav.types import Array
 
 __all__ = ["ImuSeries", "read_imu"]
@@ -20,6 +21,8 @@ __all__ = ["ImuSeries", "read_imu"]
 _NOTICED = 0.1
 #: The longest hole that is bridged by default: this [s], or so many times the usual spacing.
 _LEAST_GAP, _SPACINGS = 1.0, 10.0
+#: No IMU of a vessel measures more [rad/s, m/s^2].
+_LARGEST = {"angular rate": 1e3, "specific force": 1e4}
 #: Mean specific force of a vessel [m/s^2], within the errors of a poor IMU.
 _PULL = (9.4, 10.2)
 
@@ -106,6 +109,9 @@ def _means(
     for i, (column, unit) in enumerate(zip(columns, units, strict=True)):
         sign, values = table.column(column)
         raw[:, i] = sign * values[rows] * factor(unit)
+        rate = dimension(unit) == "angular rate" or dimension(unit) == "angle"
+        name = "angular rate" if rate else "specific force"
+        check_cells(raw[:, i], _LARGEST[name], factor(unit), column, table, rows, name)
         bad = np.flatnonzero(~np.isfinite(raw[:, i]))
         if bad.size and (imu.samples == "increments" or bad.size == len(rows)):
             raise LogError(
@@ -126,6 +132,12 @@ def _means(
         raise LogError(f"{table.source}: {len(time)} row is too short for an IMU")
     interval = np.diff(time)
     spacing = float(np.median(interval))
+    if spacing > (1.0 + 1e-3) / SLOWEST_IMU:
+        right = unit_to_write(spec.files[key], time, (), inertial=True)
+        raise LogError(
+            f"{table.source}: the IMU would have {1.0 / spacing:.4g} Hz, where {SLOWEST_IMU:g} Hz is the least; "
+            + (f"its times are probably in a smaller unit: write {right} of its file" if right else "check its times")
+        )
     longest = max(_LEAST_GAP, _SPACINGS * spacing) if imu.max_gap is None else imu.max_gap
     k = int(np.argmax(interval))
     if interval[k] > longest:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import re
 import warnings
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +14,7 @@ import numpy as np
 from simnav.geometry.earth import relative_position
 from simnav.log.binary import signature
 from simnav.log.check import described
-from simnav.log.delimited import read_csv
+from simnav.log.delimited import lines_above, read_csv
 from simnav.log.files import FileSpec
 from simnav.log.formats.bags import topics_of
 from simnav.log.formats.dataflash import read_dataflash
@@ -27,7 +27,8 @@ from simnav.log.nmea import read_nmea
 from simnav.log.reader import READERS
 from simnav.log.table import LogError, LogWarning, Table, utc_seconds
 from simnav.log.text_forms import form_of_text
-from simnav.log.units import factor
+from simnav.log.time_units import MONTH, other_unit
+from simnav.log.units import dimension, factor, spelt, units_row
 from simnav.types import Array
 
 __all__ = ["WITH_TOPICS", "Stream", "inspect_log", "streams_of", "track_of"]
@@ -42,8 +43,13 @@ _TIME = re.compile(r"^#?\s*(time|times|timestamp|stamp|t|utc|sec|secs|seconds|ep
 _DATE = re.compile(r"^\s*(date|day|%?\s*ymd)\b", re.I)
 #: Times of this size are in this unit.
 _LARGE = ((1e17, "ns"), (1e14, "us"), (1e11, "ms"))
+#: Where all streams have less than a row in this time [s], their times are in a smaller unit.
+_RARE = 100.0
 #: Columns of an IMU.
-_INERTIAL = re.compile(r"(?:^|[./])(a|g|w|acc|gyr|gyro|accel|omega)[_ .]?[xyz123](?![a-z0-9])", re.I)
+_INERTIAL = re.compile(
+    r"(?:^|[./_ ])(a|g|w|acc|gyro?|accel|omega|angular_(rate|velocity)|specific_force|(linear_)?acceleration)[_ .]?"
+    r"[xyz123](?![a-z0-9])", re.I)  # fmt: skip
+_OF_IMU = re.compile(r"gyr|acc(?!urac)|imu", re.I)
 #: Files of a folder that hold no streams: what 'simnav export' writes beside them, and texts.
 _START, _TEXTS = "start.json", (".md", ".toml")
 #: Formats whose files hold arrays or columns by name, with a time or several.
@@ -76,6 +82,8 @@ class Stream:
         Keys of `FileSpec` with which it is read.
     notes : tuple of str
         What was left out, or looks wrong.
+    units : mapping of str to str
+        Units that stand in a row below the header, by column.
     """
 
     path: Path
@@ -86,6 +94,7 @@ class Stream:
     time: Array
     keys: dict[str, Any] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
+    units: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def name(self) -> str:
@@ -155,6 +164,8 @@ def inspect_log(paths: Sequence[Path]) -> tuple[list[Stream], list[str]]:
             found += streams_of(path)
         except LogError as error:
             failed.append(str(error))
+    for k, stream in enumerate(found):
+        found[k] = _timed(stream, [s.time for s in found if s is not stream])
     return found, failed
 
 
@@ -173,7 +184,27 @@ def streams_of(path: Path) -> list[Stream]:
     notes = tuple(dict.fromkeys(" ".join(str(w.message).split()).removeprefix(f"{path}: ") for w in said))
     if not found:
         raise LogError(f"{path}: " + ("; ".join(notes) or "there is nothing in it"))
-    return [Stream(s.path, s.form, s.sentence, s.talker, s.table, s.time, s.keys, notes) for s in found]
+    return [_timed(replace(s, notes=notes)) for s in found]
+
+
+def _timed(stream: Stream, others: Sequence[Array] = ()) -> Stream:
+    """The stream with its times in the unit in which they probably are."""
+    unit = stream.keys.get("time_unit", "s" if stream.form in _OF_ARRAYS else "")
+    every = [float(np.median(np.diff(t))) for t in (stream.time, *others) if len(t) > 1]
+    longest = 0.0 if len(every) > 1 and min(every) > _RARE else MONTH
+    found = other_unit(unit, stream.time, others, inertial=_is_inertial(stream), longest=longest)
+    if found is None:
+        return stream
+    note = f"its times are taken for {found}: as {unit} they would be {described(stream.time)}"
+    time = stream.time * (factor(found) / factor(unit))
+    return replace(stream, time=time, keys={**stream.keys, "time_unit": found}, notes=(*stream.notes, note))
+
+
+def _is_inertial(stream: Stream) -> bool:
+    names = stream.table.names
+    axes = sum(bool(re.fullmatch(r"(?:.*[./])?[xyz](?:\W.*)?", n, re.I)) for n in names)
+    label = stream.path.stem if stream.sentence is None else stream.sentence
+    return sum(bool(_INERTIAL.search(n)) for n in names) >= 3 or (axes >= 3 and bool(_OF_IMU.search(label)))
 
 
 def _format(path: Path) -> str:
@@ -227,16 +258,16 @@ def _streams(path: Path, form: str) -> Iterator[Stream]:
     reader = READERS.get(form)
     assert reader is not None
     if form not in _OF_ARRAYS:
-        keys = _time_keys(path) if form == "csv" else {}
+        keys, units = _table_keys(path) if form == "csv" else ({}, {})
         if form == "kf_gins" and content_of(path) == "gnss":
             keys = {"options": {"content": "gnss"}}
         rows = reader.read(path, FileSpec(path=path.name, format=form, **keys))
-        yield Stream(path, form, None, None, rows.table, _known(rows.time), keys)
+        yield Stream(path, form, None, None, rows.table, _known(rows.time), keys, units=units)
         return
     for name in _array_times(path, form):
         rows = reader.read(path, FileSpec(path=path.name, format=form, time=name))
         keys = {"time": name}
-        if (unit := _time_unit(rows.table, name, rows.time)) != "s":
+        if (unit := _time_unit(name, rows.time)) != "s":
             keys |= {"time_unit": unit}
         yield Stream(path, form, None, None, _beside(rows.table, name), _known(rows.time) * factor(unit), keys)
 
@@ -276,16 +307,45 @@ def _known(time: Array) -> Array:
     return time[np.isfinite(time)]
 
 
-def _time_keys(path: Path) -> dict[str, Any]:
-    """Where the times of a table probably are, as keys of `FileSpec`."""
+def _table_keys(path: Path) -> tuple[dict[str, Any], dict[str, str]]:
+    """Where a table and its times probably are, as keys of `FileSpec`, and its units, if there is a row of them."""
     comment = "#" if path.read_bytes()[:1] == b"#" and not _header_in_comment(path) else ""
-    table = read_csv(path, comment)
     keys: dict[str, Any] = {"comment": comment} if comment else {}
+    try:
+        with warnings.catch_warnings(record=True) as said:
+            warnings.simplefilter("always")
+            found = _time_keys(path, keys)
+        for warning in said:
+            warnings.warn_explicit(warning.message, warning.category, warning.filename, warning.lineno)
+    except LogError as error:
+        above = lines_above(path, comment)
+        if not above:
+            raise
+        try:
+            found = _time_keys(path, keys | {"skip_lines": above})
+        except LogError:
+            raise error from None
+    return found
+
+
+def _time_keys(path: Path, keys: dict[str, Any]) -> tuple[dict[str, Any], dict[str, str]]:
+    table = read_csv(path, **keys)
+    units: dict[str, str] = {}
+    if all(c.dtype == object or np.isnan(c[0]) for c in table.columns.values()):
+        told = units_row([str(c[0] or "") if c.dtype == object else "" for c in table.columns.values()])
+        if told is not None:
+            keys, units = {**keys, "skip_rows": 1}, dict(zip(table.names, told, strict=True))
+            table = read_csv(path, **keys)
+    return keys | _times(path, table, units), units
+
+
+def _times(path: Path, table: Table, units: Mapping[str, str]) -> dict[str, Any]:
+    """Where the times of a table probably are, as keys of `FileSpec`."""
     names = list(table.names)
     date = next((n for n in names if _DATE.match(n) and table.columns[n].dtype == object), None)
     named = next((n for n in names if _TIME.match(n)), None)
     if date is not None and named is not None and date != named:
-        return keys | {"time": (date, named)}
+        return {"time": (date, named)}
     if named is None:
         named = next((n for n in names if _ascends(table, n)), names[0])
     values = table.columns[named]
@@ -299,9 +359,10 @@ def _time_keys(path: Path) -> dict[str, Any]:
             second = names[names.index(named) + 1] if names.index(named) + 1 < len(names) else None
             if second is None or not re.match(r"\d{4}[-/]", first):
                 raise LogError(f"{path}: no column holds the times; there are: {', '.join(names)}") from None
-            return keys | {"time": (named, second)}
-        return keys | {"time": named, "time_unit": "iso"}
-    return keys | {"time": named, "time_unit": _time_unit(table, named, np.asarray(values, dtype=np.float64))}
+            return {"time": (named, second)}
+        return {"time": named, "time_unit": "iso"}
+    told = f"{named} [{units[named]}]" if units.get(named) else named
+    return {"time": named, "time_unit": _time_unit(told, np.asarray(values, dtype=np.float64))}
 
 
 def _is_number(text: str) -> bool:
@@ -318,16 +379,11 @@ def _header_in_comment(path: Path) -> bool:
     return not second.startswith("#") and first.count(",") == second.count(",") > 0
 
 
-def _time_unit(table: Table, name: str, values: Array) -> str:
-    ending = re.search(r"(?:_|\[|\()(ns|us|ms|s)(?:\]|\))?$", name.strip())
-    if ending:
-        return ending[1]
+def _time_unit(name: str, values: Array) -> str:
+    ending = re.search(r"(?:_|\[|\()([a-z]+)(?:\]|\))?$", name.strip())
+    if ending and dimension(unit := spelt(ending[1])) == "time":
+        return unit
     size = float(np.nanmedian(np.abs(values)))
-    inertial = sum(bool(_INERTIAL.search(n)) for n in table.names) >= 3
-    spacing = float(np.nanmedian(np.abs(np.diff(values)))) if len(values) > 1 else 0.0
-    since_1970 = 1e9 < size < 1e10 and spacing < 10.0
-    if inertial and size < _LARGE[-1][0] and spacing >= 1.0 and not since_1970:  # hardly an IMU has samples so rare
-        return "ms" if spacing < 1e3 else "us" if spacing < 1e6 else "ns"
     return next((unit for least, unit in _LARGE if size > least), "s")
 
 

@@ -257,7 +257,7 @@ class LogSource:
             if not inside.any():
                 raise LogError(
                     f"{series.source}: none of the {len(time)} measurements of {name!r} lies within the run; they are "
-                    f"at {time[0]:.3f} to {time[-1]:.3f} s of it (check clock and offset_s)"
+                    f"at {time[0]:.3f} to {time[-1]:.3f} s of it (check time_unit, clock and offset_s)"
                 )
             often = float(np.median(np.diff(time[inside]))) if inside.sum() > 2 else math.inf
             if often * sheet.rate < 0.8:
@@ -333,7 +333,7 @@ def _begin(log: RecordedSpec, recording: str, reference: Reference, imu: ImuSeri
         other = "" if imu is None else f" and of the IMU ({imu.source}: {imu.edge[0]:.3f} to {imu.edge[-1]:.3f} s)"
         raise LogError(
             f"the clocks of the reference ({reference.time[0]:.3f} to {reference.time[-1]:.3f} s){other} have no epoch "
-            f"in common that has all parts of the reference; check scale, offset_s, spacing_s and skip_s"
+            f"in common that has all parts of the reference; check time_unit, scale, offset_s, spacing_s and skip_s"
         )
     if log.begin == "moving":
         speed = np.hypot(*reference.velocity_ahead(time, _MOVING).T)

@@ -18,6 +18,7 @@ from simnav.log.units import check_dimension, check_units
 from simnav.spec import NonNegative, Positive, Spec, Vector, closest, quantity, without_later
 
 __all__ = [
+    "TO_FILL_IN",
     "ChannelSpec",
     "FileSpec",
     "LogImuSpec",
@@ -26,6 +27,9 @@ __all__ = [
     "RecordedSpec",
     "ReferenceSpec",
 ]
+
+#: What stands in a scenario that `simnav.log.draft` could not complete.
+TO_FILL_IN = "FILL IN"
 
 _Every = Annotated[int, Field(ge=1)]
 _LEVEL: Vector = (0.0, 0.0, 0.0)

@@ -91,10 +91,6 @@ class Table:
             return -1.0, which[1:]
         raise LogError(f"{self.source}: there is no column {which.removeprefix('-')!r}{closest(which, self.names)}")
 
-    def without_first(self, count: int) -> Table:
-        """The table without its first rows."""
-        return Table(self.source, {n: c[count:] for n, c in self.columns.items()}, self.line[count:], self.numbered)
-
     def _numbers(self, name: str) -> Array:
         """A text column as numbers; the first cell that is none is named."""
         out = np.empty(len(self))
@@ -117,6 +113,11 @@ def check_ascending(time: Array, table: Table, column: str) -> None:
             k = k if not np.isfinite(time[k]) else k - 1
             raise LogError(f"{table.source}, line {table.line[k]}, column {column!r}: the time is missing; 'where' "
                            f"leaves such rows out, like where = '`{column}` > 0'")  # fmt: skip
+        if time[k - 1] > time[-1] and (k < 2 or time[k] > time[k - 2]):
+            raise LogError(
+                f"{table.source}, line {table.line[k - 1]}, column {column!r}: the time {time[k - 1]:.10g} s is after "
+                f"that of all later rows, the last of which is at {time[-1]:.10g} s; leave the row out by 'where'"
+            )
         same = time[k] == time[k - 1]
         what = "is the same as" if same else "is before"
         right = (

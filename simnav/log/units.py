@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 from collections import ChainMap
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from simnav.spec import UNITS, closest
 
-__all__ = ["DIMENSIONS", "LOG_UNITS", "check_dimension", "check_units", "dimension", "factor"]
+__all__ = ["DIMENSIONS", "LOG_UNITS", "check_dimension", "check_units", "dimension", "factor", "spelt", "units_row"]
 
 #: Factor to SI of every unit that a column of a log may have: those of TOML keys, and some that only logs have.
 LOG_UNITS: Mapping[str, float] = ChainMap(
@@ -34,6 +34,44 @@ DIMENSIONS: Mapping[str, tuple[str, ...]] = {
     "angular rate": ("deg_s", "rad_s", "deg_min", "deg_h"),
     "time": ("s", "ms", "us", "ns", "min", "h"),
 }
+
+#: Units as headers write them, in brackets or after an underscore at the end, where they are not those of `LOG_UNITS`.
+_SPELT = {
+    "dps": "deg_s", "deg/s": "deg_s", "deg/sec": "deg_s", "degs": "deg_s", "\N{DEGREE SIGN}/s": "deg_s",
+    "rad/s": "rad_s", "rad/sec": "rad_s", "rads": "rad_s", "rps": "rad_s",
+    "rad s^-1": "rad_s", "m s^-2": "m_s2", "m s^-1": "m_s",
+    "m/s2": "m_s2", "m/s^2": "m_s2", "m/s/s": "m_s2", "m/s\N{SUPERSCRIPT TWO}": "m_s2", "mps2": "m_s2", "ms2": "m_s2",
+    "m/s": "m_s", "mps": "m_s", "km/h": "km_h", "kmh": "km_h", "kt": "kn", "kts": "kn", "knots": "kn",
+    "sec": "s", "secs": "s", "seconds": "s", "msec": "ms", "usec": "us", "nsec": "ns",
+    "degree": "deg", "degrees": "deg", "\N{DEGREE SIGN}": "deg", "e7": "1e-7 deg", "dege7": "1e-7 deg",
+    "meter": "m", "meters": "m", "metre": "m", "metres": "m",
+}  # fmt: skip
+
+
+def spelt(text: str) -> str:
+    """A unit as a log writes it, by its name in `LOG_UNITS`; empty for what cannot be one.
+
+    Examples
+    --------
+    >>> spelt("deg/s"), spelt("kts"), spelt("m")
+    ('deg_s', 'kn', 'm')
+    """
+    return _SPELT.get(text.lower(), "" if " " in text else text)
+
+
+def units_row(cells: Sequence[str]) -> tuple[str, ...] | None:
+    """The units in a row of them below a header, empty where it has none; None for another row.
+
+    Examples
+    --------
+    >>> units_row(["[s]", "deg", "", "hPa"])
+    ('s', 'deg', '', '')
+    >>> units_row(["0", "1"])
+    """
+    texts = [c.strip().strip("[]()").strip() for c in cells]
+    units = tuple(next((u for u in (spelt(t), spelt(t.lower())) if dimension(u)), "") for t in texts)
+    found, written = sum(map(bool, units)), sum(bool(t.strip("-")) for t in texts)
+    return units if 2 * found >= max(1, written) else None
 
 
 def _parts(unit: str) -> tuple[float, str]:

@@ -9,6 +9,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
+from simnav.log.spec import TO_FILL_IN
 from simnav.plugins import PluginError, Registry, load_plugin
 from simnav.scenario.catalogue import OWN_FOLDER, Header, headers
 from simnav.scenario.replay import read_logs_by
@@ -49,6 +50,7 @@ def parse(text: str, *, source: str = "<toml>", folder: Path | None = None, trie
         raise SpecError(f"{source}: {_key_of(text, _LONG_NUMBER)}: a number has more digits than can be read") from None
     except RecursionError:
         raise SpecError(f"{source}: {_key_of(text, _NESTED)}: lists or tables are nested too deeply") from None
+    _refuse_incomplete(text, source)
     if "plugins" in table:
         table["plugins"] = _load_plugins(table["plugins"], source, folder or Path.cwd())
     if isinstance(table.get("vessel"), dict):
@@ -62,6 +64,17 @@ def parse(text: str, *, source: str = "<toml>", folder: Path | None = None, trie
         return Scenario.from_toml(table, source=source, tried=tried)
     except RecursionError:
         raise SpecError(f"{source}: {_key_of(text, _NESTED)}: lists or tables are nested too deeply") from None
+
+
+def _refuse_incomplete(text: str, source: str) -> None:
+    """Raise a `SpecError` for the first line of a draft that its user has not filled in."""
+    table = ""
+    for number, line in enumerate(text.splitlines(), 1):
+        table = line.strip() if line.startswith("[") else table
+        line, _, what = line.partition("#")
+        if TO_FILL_IN in line:
+            key = line.partition("=")[0].strip()
+            raise SpecError(f"{source}, line {number}: fill in {key!r} of {table}: {what.strip()}")
 
 
 def _key_of(text: str, value: str) -> str:

@@ -242,7 +242,9 @@ def test_a_reference_of_positions_only(tiny):
 
 def test_clocks_that_do_not_meet(tiny):
     tiny.replace('path = "truth{recording}.csv"', 'path = "truth{recording}.csv"\noffset_s = 500.0')
-    with pytest.raises(LogError, match=r"have no epoch in common .* check scale, offset_s, spacing_s and skip_s"):
+    with pytest.raises(
+        LogError, match=r"have no epoch in common .* check time_unit, scale, offset_s, spacing_s and skip_s"
+    ):
         LogSource(tiny.scenario(), 0)
 
 

@@ -88,7 +88,7 @@ def test_a_file_that_is_not_there(tmp_path):
 def test_comments_anywhere_and_a_row_of_units(tmp_path, delimiter):
     lines = ["# made by hand", "t,x", "s,m", "0.5,1", "# a remark, with commas", "1.5,x", "", "2.5,3"]
     path = write(tmp_path / "a.csv", "\n".join(line if "#" in line else line.replace(",", delimiter) for line in lines))
-    table = read_csv(path, "#").without_first(1)
+    table = read_csv(path, "#", skip_rows=1)
     np.testing.assert_array_equal(table.column("t")[1], [0.5, 1.5, np.nan, 2.5])
     assert table.line.tolist()[:2] == [4, 6]
     with pytest.raises(LogError, match=r"a\.csv, line 6, column 'x': 'x' is not a number"):
