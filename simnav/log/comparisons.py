@@ -19,12 +19,12 @@ from simnav.geometry.earth import displace, earth_rate, gravity, relative_positi
 from simnav.geometry.rotation import dcm_from_rotation_vector, dcm_from_rpy, rotation_vector_from_dcm, wrap_angle
 from simnav.kinds import BODY_VELOCITY, DEPTH, HEADING, HORIZONTAL_POSITION, POSITION, VELOCITY, WATER_SPEED
 from simnav.log.channel import Series
-from simnav.log.imu_series import ImuSeries
+from simnav.log.inertial import Inertial
 from simnav.log.likelihood import Residual
 from simnav.log.reference import Track
 from simnav.types import KINDS, Array
 
-__all__ = ["COURSE_FROM", "GAP", "MOST", "Inertial", "Streams", "comparisons"]
+__all__ = ["COURSE_FROM", "GAP", "MOST", "Streams", "comparisons"]
 
 #: Times at which streams are compared at most; interval of the IMU [s].
 MOST, _INTERVAL = 600, 1.0
@@ -53,63 +53,6 @@ _FROM = {
     "velocity": ("velocity", "given velocity"),
     "attitude": ("attitude", "dcm", "rate"),
 }
-
-
-@dataclass(frozen=True, eq=False)
-class Inertial:
-    """An IMU as its integral, so that its axes, units and clock can be altered without reading it again.
-
-    Attributes
-    ----------
-    series : ImuSeries
-        As it was read.
-    gyroscope, accelerometer : (3, 3) array
-        Multiply the angular rates and the specific forces.
-    delay : float
-        By how much its clock is late [s].
-    """
-
-    series: ImuSeries
-    gyroscope: Array = field(default_factory=lambda: np.eye(3))
-    accelerometer: Array = field(default_factory=lambda: np.eye(3))
-    delay: float = 0.0
-    integral: Array = field(init=False)
-    known: dict[tuple[float, ...], Array] = field(init=False, default_factory=dict)
-
-    def __post_init__(self) -> None:
-        total = np.zeros((len(self.series.edge), 6))
-        np.cumsum(self.series.mean * np.diff(self.series.edge)[:, None], axis=0, out=total[1:])
-        object.__setattr__(self, "integral", total)
-
-    def altered(self, **changes: Any) -> Inertial:
-        """The same IMU, read otherwise."""
-        other = object.__new__(Inertial)
-        for name, value in {**vars(self), **changes}.items():
-            object.__setattr__(other, name, value)
-        return other
-
-    def turns(self, begin: Array, end: Array) -> Array:
-        """(n, 3) integrals of the angular rate over intervals [rad]; not a number outside."""
-        return self._between(begin, end, slice(0, 3)) @ self.gyroscope.T
-
-    def forces(self, begin: Array, end: Array) -> Array:
-        """(n, 3) mean specific forces [m/s^2]."""
-        return self._between(begin, end, slice(3, 6)) @ self.accelerometer.T / (end - begin)[:, None]
-
-    def _between(self, begin: Array, end: Array, part: slice) -> Array:
-        if not len(begin):
-            return np.zeros((0, 3))
-        key = (*(float(t) for t in (begin[0], begin[-1], end[0], end[-1])), self.delay, part.start, len(begin))
-        if key not in self.known:
-            self.known[key] = self._interpolated(begin, end, part)
-        return self.known[key]
-
-    def _interpolated(self, begin: Array, end: Array, part: slice) -> Array:
-        edge = self.series.edge
-        first, last = begin + self.delay, end + self.delay
-        found = np.stack([np.interp(last, edge, c) - np.interp(first, edge, c) for c in self.integral.T[part]], axis=-1)
-        found[(first < edge[0]) | (last > edge[-1])] = np.nan
-        return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -257,20 +200,18 @@ class Streams:
 
         return self._once("moved", time, mean, span)
 
-    def between(self, time: Array) -> float:
-        """Variance of the error with which the stated velocity is interpolated at n times [m^2/s^2].
+    @cached_property
+    def between(self) -> float:
+        """Variance of the error with which the stated velocity is interpolated [m^2/s^2].
 
         Each of its values is interpolated from its neighbours by a cubic. The reference of a vessel in waves that has a
         value a second does not say how she moves between them.
         """
         if self.velocity is None or len(self.velocity.time) < 8:
             return 0.0
-        v, stated = self.velocity.value, self.velocity.time - self.late
+        v = self.velocity.value
         error = v[3:-3] - (9.0 * (v[2:-4] + v[4:-2]) - (v[:-6] + v[6:])) / 16.0
-        after = np.clip(np.searchsorted(stated, time), 1, len(stated) - 1)
-        part = np.clip((time - stated[after - 1]) / (stated[after] - stated[after - 1]), 0.0, 1.0)
-        near = float(np.mean((4.0 * part * (1.0 - part)) ** 2))
-        return near * float(np.nan_to_num(np.nanmedian(error**2, axis=0)).max()) * 2.2
+        return float(np.nan_to_num(np.nanmedian(np.abs(error), axis=0)).max() * 1.4826) ** 2
 
     def attitudes(self, time: Array) -> Array:
         """(n, 3) roll, pitch, yaw of the reference [rad]."""
@@ -549,7 +490,7 @@ def _body_velocity(s: Streams, name: str) -> Residual | None:
         return None
     dcm, rate = turned
     own = np.einsum("nji,nj->ni", dcm, s.velocities(time)) + np.cross(rate, arm)
-    size = float(np.hypot(_SPEED, _BETWEEN * s.between(time) ** 0.5)) if s.velocity is not None else 2.0 * _SPEED
+    size = float(np.hypot(_SPEED, _BETWEEN * s.between**0.5)) if s.velocity is not None else 2.0 * _SPEED
     return _residual(value - own, size, (_constant(len(time), 3), _DVL_BIAS), (_skews(value), _MOUNTING),
                      (_skews(rate), _ARM), (_scaled(value), _SCALE))  # fmt: skip
 

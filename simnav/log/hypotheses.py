@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from simnav.log.comparisons import Streams
 from simnav.types import Array
 
-__all__ = ["FLIPS", "Reading", "flip", "shown", "with_series"]
+if TYPE_CHECKING:
+    from simnav.log.spec import RecordedSpec
+
+__all__ = ["FLIPS", "Reading", "flip", "shown", "with_series", "written"]
 
 #: Signs that an axis may have.
 FLIPS = (1.0, -1.0)
@@ -68,3 +73,24 @@ def with_series(name: str, **changes: Array) -> Callable[[Streams], Streams]:
         return t.with_instrument(name, **changes) if part == name else t.with_reference(part, **changes)
 
     return alter
+
+
+def written(log: RecordedSpec, changes: tuple[tuple[str, str, Any], ...]) -> RecordedSpec:
+    """The ``[log]`` with some keys written anew."""
+    for table, key, value in changes:
+        name, scale = key, 1.0
+        if key.endswith("_deg"):
+            name, scale = key.removesuffix("_deg"), np.pi / 180.0
+        elif key.endswith("_s"):
+            name = key.removesuffix("_s")
+        new = tuple(v * scale if scale != 1.0 else v for v in value) if isinstance(value, list) else value
+        log = _set(log, [*table.split(".")[1:], name], new)
+    return log
+
+
+def _set(spec: Any, path: list[str], value: Any) -> Any:
+    if not path:
+        return value
+    if isinstance(spec, Mapping):
+        return {**spec, path[0]: _set(spec[path[0]], path[1:], value)}
+    return spec.model_copy(update={path[0]: _set(getattr(spec, path[0]), path[1:], value)})

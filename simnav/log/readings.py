@@ -22,9 +22,10 @@ from simnav.geometry.rotation import dcm_from_rpy, wrap_angle
 from simnav.kinds import BODY_VELOCITY, HEADING, VELOCITY
 from simnav.log.attitude_readings import of_attitude
 from simnav.log.channel import Series, read_channel, skip_of
-from simnav.log.comparisons import COURSE_FROM, Inertial, Streams, comparisons
-from simnav.log.hypotheses import FLIPS, Reading, flip, shown, with_series
+from simnav.log.comparisons import COURSE_FROM, Streams, comparisons
+from simnav.log.hypotheses import FLIPS, Reading, flip, shown, with_series, written
 from simnav.log.imu_series import read_imu
+from simnav.log.inertial import Inertial
 from simnav.log.likelihood import Fit, Residual, fit, log_ratios
 from simnav.log.units import DIMENSIONS, factor
 from simnav.spec import SpecError
@@ -164,7 +165,7 @@ def probable_readings(scenario: Scenario, recording: str) -> list[ProbableReadin
         if not reading.changes:
             unfit.add(reading.stream)
         try:
-            log = _written(log, reading.changes)
+            log = written(log, reading.changes)
             _read(scenario, log, recording, unfit)
         except (SpecError, ValueError):
             break
@@ -215,7 +216,8 @@ def _best(log: RecordedSpec, streams: Streams) -> tuple[Reading, ProbableReading
         others = sorted((t for t in tried if not t.reading.delay), key=lambda t: -t.ratio)
         others = [t for k, t in enumerate(others) if k < _WITH_DELAYS or t.reading.usual]
         for other, delay in itertools.product(others, delays):
-            if (one := _tried(other.reading.late(delay), streams, compared, present)) is not None:
+            one = _tried(other.reading.late(delay), streams, compared, present)
+            if one is not None and one.left <= other.left:
                 tried.append(one)
         told = _told(stream, tried)
         if told is not None and (likeliest is None or told[1].log_ratio > likeliest[1].log_ratio + _SAME):
@@ -577,24 +579,3 @@ def _positions_as(ways: Mapping[str, Array]) -> Callable[[Streams], Streams]:
         return t
 
     return alter
-
-
-def _written(log: RecordedSpec, changes: tuple[tuple[str, str, Any], ...]) -> RecordedSpec:
-    """The ``[log]`` with some keys written anew."""
-    for table, key, value in changes:
-        name, scale = key, 1.0
-        if key.endswith("_deg"):
-            name, scale = key.removesuffix("_deg"), np.pi / 180.0
-        elif key.endswith("_s"):
-            name = key.removesuffix("_s")
-        new = tuple(v * scale if scale != 1.0 else v for v in value) if isinstance(value, list) else value
-        log = _set(log, [*table.split(".")[1:], name], new)
-    return log
-
-
-def _set(spec: Any, path: list[str], value: Any) -> Any:
-    if not path:
-        return value
-    if isinstance(spec, Mapping):
-        return {**spec, path[0]: _set(spec[path[0]], path[1:], value)}
-    return spec.model_copy(update={path[0]: _set(getattr(spec, path[0]), path[1:], value)})
