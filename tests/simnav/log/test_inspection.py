@@ -27,10 +27,10 @@ def test_a_draft_of_tables_can_be_run(tiny, tmp_path):
     path = tmp_path / "my-log.toml"
     path.write_text(draft(streams, "my-log"))
     scenario = load(path)
-    # The file's axes are starboard, forward, up: no size of a column tells, but the other streams do.
+    # The axes of the gyroscopes are those that the accelerometers have in the draft; their unit is not seen by size.
     (wrong,) = [f for f in check_log(scenario).findings if f.level == "error"]
     assert wrong.part == "gyroscope"
-    assert 'angular_rate = ["gy", ' in wrong.sentence
+    assert "gx, -gy, -gz in deg_s" in wrong.sentence
     assert 'angular_rate_unit = "deg_s"' in wrong.sentence
     source = LogSource(scenario, 0)
     assert set(source.instruments) == {"gnss", "gyrocompass"}
