@@ -113,7 +113,7 @@ def check_ascending(time: Array, table: Table, column: str) -> None:
             k = k if not np.isfinite(time[k]) else k - 1
             raise LogError(f"{table.source}, line {table.line[k]}, column {column!r}: the time is missing; 'where' "
                            f"leaves such rows out, like where = '`{column}` > 0'")  # fmt: skip
-        if len(time) > k + 1 and time[k - 1] > time[-1] and (k < 2 or time[k] > time[k - 2]):
+        if len(time) > 2 and time[k - 1] > time[-1] and (k < 2 or time[k] > time[k - 2]):
             raise LogError(
                 f"{table.source}, line {table.line[k - 1]}, column {column!r}: the time {time[k - 1]:.10g} s is after "
                 f"that of all later rows, the last of which is at {time[-1]:.10g} s; leave the row out by 'where'"
