@@ -1,4 +1,4 @@
-"""What kind of binary file a file is, by its first bytes."""
+"""What kind of binary file a file is, or which code of text it has, by its first bytes."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from pathlib import Path
 from simnav.log.reader import READERS
 from simnav.log.table import LogError
 
-__all__ = ["refuse_binary", "signature"]
+__all__ = ["refuse_binary", "signature", "utf16_of"]
 
 #: First bytes of a file -> what it is, and the format that reads it (empty: none of simnav).
 _SIGNATURES: tuple[tuple[bytes, str, str], ...] = (
@@ -31,6 +31,8 @@ _SIGNATURES: tuple[tuple[bytes, str, str], ...] = (
     (b"%PDF", "a PDF document", ""),
 )
 _LOOKED_AT = 4096
+#: Part of the characters of a table that are ASCII, at least.
+_ASCII = 0.9
 _TEXT_CONTROLS = frozenset(b"\t\n\r\f\x1a\x02\x03")
 
 
@@ -52,10 +54,21 @@ def signature(path: Path) -> tuple[str, str] | None:
     for mark, what, form in _SIGNATURES:
         if head.startswith(mark):
             return what, form
-    if head.startswith((b"\xff\xfe", b"\xfe\xff")):  # text in UTF-16
+    if utf16_of(head) is not None:
         return None
     controls = sum(byte < 32 and byte not in _TEXT_CONTROLS for byte in head)
     return ("a binary file", "") if controls > 0.02 * len(head) else None
+
+
+def utf16_of(content: bytes) -> str | None:
+    """The codec of a text in UTF-16: by its mark, or by the zero byte of nearly each character; None for another."""
+    if content.startswith((b"\xff\xfe", b"\xfe\xff")):
+        return "utf-16"
+    head = content[:_LOOKED_AT]
+    even, odd = head[0::2].count(0), head[1::2].count(0)
+    if min(even, odd) > 0 or max(even, odd) < _ASCII * (len(head) // 2) or len(head) < 2:
+        return None
+    return "utf-16-le" if odd else "utf-16-be"
 
 
 def refuse_binary(path: Path, form: str) -> None:

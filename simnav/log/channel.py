@@ -65,6 +65,8 @@ _DEGREES = 1e3
 _LARGEST_DEGREES = 361.0
 #: No position is so far from its origin [m].
 _FAR = 1e8
+#: An impossible cell is larger than the largest of the possible ones by this factor.
+_APART = 3.0
 #: A quaternion has the length 1, within this.
 _UNIT_LENGTH = 0.1
 
@@ -489,7 +491,7 @@ def _check_units(
 def check_cells(
     value: Array, limit: float, scale: float, column: Column, table: Table, rows: NDArray[np.int64], name: str
 ) -> None:
-    """LogError where a few of n values are larger than possible: single cells, and no wrong unit of all.
+    """LogError where a few of n values are larger than possible, and far from the others: no wrong unit of all.
 
     Parameters
     ----------
@@ -502,8 +504,9 @@ def check_cells(
     column, table, rows, name
         For messages: the column, its table, which rows the values are of, and what they are.
     """
-    bad = np.flatnonzero(np.abs(value) > limit)
-    if not 0 < 2 * bad.size <= len(value):
+    size = np.abs(value)
+    bad = np.flatnonzero(size > limit)
+    if not 0 < 2 * bad.size <= len(value) or size[bad].min() < _APART * size[size <= limit].max():
         return
     plain, most = str(column).removeprefix("-"), abs(limit / scale)
     cell = value[bad[0]] / scale * (-1.0 if plain != str(column) else 1.0)

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from simnav.log.binary import refuse_binary
+from simnav.log.binary import refuse_binary, utf16_of
 from simnav.log.files import FileSpec
 from simnav.log.kept import kept
 from simnav.log.reader import Rows, register_reader
@@ -342,11 +342,12 @@ def _utf8(path: Path) -> bytes:
 
 
 def _decoded(content: bytes) -> bytes:
-    if content.isascii():
+    codec = utf16_of(content)
+    if codec is None and content.isascii():
         return content
-    if content.startswith((b"\xff\xfe", b"\xfe\xff")):
+    if codec is not None:
         with contextlib.suppress(UnicodeDecodeError):
-            return content.decode("utf-16").encode()
+            return content.decode(codec).encode()
     try:
         return content.decode("utf-8-sig").encode()
     except UnicodeDecodeError:

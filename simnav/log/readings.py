@@ -267,13 +267,11 @@ def _noise(value: Array) -> float:
 
 def _told(stream: str, tried: list[_Tried]) -> tuple[Reading, ProbableReading] | None:
     """The likeliest reading of one stream, with its probability, if it is far more likely than the present one."""
-    smaller = [t for t in tried if t.left <= 0.0]
+    smaller = [t for t in tried if t.left < np.log(_PART)]
     if not smaller or (top := max(t.ratio for t in smaller)) < _FAR:
         return None
     alike = [t for t in smaller if t.ratio > top - _SAME]
     best = min(alike, key=lambda t: (t.reading.number, -t.ratio))
-    if best.left >= np.log(_PART):
-        return None
     reading = best.reading
     # The delay next to the best one is another figure of the same reading.
     others = [t for t in alike if t.reading.number == reading.number and not (reading.delay and t.reading.delay)]

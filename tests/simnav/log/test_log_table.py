@@ -97,7 +97,7 @@ def test_comments_anywhere_and_a_row_of_units(tmp_path, delimiter):
         read_csv(path)
 
 
-@pytest.mark.parametrize("encoding", ["latin-1", "utf-8-sig", "utf-16"])
+@pytest.mark.parametrize("encoding", ["latin-1", "utf-8-sig", "utf-16", "utf-16-le", "utf-16-be"])
 def test_headers_with_letters_of_other_alphabets(tmp_path, encoding):
     path = tmp_path / "a.csv"
     path.write_bytes("Zeit,Kurs [°]\r\n0,1\r\n1,20°\r\n".encode(encoding))

@@ -8,7 +8,7 @@ import pytest
 from simnav.leaderboard.log_inspection import drafted
 from simnav.leaderboard.results.files import write_whole
 from simnav.log import LogError, LogWarning
-from simnav.log.channel import no_fix, read_channel
+from simnav.log.channel import check_cells, no_fix, read_channel
 from simnav.log.check import check_log
 from simnav.log.delimited import lines_above, read_csv
 from simnav.log.draft import draft, guesses
@@ -267,3 +267,13 @@ def test_a_local_position_with_one_impossible_cell(tiny):
     channel = ChannelSpec(file="truth", columns=("vn", "ve", "h"), frame="ned")
     with pytest.raises(LogError, match=r"line 7, column 'vn': 1e\+30 is no possible position"):
         read_channel(tiny.scenario().log, channel, "position", "1")
+
+
+def test_a_column_in_a_smaller_unit_has_no_impossible_cells():
+    table = Table("dvl.csv", {}, np.arange(2, 202))
+    value = np.random.default_rng(0).normal(0.0, 150.0, 200)  # 0.15 m/s, in mm/s that are read as m/s
+    rows = np.arange(200)
+    check_cells(value, 200.0, 1.0, "v", table, rows, "velocity")
+    value[7] = 1e6
+    with pytest.raises(LogError, match="is no possible velocity"):
+        check_cells(np.where(np.abs(value) < 200.0, value, 1e6), 200.0, 1.0, "v", table, rows, "velocity")
