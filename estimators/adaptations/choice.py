@@ -121,7 +121,7 @@ def choose_noise(choice: Choice, covariance: Matrix, readings: Readings, k: int,
         return
     tested, wrong = choice.tested, False
     if tested.tests:
-        judged = judge_prediction(innovation, predicted, nominal, i, readings.time[k], tested)
+        judged = judge_prediction(innovation, predicted, nominal, i, readings.time[k], readings.value[k, :m], tested)
         wrong = judged.wrong
         if judged.disturbed and choice.inflates_disturbed:
             readings.inflation[k] = joint_inflation(innovation, predicted, nominal, covariance, tested)

@@ -10,6 +10,7 @@ import numpy as np
 from simnav.compiled import helper, kernel
 from simnav.estimators.algebra.chi_square import chi_square_limits, normal_quantile
 from simnav.estimators.models.roles import fixes_and_logs, witnesses
+from simnav.estimators.onset import Onsets, add_to_onset, no_onsets
 from simnav.estimators.persistence import (
     Courses,
     add_innovation,
@@ -64,6 +65,8 @@ class TestedPrediction(Record):
         Which others are witnesses of the prediction of an instrument.
     courses : Courses
         The recent innovations of the instruments.
+    onsets : Onsets
+        How their present failures began.
     wrong : (k,) array
         Time at which an instrument last found the prediction wrong [s]; -inf if it no longer does.
     failures : (k,) array
@@ -93,6 +96,7 @@ class TestedPrediction(Record):
     heard: Vector
     witness: FlagMatrix
     courses: Courses
+    onsets: Onsets
     wrong: Vector
     failures: Vector
     tested: Vector
@@ -146,6 +150,8 @@ def _persists(i: int, time: float, t: TestedPrediction) -> bool:
     if not persistent or not heard:
         t.condemned[i] = False
         return persistent
+    if t.group[i] == 0 and not t.onsets.sudden[i]:
+        return True
     if t.condemned[i] or sound:
         if t.group[i] == 1:
             t.condemned[i] = True
@@ -155,7 +161,7 @@ def _persists(i: int, time: float, t: TestedPrediction) -> bool:
 
 @kernel
 def judge_prediction(
-    residual: Vector, predicted: Matrix, noise: Matrix, i: int, time: float, t: TestedPrediction
+    residual: Vector, predicted: Matrix, noise: Matrix, i: int, time: float, value: Vector, t: TestedPrediction
 ) -> Judgement:
     """Make the tests of `PredictionTest` for an innovation of m components.
 
@@ -167,6 +173,8 @@ def judge_prediction(
         Index of the instrument among the k instruments; -1 for another one.
     time : float
         Time of the measurement [s].
+    value : (m,) array
+        The reading itself.
     t : TestedPrediction
         The tests; what they keep is updated.
     """
@@ -187,6 +195,7 @@ def judge_prediction(
     wrong = disturbed
     if t.persistence[i]:
         add_innovation(t.courses, i, u0, u1, u2, residual.size, time, square > limit)
+        add_to_onset(t.onsets, i, u0, u1, u2, value, square > limit)
         wrong = _persists(i, time, t) or wrong
     t.wrong[i] = time if wrong and t.inertial else -np.inf
     return Judgement(wrong, disturbed)
@@ -296,7 +305,7 @@ class PredictionTest:
             "witness": np.array(
                 [[other in against.get(n, ()) for other in instruments] for n in instruments], np.bool_
             ).reshape(count, count),
-            "courses": no_innovations(count), "wrong": np.full(count, -np.inf), "failures": np.zeros(count),
+            "courses": no_innovations(count), "onsets": no_onsets(count), "wrong": np.full(count, -np.inf), "failures": np.zeros(count),
             "tested": np.zeros(count), "condemned": np.zeros(count, np.bool_), "blamed": np.zeros(1),
         }  # fmt: skip
 
