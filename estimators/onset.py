@@ -1,4 +1,4 @@
-"""How the failures of an instrument begin: at once, as its own errors do, or little by little, as those of a prediction.
+"""How the failures of an instrument begin: at once, as its own errors, or little by little, as those of a prediction.
 
 A wrong prediction is the integral of what is wrong. The bias of a gyroscope turns the heading, and the heading turns
 the velocity: the innovations of a log grow through all sizes between its noise and a failure of its test. An instrument

@@ -305,7 +305,8 @@ class PredictionTest:
             "witness": np.array(
                 [[other in against.get(n, ()) for other in instruments] for n in instruments], np.bool_
             ).reshape(count, count),
-            "courses": no_innovations(count), "onsets": no_onsets(count), "wrong": np.full(count, -np.inf), "failures": np.zeros(count),
+            "courses": no_innovations(count), "onsets": no_onsets(count), "wrong": np.full(count, -np.inf),
+            "failures": np.zeros(count),
             "tested": np.zeros(count), "condemned": np.zeros(count, np.bool_), "blamed": np.zeros(1),
         }  # fmt: skip
 

@@ -70,9 +70,11 @@ class SageHusaKf(_Adaptive, adaptation=SageHusa):
         failure in one direction on, and a compass while another instrument finds the prediction wrong.
     4
         It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
+    5
+        As of ``iae``.
     """
 
-    version = 4
+    version = 5
 
 
 @register("sage-husa-paper")
@@ -131,9 +133,12 @@ class Iae(_Adaptive, adaptation=piece(InnovationBased, source="innovation")):
         failure in one direction on, and a compass while another instrument finds the prediction wrong.
     4
         It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
+    5
+        Innovations of a log that persist are taken as a wrong prediction, whatever its witnesses say, if they grew
+        little by little: an instrument that begins to be wrong is wrong at once (`simnav.estimators.onset`).
     """
 
-    version = 4
+    version = 5
 
 
 @register("iae-paper")
@@ -173,9 +178,11 @@ class IaeFixed(_Adaptive, adaptation=piece(FixedWindow, source="innovation")):
         failure in one direction on, and a compass while another instrument finds the prediction wrong.
     4
         It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
+    5
+        As of ``iae``.
     """
 
-    version = 4
+    version = 5
     formerly = _FORMERLY
 
 
@@ -203,9 +210,11 @@ class Rae(_Adaptive, adaptation=piece(FixedWindow, source="residual", newest=Fal
         failure in one direction on, and a compass while another instrument finds the prediction wrong.
     4
         It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
+    5
+        As of ``iae``.
     """
 
-    version = 4
+    version = 5
     formerly = _FORMERLY
 
 
@@ -236,9 +245,11 @@ class Adkf(_Adaptive, adaptation=AdaptiveFactor):
         failure in one direction on, and a compass while another instrument finds the prediction wrong.
     4
         It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
+    5
+        As of ``iae``.
     """
 
-    version = 4
+    version = 5
 
 
 @register("adkf-paper")
@@ -278,9 +289,11 @@ class Adkf23(Row, solver=KalmanEstimator, model=DvlCalibrationModel, adaptation=
     --------
     2
         It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
+    3
+        As of ``iae``.
     """
 
-    version = 2
+    version = 3
 
 
 @register("igg3")
@@ -310,9 +323,11 @@ class Igg3(_Adaptive, adaptation=Igg3Weights):
         failure in one direction on, and a compass while another instrument finds the prediction wrong.
     4
         It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
+    5
+        As of ``iae``.
     """
 
-    version = 4
+    version = 5
 
 
 @register("huber-kf")
@@ -338,9 +353,11 @@ class HuberKf(_Adaptive, adaptation=HuberWeights):
         failure in one direction on, and a compass while another instrument finds the prediction wrong.
     4
         It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
+    5
+        As of ``iae``.
     """
 
-    version = 4
+    version = 5
 
 
 @register("gated-ekf")
@@ -371,9 +388,11 @@ class GatedEkf(_Adaptive, adaptation=ChiSquareGate):
         failure in one direction on, and a compass while another instrument finds the prediction wrong.
     4
         It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
+    5
+        As of ``iae``.
     """
 
-    version = 4
+    version = 5
 
 
 @register("fading-ekf")
@@ -418,9 +437,11 @@ class VbAkf(_Adaptive, adaptation=VariationalBayes):
         failure in one direction on, and a compass while another instrument finds the prediction wrong.
     4
         It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
+    5
+        As of ``iae``.
     """
 
-    version = 4
+    version = 5
 
 
 @register("mckf")
@@ -447,9 +468,11 @@ class Mckf(_Adaptive, adaptation=piece(MaximumCorrentropy, smallest=1e-3)):
         failure in one direction on, and a compass while another instrument finds the prediction wrong.
     4
         It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
+    5
+        As of ``iae``.
     """
 
-    version = 4
+    version = 5
 
 
 @register("imm")
@@ -482,6 +505,9 @@ class Imm(Row, solver=ImmEstimator, model=Suitable):
     5
         Readings of one time of several channels (satellites, beams, points of a terrain) are mixed, too. Before, they
         had the noise of the datasheet.
+    6
+        Innovations of a log that persist are taken as a wrong prediction, whatever its witnesses say, if they grew
+        little by little: an instrument that begins to be wrong is wrong at once (`simnav.estimators.onset`).
     """
 
-    version = 5
+    version = 6

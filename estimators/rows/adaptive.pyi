@@ -43,7 +43,7 @@ class _Adaptive(Row, solver=KalmanEstimator, model=Suitable, iteration=poor_head
 
 @register("sage-husa")
 class SageHusaKf(_Adaptive, adaptation=SageHusa):
-    version = 4
+    version = 5
     def __init__(
         self,
         *,
@@ -75,7 +75,7 @@ class SageHusaPaper(
 
 @register("iae")
 class Iae(_Adaptive, adaptation=piece(InnovationBased, source="innovation")):
-    version = 4
+    version = 5
     def __init__(
         self,
         *,
@@ -116,7 +116,7 @@ class IaePaper(_Adaptive, adaptation=INNOVATIONS_AS_PRINTED):
 
 @register("iae-fixed")
 class IaeFixed(_Adaptive, adaptation=piece(FixedWindow, source="innovation")):
-    version = 4
+    version = 5
     formerly = _FORMERLY
     def __init__(
         self,
@@ -134,7 +134,7 @@ class IaeFixed(_Adaptive, adaptation=piece(FixedWindow, source="innovation")):
 
 @register("rae")
 class Rae(_Adaptive, adaptation=piece(FixedWindow, source="residual", newest=False)):
-    version = 4
+    version = 5
     formerly = _FORMERLY
     def __init__(
         self,
@@ -151,7 +151,7 @@ class Rae(_Adaptive, adaptation=piece(FixedWindow, source="residual", newest=Fal
 
 @register("adkf")
 class Adkf(_Adaptive, adaptation=AdaptiveFactor):
-    version = 4
+    version = 5
     def __init__(
         self,
         *,
@@ -179,7 +179,7 @@ class AdkfPaper(_Adaptive, adaptation=piece(AdaptiveFactor, preset="paper", c0=N
 
 @register("adkf-23")
 class Adkf23(Row, solver=KalmanEstimator, model=DvlCalibrationModel, adaptation=AdaptiveFactor, iteration=poor_heading):
-    version = 2
+    version = 3
     def __init__(
         self,
         *,
@@ -198,7 +198,7 @@ class Adkf23(Row, solver=KalmanEstimator, model=DvlCalibrationModel, adaptation=
 
 @register("igg3")
 class Igg3(_Adaptive, adaptation=Igg3Weights):
-    version = 4
+    version = 5
     def __init__(
         self,
         *,
@@ -209,7 +209,7 @@ class Igg3(_Adaptive, adaptation=Igg3Weights):
 
 @register("huber-kf")
 class HuberKf(_Adaptive, adaptation=HuberWeights):
-    version = 4
+    version = 5
     def __init__(
         self,
         *,
@@ -219,7 +219,7 @@ class HuberKf(_Adaptive, adaptation=HuberWeights):
 
 @register("gated-ekf")
 class GatedEkf(_Adaptive, adaptation=ChiSquareGate):
-    version = 4
+    version = 5
     def __init__(
         self,
         *,
@@ -240,7 +240,7 @@ class FadingEkf(_Adaptive, adaptation=FadingMemory):
 
 @register("vb-akf")
 class VbAkf(_Adaptive, adaptation=VariationalBayes):
-    version = 4
+    version = 5
     def __init__(
         self,
         *,
@@ -255,7 +255,7 @@ class VbAkf(_Adaptive, adaptation=VariationalBayes):
 
 @register("mckf")
 class Mckf(_Adaptive, adaptation=piece(MaximumCorrentropy, smallest=1e-3)):
-    version = 4
+    version = 5
     def __init__(
         self,
         *,
@@ -267,7 +267,7 @@ class Mckf(_Adaptive, adaptation=piece(MaximumCorrentropy, smallest=1e-3)):
 
 @register("imm")
 class Imm(Row, solver=ImmEstimator, model=Suitable):
-    version = 5
+    version = 6
     def __init__(
         self,
         *,

@@ -40,9 +40,12 @@ class StudentTKf(Row, solver=KalmanEstimator, model=Suitable, adaptation=Student
         failure in one direction on, and a compass while another instrument finds the prediction wrong.
     4
         It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
+    5
+        Innovations of a log that persist are taken as a wrong prediction, whatever its witnesses say, if they grew
+        little by little: an instrument that begins to be wrong is wrong at once (`simnav.estimators.onset`).
     """
 
-    version = 4
+    version = 5
 
 
 @register("student-t-rts")
@@ -72,7 +75,9 @@ class StudentTRts(StudentTKf, smoother=StudentTSmoother):
         failure in one direction on, and a compass while another instrument finds the prediction wrong.
     4
         It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
+    5
+        As of ``student-t``.
     """
 
-    version = 4
+    version = 5
     formerly = _FORMERLY

@@ -36,9 +36,12 @@ class NetEkf(Row, solver=KalmanEstimator, model=Suitable, iteration=poor_heading
     --------
     2
         The network learned anew: before, its target counted a noise step twice.
+    3
+        Innovations of a log that persist are taken as a wrong prediction, whatever its witnesses say, if they grew
+        little by little: an instrument that begins to be wrong is wrong at once (`simnav.estimators.onset`).
     """
 
-    version = 2
+    version = 3
 
 
 @register("net-fgo")
@@ -103,9 +106,14 @@ class NetEkf20000(NetEkf, adaptation=piece(LearnedNoise, budget=20_000)):
     is lost.
 
     Source: as ``net-ekf``.
+
+    Versions
+    --------
+    2
+        As of ``iae``.
     """
 
-    version = 1
+    version = 2
 
 
 @register("net-fgo-20000")

@@ -16,7 +16,7 @@ __all__ = ["BeamsEkf", "BeamsEkf20000", "NetEkf", "NetEkf20000", "NetFgo", "NetF
 
 @register("net-ekf")
 class NetEkf(Row, solver=KalmanEstimator, model=Suitable, iteration=poor_heading, adaptation=LearnedNoise):
-    version = 2
+    version = 3
     def __init__(
         self,
         *,
@@ -70,7 +70,7 @@ class BeamsEkf(
 
 @register("net-ekf-20000")
 class NetEkf20000(NetEkf, adaptation=piece(LearnedNoise, budget=20_000)):
-    version = 1
+    version = 2
     def __init__(
         self,
         *,

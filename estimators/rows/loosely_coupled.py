@@ -40,9 +40,11 @@ class GatedEkfLoose(Row, solver=KalmanEstimator, model=Suitable, adaptation=ChiS
     --------
     2
         It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
+    3
+        As of ``iae``.
     """
 
-    version = 2
+    version = 3
 
     loose = True
 

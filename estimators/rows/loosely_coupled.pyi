@@ -26,7 +26,7 @@ class EkfLoose(Row, solver=KalmanEstimator, model=InertialModel, iteration=poor_
 
 @register("gated-ekf-loose")
 class GatedEkfLoose(Row, solver=KalmanEstimator, model=Suitable, adaptation=ChiSquareGate, iteration=poor_heading):
-    version = 2
+    version = 3
     loose = True
     def __init__(
         self,

@@ -99,9 +99,11 @@ class MidValue(
         The motion is suspected, too, where the weighting has rejected measurements, and where there is no log.
     5
         As version 4 of ``huber-fgo``.
+    6
+        As of ``vb-akf``.
     """
 
-    version = 5
+    version = 6
 
 
 @register("mh-ekf")

@@ -50,7 +50,7 @@ class MidValue(
     isolation=FaultIsolation,
     iteration=poor_heading,
 ):
-    version = 5
+    version = 6
     def __init__(
         self,
         *,

@@ -76,9 +76,12 @@ class IaeFgo(Row, solver=_WINDOW, model=Suitable, adaptation=piece(InnovationBas
         failure in one direction on, and a compass while another instrument finds the prediction wrong.
     4
         It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
+    5
+        Innovations of a log that persist are taken as a wrong prediction, whatever its witnesses say, if they grew
+        little by little: an instrument that begins to be wrong is wrong at once (`simnav.estimators.onset`).
     """
 
-    version = 4
+    version = 5
 
 
 @register("iae-fgo-paper")
@@ -112,9 +115,11 @@ class IaeFgoFixed(Row, solver=_WINDOW, model=Suitable, adaptation=piece(FixedWin
         failure in one direction on, and a compass while another instrument finds the prediction wrong.
     4
         It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
+    5
+        As of ``iae``.
     """
 
-    version = 4
+    version = 5
 
 
 @register("sw-fgo-paper")

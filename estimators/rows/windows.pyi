@@ -57,7 +57,7 @@ class FgoFull(Row, solver=FullGraph, model=InertialModel):
 
 @register("iae-fgo")
 class IaeFgo(Row, solver=_WINDOW, model=Suitable, adaptation=piece(InnovationBased, source="innovation")):
-    version = 4
+    version = 5
     def __init__(
         self,
         *,
@@ -104,7 +104,7 @@ class IaeFgoPaper(Row, solver=_WINDOW, model=Suitable, adaptation=INNOVATIONS_AS
 
 @register("iae-fgo-fixed")
 class IaeFgoFixed(Row, solver=_WINDOW, model=Suitable, adaptation=piece(FixedWindow, source="innovation")):
-    version = 4
+    version = 5
     def __init__(
         self,
         *,

@@ -22,4 +22,4 @@ class JudgedPredictions:
             return False
         row = self._names.index(m.instrument)
         own = innovation.residual, innovation.predicted, innovation.noise
-        return bool(judge_prediction(*own, row, m.time, tested).wrong)
+        return bool(judge_prediction(*own, row, m.time, m.value, tested).wrong)
