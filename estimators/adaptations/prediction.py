@@ -138,7 +138,7 @@ def _fails_jointly(i: int, time: float, t: TestedPrediction) -> bool:
 
 @helper
 def _persists(i: int, time: float, t: TestedPrediction) -> bool:
-    """Whether the innovations of instrument i persist, and no witness is against it."""
+    """Whether the innovations of instrument i persist, and no witness is against it who has to be asked."""
     heard, sound = False, False
     for k in range(t.heard.size):
         if t.witness[i, k] and time - t.courses.time[k] <= t.heard[k]:
@@ -262,6 +262,11 @@ class PredictionTest:
     prediction, however large it is: a gyroscope that is disturbed for a second makes errors of any size. The instrument
     is then believed, as in the plain filter. Its error is bounded, and the error of an IMU alone is not. Without an IMU
     this test is not made.
+
+    *A log whose failures grow.* A wrong prediction is an integral and grows through all sizes, and an instrument that
+    begins to be wrong is wrong at once (`simnav.estimators.onset`). So a log whose failures began little by little is
+    believed, whatever its witnesses say: rare or coarse fixes notice a wrong heading only when the position has
+    drifted. (Its price: an error of a log that itself grows is believed, as in the plain filter.)
 
     *A log that is left alone.* Fixes that get no weight for some seconds cost little, because the next one restores the
     position. What a log says of a motion is said once: if it gets no weight, the position has lost it. So a log that no
