@@ -80,8 +80,8 @@ class MidValue(
     is wrong, and its covariance may be too small; so it is if all three believe the only instrument that gives the
     position.
 
-    Beside an IMU that is poorer than its datasheet, 6 of 198 voyages (``training-poor-imu``, seeds 70000 to 70199) had
-    more than 1.2 times the error of ``ekf``, 4 of them more than 1.5 times, and 1.9 times at most (70115).
+    Beside an IMU that is poorer than its datasheet, 2 of 198 voyages (``training-poor-imu``, seeds 70000 to 70199) had
+    more than 1.5 times the error of ``ekf``, 1.6 times at most (70091).
 
     Source: S. Osder, *Practical view of redundancy management application and theory*, J. Guidance, Control, and
     Dynamics 22(1), 1999; H. W. Sorenson and D. L. Alspach, *Recursive Bayesian estimation using Gaussian sums*,
