@@ -18,8 +18,8 @@ __all__ = ["Onsets", "add_to_onset", "no_onsets"]
 
 #: Memory of the mean before a failure, and number of passed tests before a new one [innovations].
 BEFORE = 4
-#: The failures began little by little if the mean before has at least this part of the first one. 0.2 and 0.3 were tried
-#: on voyages with a step of a gyroscope's or of a DVL's bias.
+#: The failures began little by little if the mean before has at least this part of the first one. 0.2 and 0.3 were
+#: tried on voyages with a step of a gyroscope's or of a DVL's bias.
 PART = 0.2
 
 
