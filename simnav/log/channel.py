@@ -65,8 +65,7 @@ _DEGREES = 1e3
 _LARGEST_DEGREES = 361.0
 #: No position is so far from its origin [m].
 _FAR = 1e8
-#: An impossible cell is larger than the largest of the possible ones by this factor.
-_APART = 3.0
+_APART = 3.0  # an impossible cell is larger than the largest possible one by this factor
 #: A quaternion has the length 1, within this.
 _UNIT_LENGTH = 0.1
 
