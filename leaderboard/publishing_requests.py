@@ -246,7 +246,7 @@ class PublishRequest:
     preliminary: bool = option(
         "--preliminary",
         default=False,
-        help="Publish also if runs are missing.",
-        more="The tables then say how many are there, and there is no edition.",
+        help="Publish also if runs are missing, or of an older version of their rows.",
+        more="The tables then say how many are there, and there is no edition, or which rows are older.",
     )
     progress: Bar = option(default=None, help="Called with how many of how many pages are done.", hidden=True)

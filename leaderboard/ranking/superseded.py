@@ -38,10 +38,12 @@ def superseded_by(name: str, results: Iterable[Result]) -> str:
         Its results.
     """
     today = version_of(name)
-    older = sorted({r.estimator_version for r in results if today is not None and r.estimator_version < today})
+    versions = {r.estimator_version for r in results}
+    older = sorted(v for v in versions if today is not None and v < today)
     if not older:
         return ""
-    return f"version {' and '.join(map(str, older))}; simnav has version {today}"
+    some = " in some scenarios" if today in versions else ""
+    return f"version {' and '.join(map(str, older))}{some}; simnav has version {today}"
 
 
 def only_version(results: Iterable[Result]) -> int | None:

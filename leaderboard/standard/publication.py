@@ -33,7 +33,7 @@ from simnav.scenario import Scenario, load
 
 from . import shipped
 from .history import append
-from .outdated_results import changes, outdated
+from .outdated_results import Outdated, changes, outdated
 from .readme import PAGE, draw, first_answer, replaced, tables
 from .unsuited_results import unsuited
 
@@ -226,9 +226,10 @@ def publish(
     named = {(load(s).id, label) for part in profile.parts for s in part.scenarios for label in part.estimators}
     without = changes(found).keys() - named
     old = outdated(working, without)
-    if old:
+    if old and not (preliminary and old == Outdated(rows=old.rows)):
+        also = ", and --preliminary publishes what is there" if old == Outdated(rows=old.rows) else ""
         raise RequestError(
-            f"these results are out of date: {'; '.join(old.sentences())}; 'simnav standard run' does it"
+            f"these results are out of date: {'; '.join(old.sentences())}; 'simnav standard run' does it{also}"
         )
     kept = (replace(r, seconds=round(r.seconds, 3)) for r in found if (r.scenario, r.estimator) not in without)
     results = shortened(declared(kept))  # as others will have them

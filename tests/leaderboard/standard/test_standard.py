@@ -262,6 +262,22 @@ def test_what_the_profile_does_not_name_is_left_out_when_it_is_out_of_date(
     assert not publishing.check_standard(made.folder)
 
 
+def test_results_of_an_older_version_of_a_row_are_published_if_asked_for_and_named(
+    home: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shutil.copy(home / "small.toml", tmp_path)
+    (tmp_path / "README.md").write_text(README)
+    monkeypatch.setattr(find("gnss-only"), "version", 2)
+    with pytest.raises(RequestError, match="run gnss-only on all scenarios.*--preliminary publishes what is there"):
+        publish(tmp_path, home / "work")
+    made = publish(tmp_path, home / "work", preliminary=True)
+    assert made.edition == 1
+    assert "Results of an older version, until the next edition: `gnss-only`" in (tmp_path / "README.md").read_text()
+    monkeypatch.setattr(outdated_results, "SIMULATOR_VERSION", 2)
+    with pytest.raises(RequestError, match="the simulator now has version 2"):
+        publish(tmp_path, home / "work", preliminary=True)
+
+
 def test_a_change_of_simulator_scenario_or_benchmark_is_said(
     home: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
