@@ -268,7 +268,7 @@ def test_results_of_an_older_version_of_a_row_are_published_if_asked_for_and_nam
     shutil.copy(home / "small.toml", tmp_path)
     (tmp_path / "README.md").write_text(README)
     monkeypatch.setattr(find("gnss-only"), "version", 2)
-    with pytest.raises(RequestError, match="run gnss-only on all scenarios.*--preliminary publishes what is there"):
+    with pytest.raises(RequestError, match=r"run gnss-only on all scenarios.*--preliminary publishes what is there"):
         publish(tmp_path, home / "work")
     made = publish(tmp_path, home / "work", preliminary=True)
     assert made.edition == 1
