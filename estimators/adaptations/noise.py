@@ -127,6 +127,7 @@ class NoiseAdaptation(Adaptation):
         reading, row = self._reading, self.index[m.instrument]
         reading.instrument[0], reading.time[0], reading.inflation[0], reading.reported[0] = row, m.time, 1.0, 0.0
         reading.rejected[0], reading.sigma[0, 0] = False, np.nan
+        reading.value[0, : len(m.value)] = m.value
         self._innovation, self.inflation = innovation, 1.0
         d = len(residual)
         prediction = Prediction(ready(residual), _NO_CROSS, ready(predicted), ready(nominal), np.empty((d, d)))
