@@ -138,7 +138,7 @@ def _fails_jointly(i: int, time: float, t: TestedPrediction) -> bool:
 
 @helper
 def _persists(i: int, time: float, t: TestedPrediction) -> bool:
-    """Whether the innovations of instrument i persist, and no witness is against it who has to be asked."""
+    """Whether the innovations of instrument i persist, and have grown or are contradicted by no witness."""
     heard, sound = False, False
     for k in range(t.heard.size):
         if t.witness[i, k] and time - t.courses.time[k] <= t.heard[k]:

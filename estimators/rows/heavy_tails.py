@@ -53,10 +53,10 @@ class StudentTRts(StudentTKf, smoother=StudentTSmoother):
     It does not notice that it is lost on a ship without an IMU whose instruments are wrong (``python -m tests.audit
     silence`` counts such runs).
 
-    Beside an IMU that is poorer than its datasheet, 11 of 198 voyages (``training-poor-imu``, seeds 70000 to 70199)
-    had more than 1.5 times the error of ``ekf``, 5.4 times at most (70042), or ended early (1). Do not use its
-    smoothed trajectory there: 135 of them had more than 1.5 times the error of that of ``ekf-rts``, and the
-    geometric mean is 4.4 times.
+    Beside an IMU that is poorer than its datasheet, 8 of 198 voyages (``training-poor-imu``, seeds 70000 to 70199) had
+    more than 1.5 times the error of ``ekf``, 5.4 times at most (70042), or ended early (1). Do not use its smoothed
+    trajectory there: in version 4, 135 of them had more than 1.5 times the error of that of ``ekf-rts``, and the
+    geometric mean was 4.4 times.
 
     Source: A. Y. Aravkin, J. V. Burke and G. Pillonetto, *Robust and trend-following Student's t Kalman smoothers*,
     SIAM J. Control and Optimization 52(5), 2014.

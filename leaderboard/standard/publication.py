@@ -226,8 +226,9 @@ def publish(
     named = {(load(s).id, label) for part in profile.parts for s in part.scenarios for label in part.estimators}
     without = changes(found).keys() - named
     old = outdated(working, without)
-    if old and not (preliminary and old == Outdated(rows=old.rows)):
-        also = ", and --preliminary publishes what is there" if old == Outdated(rows=old.rows) else ""
+    only_rows = old == Outdated(rows=old.rows)
+    if old and not (preliminary and only_rows):
+        also = ", and --preliminary publishes what is there" if only_rows else ""
         raise RequestError(
             f"these results are out of date: {'; '.join(old.sentences())}; 'simnav standard run' does it{also}"
         )

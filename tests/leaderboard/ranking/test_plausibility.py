@@ -11,6 +11,7 @@ from simnav.estimator.registry import registered
 from simnav.leaderboard.ranking import reference
 from simnav.leaderboard.ranking.board import Reference
 from simnav.leaderboard.ranking.ranking import rank
+from simnav.leaderboard.ranking.superseded import superseded_by
 from simnav.leaderboard.results.provenance import Provenance
 from simnav.leaderboard.results.result import Result
 from simnav.leaderboard.standard.readme import tables
@@ -111,6 +112,9 @@ def test_the_board_says_which_results_are_of_an_older_version(monkeypatch: pytes
     assert "Results of an older version, until the next edition: `ekf` (version 2; simnav has version 3)." in tables(
         rank(found), found
     )
+    own = [r for r in found if r.estimator == "ekf"]
+    newer = [replace(r, estimator_version=3) for r in own]
+    assert superseded_by("ekf", own + newer) == "version 2 in some scenarios; simnav has version 3"
 
 
 def test_the_board_says_what_a_row_learned_from() -> None:
