@@ -18,8 +18,8 @@ __all__ = ["Onsets", "add_to_onset", "no_onsets"]
 
 #: Memory of the mean before a failure, and number of passed tests before a new one [innovations].
 BEFORE = 4
-#: The failures began little by little if the mean before has at least this part of the first one. 0.2 and 0.3 were
-#: tried on voyages with a step of a gyroscope's or of a DVL's bias.
+#: The failures began little by little if the mean before has at least this part of the first one. On 80 voyages of
+#: ``training-rare-fixes`` (seeds 50000 to 50079) 0 to 0.2 do equally well, and 0.3 loses a third of the gain.
 PART = 0.2
 
 
