@@ -41,7 +41,7 @@ MOST_IN_JSON = 20_000
 
 _CHUNK = 8192  # runs that are converted at a time
 _DIGITS = 4  # of figures of the ranking
-_BITS = 16  # of figures of more runs than `MOST_IN_JSON`: a part in 50 000
+_BITS = 13  # of figures of more runs than `MOST_IN_JSON`: four figures
 _FACTS = ("scenario", "seed", "draws", "estimator", "parameters", "learned", "reference", "status", "reason", "note")
 _COSTS = ("seconds", "peak_memory")
 #: Column -> attribute: how a run ended as tables count it, and why.
