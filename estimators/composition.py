@@ -101,13 +101,13 @@ class Solver(Estimator):
     def needs(self) -> Needs:
         """The instruments that its model needs."""
         own = vars(self)
-        model = own.get("_choice", own.get("model"))
+        model = own.get("_model_choice", own.get("model"))
         found: Needs = () if model is None else model.needs
         return found
 
     def observes(self, instruments: Instruments) -> Collection[str] | None:
         """The instruments that its model observes; None without a model, and for a model that is unaided by design."""
-        choice = vars(self).get("_choice", vars(self).get("model"))
+        choice = vars(self).get("_model_choice", vars(self).get("model"))
         if choice is None:
             return None
         model = choice.choose(instruments, self.label)

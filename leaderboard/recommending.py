@@ -75,7 +75,8 @@ def _kinds(given: ScenarioLike | Sequence[str]) -> tuple[str, ...]:
     found = []
     for name in names:
         if name not in valid:
-            raise RequestError(f"{name!r} is no kind of instrument{closest(str(name), list(valid))}")
+            known = [n for n in valid if "_" not in n]  # each once
+            raise RequestError(f"{name!r} is no kind of instrument{closest(str(name), known)}")
         found.append(valid[name])
     return tuple(sorted(set(found)))
 

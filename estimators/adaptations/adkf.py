@@ -227,7 +227,7 @@ class AdaptiveFactor(NoiseAdaptation):
         """As `NoiseAdaptation.ruled`: with the residual statistic and target R."""
         return super().ruled and self.statistic == "residual" and self.target == "R"
 
-    def settings_of(self, longer: float) -> Array:
+    def settings_of(self, per_second: float) -> Array:
         """As `NoiseAdaptation.settings_of`."""
         return filled(SETTINGS, c0=self.c0, c1=self.c1, two=2.0, smallest=self.SMALLEST)
 
@@ -246,7 +246,7 @@ class AdaptiveFactor(NoiseAdaptation):
             return innovation.noise
         P = innovation.covariance
         if self.target == "P" and P is not None:
-            self.inflation = limited_inflation(1.0 / factor, P, self.prediction.tested(len(P)).first)
+            self.inflation = limited_inflation(1.0 / factor, P, self.prediction_test.record(len(P)).first)
         self.report_number(innovation.measurement.instrument, factor)
         return innovation.noise if self.target == "P" or factor == 1.0 else noise
 

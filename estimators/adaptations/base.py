@@ -58,7 +58,7 @@ class Adaptation:
         last call of `adapt`. Adaptations use it if the prediction is wrong and not the measurement.
     inflates : bool
         True if the covariance of the prediction is always inflated, and not only where the motion is wrong. A window
-        has no such covariance, and refuses such an adaptation.
+        holds the motion by factors, and refuses such an adaptation.
     inflate : callable
         What of the covariance is inflated (`simnav.estimators.adaptations.inflation`).
     inflates_motion : bool

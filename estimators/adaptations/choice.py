@@ -11,13 +11,13 @@ from math import sqrt
 
 import numpy as np
 
-from simnav.compiled import kernel
+from simnav.compiled import helper, kernel
 from simnav.estimators.models.filtering import Prediction, Readings
 from simnav.kernel_types import FlagVector, IntegerVector, Matrix, Vector
 from simnav.records import Record
 from simnav.types import Instruments
 
-from .prediction import PredictionTest, TestedPrediction, joint_inflation, judge_prediction
+from .prediction import PredictionTest, TestRecord, joint_inflation, judge_prediction
 from .rules import copied
 
 __all__ = ["Choice", "choose_noise", "keep_nominal", "no_choice"]
@@ -48,7 +48,7 @@ class Choice(Record):
         Index of the first element of each memory.
     common : (c,) array
         What the rule keeps of all instruments together.
-    tested : TestedPrediction
+    test : TestRecord
         The tests of the prediction.
     """
 
@@ -62,7 +62,14 @@ class Choice(Record):
     memories: Vector
     first: IntegerVector
     common: Vector
-    tested: TestedPrediction
+    test: TestRecord
+
+
+@helper
+def is_used(last: Vector) -> bool:
+    """Whether there is a noise that was used last."""
+    used: bool = last[0] > 0.0
+    return used
 
 
 @kernel
@@ -70,7 +77,7 @@ def is_poor(predicted: Matrix, nominal: Matrix, last: Vector) -> bool:
     """Whether a prediction is less certain than the noise used last, so that it tells little about the noise."""
     before, trace, m = 0.0, 0.0, predicted.shape[0]
     for a in range(m):
-        before += last[a * (m + 1)] if last[0] > 0.0 else nominal[a, a]
+        before += last[a * (m + 1)] if is_used(last) else nominal[a, a]
         trace += predicted[a, a]
     return trace > before
 
@@ -119,16 +126,16 @@ def choose_noise(choice: Choice, covariance: Matrix, readings: Readings, k: int,
     copied(nominal, noise)
     if not has_noise(nominal):
         return
-    tested, wrong = choice.tested, False
-    if tested.tests:
-        judged = judge_prediction(innovation, predicted, nominal, i, readings.time[k], readings.value[k, :m], tested)
+    test, wrong = choice.test, False
+    if test.tests:
+        judged = judge_prediction(innovation, predicted, nominal, i, readings.time[k], readings.value[k, :m], test)
         wrong = judged.wrong
         if judged.disturbed and choice.inflates_disturbed:
-            readings.inflation[k] = joint_inflation(innovation, predicted, nominal, covariance, tested)
+            readings.inflation[k] = joint_inflation(innovation, predicted, nominal, covariance, test)
     readings.wrong[k] = wrong
     if not wrong and choice.in_scope[row]:
         if choice.estimates and is_poor(predicted, nominal, last):
-            if last[0] > 0.0:
+            if is_used(last):
                 copied(last[: m * m].reshape((m, m)), noise)
         else:
             memory = choice.memories[choice.first[i] : choice.first[i + 1]]
@@ -152,5 +159,5 @@ def no_choice() -> Choice:
     return Choice(
         rule=keep_nominal, estimates=False, inflates_disturbed=False, index=np.empty(0, np.int64),
         in_scope=np.empty(0, np.bool_), last=np.empty((0, 9)), settings=np.empty((0, 0)), memories=np.empty(0),
-        first=np.empty(0, np.int64), common=np.empty(0), tested=PredictionTest(Instruments()).tested(0),
+        first=np.empty(0, np.int64), common=np.empty(0), test=PredictionTest(Instruments()).record(0),
     )  # fmt: skip

@@ -114,6 +114,6 @@ class MaximumCorrentropy(NoiseAdaptation):
         self.bandwidth, self.iterations, self.smallest, self.begin = bandwidth, iterations, smallest, begin
         self.rule = from_update if begin == "update" else from_prediction
 
-    def settings_of(self, longer: float) -> Array:
+    def settings_of(self, per_second: float) -> Array:
         """As `NoiseAdaptation.settings_of`."""
         return filled(SETTINGS, bandwidth=self.bandwidth, smallest=self.smallest, iterations=self.iterations)

@@ -59,7 +59,7 @@ class FadingMemory(NoiseAdaptation):
             raise ValueError(f"memory = {memory:g} s: it must be above 0")
         self.memory = memory
 
-    def settings_of(self, longer: float) -> Array:
+    def settings_of(self, per_second: float) -> Array:
         """As `NoiseAdaptation.settings_of`."""
         return filled(SETTINGS, memory=self.memory)
 

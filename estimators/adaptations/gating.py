@@ -83,11 +83,11 @@ class ChiSquareGate(NoiseAdaptation):
         """As `NoiseAdaptation.ruled`; the channels of an instrument are counted in Python."""
         return super().ruled and not self._siblings
 
-    def settings_of(self, longer: float) -> Array:
+    def settings_of(self, per_second: float) -> Array:
         """As `NoiseAdaptation.settings_of`."""
         return filled(SETTINGS, patience=self.patience, limits=chi_square_limits(self.probability))
 
-    def begun(self, longer: float, m: int) -> Array:
+    def begun(self, per_second: float, m: int) -> Array:
         """As `NoiseAdaptation.begun`."""
         return filled(MEMORY, heard=-np.inf, failing=np.nan)
 

@@ -375,20 +375,20 @@ class InnovationBased(EstimatedNoise):
         of_innovations = from_innovations_as_printed if newest else from_innovations
         self.rule = of_innovations if source == "innovation" else from_residuals
 
-    def settings_of(self, longer: float) -> Array:
+    def settings_of(self, per_second: float) -> Array:
         """As `EstimatedNoise.settings_of`."""
-        shortest, longest = round(self.shortest * longer), round(self.longest * longer)
+        shortest, longest = round(self.shortest * per_second), round(self.longest * per_second)
         return filled(
             SETTINGS, shortest=shortest, longest=longest, low=self.low, high=self.high,
-            forgetting=1.0 - (1.0 - self.forgetting) ** (1.0 / longer), lowest=self.lowest**2, highest=self.highest**2,
-            of_shortest=_contradiction(shortest, self.significance),
+            forgetting=1.0 - (1.0 - self.forgetting) ** (1.0 / per_second), lowest=self.lowest**2,
+            highest=self.highest**2, of_shortest=_contradiction(shortest, self.significance),
             of_middle=_contradiction((shortest + longest) // 2, self.significance),
             of_longest=_contradiction(longest, self.significance),
         )  # fmt: skip
 
-    def begun(self, longer: float, m: int) -> Array:
+    def begun(self, per_second: float, m: int) -> Array:
         """As `EstimatedNoise.begun`: an empty window."""
-        return np.concatenate([filled(MEMORY), np.zeros(round(self.longest * longer) * _width(m))])
+        return np.concatenate([filled(MEMORY), np.zeros(round(self.longest * per_second) * _width(m))])
 
     def choose(self, innovation: Innovation) -> Array:
         """The bounded estimate of a full matrix, or the nominal noise."""

@@ -139,11 +139,11 @@ class LearnedNoise(NetworkPiece, NoiseAdaptation):
         """Whether the network has learned from this kind of instrument."""
         return kind in self.network.kinds
 
-    def settings_of(self, longer: float) -> Array:
+    def settings_of(self, per_second: float) -> Array:
         """As `NoiseAdaptation.settings_of`; `reset` fills in the group."""
         return np.concatenate([filled(SETTINGS, least=self.highest**-2, units=self._units), self._weights])
 
-    def begun(self, longer: float, m: int) -> Array:
+    def begun(self, per_second: float, m: int) -> Array:
         """As `NoiseAdaptation.begun`."""
         return np.concatenate([filled(MEMORY, heard=np.nan), np.zeros(self._units)])
 

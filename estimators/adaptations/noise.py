@@ -9,7 +9,7 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from simnav.compiled import ready
-from simnav.estimators.models.filtering import Prediction, Readings, room_for
+from simnav.estimators.models.filtering import Prediction, Readings, clear_readings, room_for
 from simnav.types import KINDS, Array, Instruments
 
 from .base import Adaptation, Innovation
@@ -66,16 +66,16 @@ class NoiseAdaptation(Adaptation):
 
     def reset(self, instruments: Instruments) -> None:
         """Begin a run."""
-        self.prediction = PredictionTest(instruments, self.together)
+        self.prediction_test = PredictionTest(instruments, self.together)
         self.report = NoiseReport(instruments, list(instruments), self.reported)
         self.instruments, self.index = instruments, {name: i for i, name in enumerate(instruments)}
-        self.longer = {name: max(sheet.rate, 1.0) for name, sheet in instruments.items()}
-        self.rule_settings = np.array([self.settings_of(longer) for longer in self.longer.values()], dtype=np.float64)
-        begun = [self.begun(n, len(KINDS[instruments[name].kind].errors)) for name, n in self.longer.items()]
+        self.per_second = {name: max(sheet.rate, 1.0) for name, sheet in instruments.items()}
+        self.rule_settings = np.array([self.settings_of(n) for n in self.per_second.values()], dtype=np.float64)
+        begun = [self.begun(n, len(KINDS[instruments[name].kind].errors)) for name, n in self.per_second.items()]
         self.rule_first = np.cumsum([0, *map(len, begun)])
         self.rule_memory = np.concatenate([*begun, np.empty(0)])
         self.rule_common = self.begun_together()
-        self._choice: Choice | None = None
+        self._noise_choice: Choice | None = None
         self._reading = room_for(1)
 
     @property
@@ -83,11 +83,11 @@ class NoiseAdaptation(Adaptation):
         """Whether a rule does all that `choose` does, with the parameters of this adaptation."""
         return self.rule is not None and not self.chooses_by_method
 
-    def settings_of(self, longer: float) -> Array:
+    def settings_of(self, per_second: float) -> Array:
         """What the rule needs to know of an instrument with so many measurements in a second, at least 1."""
         return np.empty(0)
 
-    def begun(self, longer: float, m: int) -> Array:
+    def begun(self, per_second: float, m: int) -> Array:
         """What the rule keeps of an instrument of m components, at the start of a run."""
         return np.empty(0)
 
@@ -104,7 +104,7 @@ class NoiseAdaptation(Adaptation):
         """Whether the noise of a kind of instrument is chosen; otherwise it is the nominal one."""
         return True
 
-    def choice(self, names: Sequence[str], size: int) -> Choice:
+    def noise_choice(self, names: Sequence[str], size: int) -> Choice:
         """How the noise of the readings of some instruments is chosen, in a model of so many states."""
         sheets = [self.instruments[name] for name in names]
         return Choice(
@@ -114,7 +114,7 @@ class NoiseAdaptation(Adaptation):
             in_scope=np.array([self.in_scope(sheet.kind) for sheet in sheets], dtype=np.bool_),
             last=np.zeros((len(names), 9)), settings=self.rule_settings.reshape(len(self.index), -1),
             memories=self.rule_memory, first=self.rule_first, common=self.rule_common,
-            tested=self.prediction.tested(size),
+            test=self.prediction_test.record(size),
         )  # fmt: skip
 
     def adapt(self, innovation: Innovation) -> Array | None:
@@ -122,17 +122,17 @@ class NoiseAdaptation(Adaptation):
         m, residual, predicted, nominal, covariance = (
             innovation.measurement, innovation.residual, innovation.predicted, innovation.noise, innovation.covariance,
         )  # fmt: skip
-        if self._choice is None:
-            self._choice = self.choice(list(self.index), 0 if covariance is None else len(covariance))
+        if self._noise_choice is None:
+            self._noise_choice = self.noise_choice(list(self.index), 0 if covariance is None else len(covariance))
         reading, row = self._reading, self.index[m.instrument]
-        reading.instrument[0], reading.time[0], reading.inflation[0], reading.reported[0] = row, m.time, 1.0, 0.0
-        reading.rejected[0], reading.sigma[0, 0] = False, np.nan
+        clear_readings.unchecked(reading, 1)
+        reading.instrument[0], reading.time[0] = row, m.time
         reading.value[0, : len(m.value)] = m.value
         self._innovation, self.inflation = innovation, 1.0
         d = len(residual)
         prediction = Prediction(ready(residual), _NO_CROSS, ready(predicted), ready(nominal), np.empty((d, d)))
-        choose = choose_noise.unchecked if self._choice.compiled else choose_noise.function
-        choose(self._choice, _NO_COVARIANCE if covariance is None else ready(covariance), reading, 0, prediction)
+        choose = choose_noise.unchecked if self._noise_choice.compiled else choose_noise.function
+        choose(self._noise_choice, _NO_COVARIANCE if covariance is None else ready(covariance), reading, 0, prediction)
         self.inflation = float(reading.inflation[0])
         if reading.rejected[0]:
             return None

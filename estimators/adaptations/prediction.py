@@ -23,7 +23,15 @@ from simnav.kernel_types import FlagMatrix, FlagVector, IntegerVector, Matrix, V
 from simnav.records import Record
 from simnav.types import Instruments
 
-__all__ = ["Judgement", "PredictionTest", "TestedPrediction", "joint_inflation", "judge_prediction", "standardised"]
+__all__ = ["Judgement", "PredictionTest", "TestRecord", "joint_inflation", "judge_prediction", "standardised"]
+
+
+#: Groups of the joint test: logs, fixes (with the velocity of a receiver), and what takes no part in it.
+LOG, FIX, NEITHER = 0, 1, -1
+
+
+def _group(is_fix: bool | None) -> int:
+    return NEITHER if is_fix is None else FIX if is_fix else LOG
 
 
 @kernel
@@ -36,7 +44,7 @@ def standardised(residual: Vector, predicted: Matrix, noise: Matrix) -> tuple[fl
     return u0, u1, u2
 
 
-class TestedPrediction(Record):
+class TestRecord(Record):
     """The tests of `PredictionTest` as data, for k instruments and n states.
 
     Attributes
@@ -47,7 +55,7 @@ class TestedPrediction(Record):
         Whether there is an IMU.
     together : int
         Number of joint failures in a row after which the prediction is taken as wrong.
-    round : int
+    failures_per_inflation : int
         Number of failures between two inflations.
     large, persistent, white, alone : float
         Normal quantiles of the probabilities of `PredictionTest`.
@@ -56,7 +64,7 @@ class TestedPrediction(Record):
     limits : (4,) array
         Limits of chi-square for 0 to 3 components.
     group : (k,) array of int
-        Group of each instrument in the joint test: 0 a log, 1 a fix, -1 none.
+        Group of each instrument in the joint test: `LOG`, `FIX` or `NEITHER`.
     persistence : (k,) array of bool
         Whether the test of persistence is made for an instrument.
     heard : (k,) array
@@ -71,7 +79,7 @@ class TestedPrediction(Record):
         Time at which an instrument last found the prediction wrong [s]; -inf if it no longer does.
     failures : (k,) array
         Number of failures in a row of its joint test.
-    tested : (k,) array
+    joint_test : (k,) array
         Time of its last joint test [s].
     condemned : (k,) array of bool
         Whether a log was against it since its innovations persist.
@@ -84,7 +92,7 @@ class TestedPrediction(Record):
     tests: bool
     inertial: bool
     together: int
-    round: int
+    failures_per_inflation: int
     large: float
     persistent: float
     white: float
@@ -99,7 +107,7 @@ class TestedPrediction(Record):
     onsets: Onsets
     wrong: Vector
     failures: Vector
-    tested: Vector
+    joint_test: Vector
     condemned: FlagVector
     blamed: Vector
     first: Vector
@@ -125,35 +133,35 @@ class Judgement(NamedTuple):
 
 
 @helper
-def _fails_jointly(i: int, time: float, t: TestedPrediction) -> bool:
+def _fails_jointly(i: int, time: float, t: TestRecord) -> bool:
     """Count a failure of instrument i, and say whether it and one of the other group have failed often enough."""
     t.failures[i] += 1.0
     if t.failures[i] >= t.together:
         for k in range(t.group.size):
             often = t.group[k] != t.group[i] and t.failures[k] >= t.together
-            if often and time - t.tested[k] <= t.joint_time:
+            if often and time - t.joint_test[k] <= t.joint_time:
                 return True
     return False
 
 
 @helper
-def _persists(i: int, time: float, t: TestedPrediction) -> bool:
+def _persists(i: int, time: float, t: TestRecord) -> bool:
     """Whether the innovations of instrument i persist, and have grown or are contradicted by no witness."""
     heard, sound = False, False
     for k in range(t.heard.size):
         if t.witness[i, k] and time - t.courses.time[k] <= t.heard[k]:
             heard = True
             sound = sound or not is_correlated(t.courses, k, t.white)
-    if t.group[i] == 0 and not heard and is_directed(t.courses, i, t.alone):
+    if t.group[i] == LOG and not heard and is_directed(t.courses, i, t.alone):
         return True
     persistent = is_correlated(t.courses, i, t.persistent) and is_large(t.courses, i, t.large)
     if not persistent or not heard:
         t.condemned[i] = False
         return persistent
-    if t.group[i] == 0 and not t.onsets.sudden[i]:
+    if t.group[i] == LOG and not t.onsets.sudden[i]:
         return True
     if t.condemned[i] or sound:
-        if t.group[i] == 1:
+        if t.group[i] == FIX:
             t.condemned[i] = True
         return False
     return True
@@ -161,7 +169,7 @@ def _persists(i: int, time: float, t: TestedPrediction) -> bool:
 
 @kernel
 def judge_prediction(
-    residual: Vector, predicted: Matrix, noise: Matrix, i: int, time: float, value: Vector, t: TestedPrediction
+    residual: Vector, predicted: Matrix, noise: Matrix, i: int, time: float, value: Vector, t: TestRecord
 ) -> Judgement:
     """Make the tests of `PredictionTest` for an innovation of m components.
 
@@ -175,10 +183,10 @@ def judge_prediction(
         Time of the measurement [s].
     value : (m,) array
         The reading itself.
-    t : TestedPrediction
+    t : TestRecord
         The tests; what they keep is updated.
     """
-    if i < 0 or (t.group[i] < 0 and not t.persistence[i]):
+    if i < 0 or (t.group[i] == NEITHER and not t.persistence[i]):
         for k in range(t.heard.size):
             if time - t.wrong[k] <= t.heard[k]:
                 return Judgement(True, False)
@@ -186,8 +194,8 @@ def judge_prediction(
     u0, u1, u2 = standardised(residual, predicted, noise)
     square, limit = u0 * u0 + u1 * u1 + u2 * u2, t.limits[residual.size]
     disturbed = False
-    if t.group[i] >= 0:
-        t.tested[i] = time
+    if t.group[i] != NEITHER:
+        t.joint_test[i] = time
         if square <= limit:
             t.failures[i] = t.blamed[0] = 0.0
         else:
@@ -220,15 +228,13 @@ def limited_inflation(inflation: float, covariance: Matrix, first: Vector) -> fl
 
 
 @kernel
-def joint_inflation(
-    residual: Vector, predicted: Matrix, noise: Matrix, covariance: Matrix, t: TestedPrediction
-) -> float:
-    """Count a failure of the prediction, and return the factor of P: above 1 once for every ``round`` of failures.
+def joint_inflation(residual: Vector, predicted: Matrix, noise: Matrix, covariance: Matrix, t: TestRecord) -> float:
+    """Count a failure of the prediction, and return the factor of P: above 1 once in ``failures_per_inflation``.
 
     It is the root of the mean squared standardised component, over 2 (eqs. 28 and 34 of Zhan et al. 2026), limited.
     """
     t.blamed[0] += 1.0
-    if int(t.blamed[0] - 1.0) % t.round != 0:
+    if int(t.blamed[0] - 1.0) % t.failures_per_inflation != 0:
         return 1.0
     u0, u1, u2 = standardised(residual, predicted, noise)
     return limited_inflation(0.5 * sqrt((u0 * u0 + u1 * u1 + u2 * u2) / residual.size), covariance, t.first)
@@ -252,11 +258,11 @@ class PredictionTest:
     - the recent innovations of the instrument are correlated from one to the next, and too large for R and H P H'; and
     - no witness is against it. A witness is another instrument that would notice the same error of the prediction
       (`simnav.estimators.models.roles.witnesses`): it is heard, and its own innovations are not correlated. So a
-      lasting error of the fixes is found if a log agrees with the prediction, and the other way round. A filter that
-      believes wrong fixes soon disagrees with the log, too. So what the log said at first stands until the fixes agree
-      again. What fixes say of a log does not stand: they see a wrong velocity only when the position has drifted. (Its
-      price: where a wrong log pulls the position, as with Huber's weights, which never vanish, it may be believed
-      later. The row then has about the error of the plain filter.)
+      lasting error of the fixes is found if a log agrees with the prediction, and the other way round. Once a log has
+      been against the fixes, that stands until the fixes agree again (`condemned`): a filter that believes wrong fixes
+      soon disagrees with the log, too. What fixes say of a log does not stand: they see a wrong velocity only when the
+      position has drifted. (Its price: where a wrong log pulls the position, as with Huber's weights, which never
+      vanish, it may be believed later. The row then has about the error of the plain filter.)
 
     So a lasting error is blamed on an instrument only by a witness. Without one it cannot be told from a wrong
     prediction, however large it is: a gyroscope that is disturbed for a second makes errors of any size. The instrument
@@ -299,12 +305,12 @@ class PredictionTest:
         against = witnesses(instruments) if together and inertial else {}
         large, persistent, white, alone = map(normal_quantile, (self.GOOD, self.PERSISTENT, self.WHITE, self.ALONE))
         count = len(instruments)
-        self._first: dict[int, TestedPrediction] = {}
+        self._first: dict[int, TestRecord] = {}
         self._shared: dict[str, Any] = {
             "tests": bool(group or against), "inertial": inertial, "together": together,
-            "round": max(together * len(group), 1), "large": large, "persistent": persistent, "white": white,
-            "alone": alone, "joint_time": self.RECENT, "limits": np.array(chi_square_limits(self.GOOD)),
-            "group": np.array([group.get(n, -1) for n in instruments], np.int64),
+            "failures_per_inflation": max(together * len(group), 1), "large": large, "persistent": persistent,
+            "white": white, "alone": alone, "joint_time": self.RECENT, "limits": np.array(chi_square_limits(self.GOOD)),
+            "group": np.array([_group(group.get(n)) for n in instruments], np.int64),
             "persistence": np.array([n in against for n in instruments], np.bool_),
             "heard": np.array([max(self.RECENT, 3.0 / sheet.rate) for sheet in instruments.values()], np.float64),
             "witness": np.array(
@@ -312,11 +318,11 @@ class PredictionTest:
             ).reshape(count, count),
             "courses": no_innovations(count), "onsets": no_onsets(count), "wrong": np.full(count, -np.inf),
             "failures": np.zeros(count),
-            "tested": np.zeros(count), "condemned": np.zeros(count, np.bool_), "blamed": np.zeros(1),
+            "joint_test": np.zeros(count), "condemned": np.zeros(count, np.bool_), "blamed": np.zeros(1),
         }  # fmt: skip
 
-    def tested(self, n: int) -> TestedPrediction:
+    def record(self, n: int) -> TestRecord:
         """The tests as data, in a filter of n states."""
         if n not in self._first:
-            self._first[n] = TestedPrediction(first=np.zeros(n), **self._shared)
+            self._first[n] = TestRecord(first=np.zeros(n), **self._shared)
         return self._first[n]

@@ -122,7 +122,7 @@ class HuberWeights(EquivalentWeights):
             raise ValueError(f"k = {k:g}: it must be above 0")
         self.k = k
 
-    def settings_of(self, longer: float) -> Array:
+    def settings_of(self, per_second: float) -> Array:
         """As `NoiseAdaptation.settings_of`."""
         return filled(HUBER, k=self.k, smallest=self.SMALLEST)
 
@@ -143,6 +143,6 @@ class Igg3Weights(EquivalentWeights):
             raise ValueError(f"k0 = {k0:g} and k1 = {k1:g}: it must be 0 < k0 < k1")
         self.k0, self.k1 = k0, k1
 
-    def settings_of(self, longer: float) -> Array:
+    def settings_of(self, per_second: float) -> Array:
         """As `NoiseAdaptation.settings_of`."""
         return filled(IGG3, k0=self.k0, k1=self.k1, two=2.0, smallest=self.SMALLEST)

@@ -91,13 +91,15 @@ class SageHusa(EstimatedNoise):
             raise ValueError(f"prior = {prior}: it must not be negative")
         self.fading, self.prior = fading, prior
 
-    def settings_of(self, longer: float) -> Array:
+    def settings_of(self, per_second: float) -> Array:
         """As `EstimatedNoise.settings_of`."""
-        return filled(SETTINGS, fading=self.fading ** (1.0 / longer), lowest=self.lowest**2, highest=self.highest**2)
+        return filled(
+            SETTINGS, fading=self.fading ** (1.0 / per_second), lowest=self.lowest**2, highest=self.highest**2
+        )
 
-    def begun(self, longer: float, m: int) -> Array:
+    def begun(self, per_second: float, m: int) -> Array:
         """As `EstimatedNoise.begun`."""
-        return filled(MEMORY, count=round(self.prior * longer))
+        return filled(MEMORY, count=round(self.prior * per_second))
 
     def choose(self, innovation: Innovation) -> Array:
         """The bounded estimate of a full matrix, this innovation included."""

@@ -134,6 +134,6 @@ class StudentT(NoiseAdaptation):
             raise ValueError(f"turns = {turns}: it must be at least 1")
         self.dof, self.turns = min(dof, 1e12), turns
 
-    def settings_of(self, longer: float) -> Array:
+    def settings_of(self, per_second: float) -> Array:
         """As `NoiseAdaptation.settings_of`."""
         return filled(SETTINGS, dof=self.dof, iterations=self.turns)

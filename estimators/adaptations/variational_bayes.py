@@ -138,14 +138,14 @@ class VariationalBayes(EstimatedNoise):
             raise ValueError(f"iterations = {iterations}: it must be at least 1")
         self.forgetting, self.prior, self.iterations = forgetting, prior, iterations
 
-    def settings_of(self, longer: float) -> Array:
+    def settings_of(self, per_second: float) -> Array:
         """As `EstimatedNoise.settings_of`."""
         return filled(
-            SETTINGS, forgetting=self.forgetting ** (1.0 / longer), iterations=self.iterations,
+            SETTINGS, forgetting=self.forgetting ** (1.0 / per_second), iterations=self.iterations,
             lowest=self.lowest**2, highest=self.highest**2,
         )  # fmt: skip
 
-    def begun(self, longer: float, m: int) -> Array:
+    def begun(self, per_second: float, m: int) -> Array:
         """As `EstimatedNoise.begun`: shape and scales of the datasheet's noise."""
-        prior = 0.5 * self.prior * longer
+        prior = 0.5 * self.prior * per_second
         return filled(MEMORY, gamma_shape=prior, scales=prior)

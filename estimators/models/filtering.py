@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from simnav.compiled import helper
+from simnav.compiled import helper, kernel
 from simnav.estimators.algebra.inflation import MotionStates
 from simnav.kernel_types import FlagVector, IntegerVector, Matrix, Vector
 from simnav.records import Record
@@ -19,7 +19,7 @@ from simnav.types import Array, Measurement
 
 __all__ = [
     "Aid", "AidTable", "Dynamics", "ModelFunctions", "Prediction", "Readings", "ReadingsOfSteps", "SigmaPoints",
-    "aid_of", "aid_table", "room_for",
+    "aid_of", "aid_table", "clear_readings", "has_noise_chosen", "room_for",
 ]  # fmt: skip
 
 
@@ -184,7 +184,7 @@ class Readings(Record):
     nis : (k,) array
         Normalised innovation squared; -1 where the reading was not used.
     size : (k,) array
-        Norm of the innovation.
+        Norm of the innovation; -1 where the reading was not predicted.
     sigma : (k, 3) array
         Roots of the variances that an adaptation chose; NaN where none was chosen.
     reported : (k,) array
@@ -206,6 +206,22 @@ class Readings(Record):
     inflation: Vector
     rejected: FlagVector
     wrong: FlagVector
+
+
+@kernel
+def clear_readings(readings: Readings, count: int) -> None:
+    """Forget what became of the first readings: none of them is predicted yet."""
+    for k in range(count):
+        readings.nis[k] = readings.size[k] = -1.0
+        readings.sigma[k, 0], readings.reported[k], readings.inflation[k] = np.nan, 0.0, 1.0
+        readings.rejected[k] = readings.wrong[k] = False
+
+
+@helper
+def has_noise_chosen(readings: Readings, k: int) -> bool:
+    """Whether an adaptation has chosen the noise of a reading."""
+    chosen: bool = readings.sigma[k, 0] == readings.sigma[k, 0]  # NaN is not equal to itself
+    return chosen
 
 
 class Prediction(NamedTuple):
@@ -273,10 +289,6 @@ class ReadingsOfSteps:
     def __init__(self, components: Mapping[str, int]):
         self._row = {name: (i, d) for i, (name, d) in enumerate(components.items())}
         self._readings = room_for(8)
-
-    def components(self, instrument: str) -> int:
-        """Number of components of an instrument."""
-        return self._row[instrument][1]
 
     def room(self, count: int) -> Readings:
         """Room for so many readings at least; those of the call before are there until they are overwritten."""

@@ -4,12 +4,11 @@ The state is propagated by `simnav.strapdown` at IMU rate, its error in blocks o
 measurement (`simnav.estimators.models.propagation`).
 
 Error: estimate minus truth; position ``(R_M + h) dlat, (R_N + h) cos(lat) dlon, -dh`` [m], velocity [m/s] and the
-rotation vector phi of C_est C_true' [rad], all in north-east-down, and the biases [rad/s], [m/s^2]. Its dynamics
-(phi-angle form, Groves 2013, section 14.2.4, with his signs turned to estimate minus truth):
-
-with the position, velocity and attitude errors dr, dv and phi, the bias errors db_g and db_a and db for both of them,
+rotation vector phi of C_est C_true' [rad], all in north-east-down, and the biases [rad/s], [m/s^2]. The dynamics of
+the error are in the phi-angle form (Groves 2013, section 14.2.4, with his signs turned to estimate minus truth). With
+the position, velocity and attitude errors dr, dv and phi, the bias errors db_g and db_a and db for both of them,
 the specific force f_n, the Earth rate w_ie, the transport rate w_en, w_in = w_ie + w_en and their errors dw, the
-velocity v, gravity g, the Earth's radius R, the correlation time T and the direction cosine matrix C:
+velocity v, gravity g, the Earth's radius R, the correlation time T and the direction cosine matrix C they are
 
 - dr' = dv + (curvature terms of order v/R) dr
 - dv' = -[f_n x] phi - C db_a - (2 w_ie + w_en) x dv - (2 dw_ie + dw_en) x v + 2 g/R dr_D

@@ -141,7 +141,7 @@ class FederatedEstimator(KalmanEstimator):
 
     def reset(self, start: InitialState, instruments: Instruments) -> None:
         """Begin a run."""
-        instruments = by_source(without_shared_blocks(instruments), self._choice, self.label)
+        instruments = by_source(without_shared_blocks(instruments), self._model_choice, self.label)
         super().reset(start, instruments)
         self._of = {name: instrument_of(instruments[name]) for name in self._names}
         names = list(dict.fromkeys(self._of.values()))

@@ -16,7 +16,7 @@ import numpy as np
 from simnav.compiled import kernel
 from simnav.estimators.adaptations.choice import Choice
 from simnav.estimators.algebra.joseph import joseph_update
-from simnav.estimators.models.filtering import Dynamics, Prediction, Readings
+from simnav.estimators.models.filtering import Dynamics, Prediction, Readings, clear_readings
 from simnav.estimators.models.propagation import Samples
 from simnav.kernel_types import Matrix
 from simnav.records import Record
@@ -76,12 +76,11 @@ def filter_step(f: Filter, readings: Readings, samples: Samples, count: int, unt
         End of the step [s].
     """
     n = f.dynamics.covariance.shape[0]
+    clear_readings(readings, count)
     for k in range(count):
         f.propagate(f.dynamics, samples, min(float(readings.time[k]), until))
         d = int(readings.components[k])
         prediction = Prediction(np.empty(d), np.empty((n, d)), np.empty((d, d)), np.empty((d, d)), np.empty((d, d)))
-        readings.nis[k], readings.sigma[k, 0], readings.reported[k] = -1.0, np.nan, 0.0
-        readings.inflation[k], readings.rejected[k], readings.wrong[k] = 1.0, False, False
         if not f.predict(f.dynamics, readings, k, prediction):
             continue
         square = 0.0

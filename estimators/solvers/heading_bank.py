@@ -191,7 +191,7 @@ class HeadingBank(Solver):
             raise ValueError(f"above_deg = {above_deg:g}: it must be above 0")
         if not 1.0 <= spacing_deg <= 90.0:
             raise ValueError(f"spacing_deg = {spacing_deg:g}: it must lie between 1 and 90")
-        self._choice, self.above_deg, self.spacing_deg = model, above_deg, spacing_deg
+        self._model_choice, self.above_deg, self.spacing_deg = model, above_deg, spacing_deg
         self._hypotheses: list[_Hypothesis] = []
 
     def reset(self, start: InitialState, instruments: Instruments) -> None:
@@ -200,7 +200,7 @@ class HeadingBank(Solver):
         kind = KalmanEstimator if len(starts) == 1 else _Scored
         self._hypotheses = []
         for own, weight in starts:
-            one = kind(copy.deepcopy(self._choice))
+            one = kind(copy.deepcopy(self._model_choice))
             one.row = self.label
             one.reset(own, instruments)
             self._hypotheses.append(_Hypothesis(one, weight))

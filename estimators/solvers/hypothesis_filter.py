@@ -130,12 +130,12 @@ class HypothesisFilter(ImmEstimator):
         """The correction is a mixture that reports its evidence."""
         return super().functions().replaced(correct=correct_with_evidence)
 
-    def choice(self, instruments: Instruments) -> Choice:
+    def noise_choice(self, instruments: Instruments) -> Choice:
         """As of `ImmEstimator`, but without tests of the prediction: that the IMU is wrong is another hypothesis.
 
         The noise of a lone fix (`lone_fix`) has one level.
         """
-        choice = replace(super().choice(instruments), tested=PredictionTest(instruments, together=0).tested(0))
+        choice = replace(super().noise_choice(instruments), test=PredictionTest(instruments, together=0).record(0))
         if name := lone_fix(instruments):
             choice.settings[list(instruments).index(name), : len(self._variances)] = 1.0
         return choice

@@ -97,7 +97,7 @@ class ImmEstimator(KalmanEstimator):
         correct = self.correct if self.smoother is not None else correct_by_mixture
         return functions.replaced(choose=choose_noise, correct=correct)
 
-    def choice(self, instruments: Instruments) -> Choice:
+    def noise_choice(self, instruments: Instruments) -> Choice:
         """The levels as settings, and the probabilities of the levels as memories; at first the stationary ones."""
         values, vectors = np.linalg.eig(self.transition.T)
         first = np.real(vectors[:, int(np.argmax(np.real(values)))])
@@ -109,7 +109,7 @@ class ImmEstimator(KalmanEstimator):
             last=np.zeros((i, 9)),
             settings=np.tile([*self._variances, *self.transition.ravel()], (len(instruments), 1)),
             memories=probability.ravel(), first=np.arange(0, probability.size + 1, len(self._variances)),
-            common=np.empty(0), tested=PredictionTest(instruments).tested(self.model.size),
+            common=np.empty(0), test=PredictionTest(instruments).record(self.model.size),
         )  # fmt: skip
 
     def correct(self, dynamics: Dynamics, choice: Choice, readings: Readings, k: int, prediction: Prediction) -> float:

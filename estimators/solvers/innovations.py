@@ -90,10 +90,10 @@ class InnovationKeeper(KalmanEstimator):
         """Those of the filter, but the one that corrects."""
         return super().functions().replaced(correct=correct_and_keep)
 
-    def choice(self, instruments: Instruments) -> Choice:
+    def noise_choice(self, instruments: Instruments) -> Choice:
         """That of a filter without an adaptation, with room for innovations."""
         self._room = np.zeros((_READINGS, length(KEPT)))
-        return replace(super().choice(instruments), last=self._room)
+        return replace(super().noise_choice(instruments), last=self._room)
 
     def _use(
         self,

@@ -115,7 +115,7 @@ class KalmanEstimator(Solver):
         iteration: Iteration | None = None,
         smoother: Smoother | None = None,
     ):
-        self._choice = model
+        self._model_choice = model
         if isinstance(model, ErrorModel):
             self.model = model
         self.adaptation = adaptation
@@ -126,7 +126,7 @@ class KalmanEstimator(Solver):
 
     def reset(self, start: InitialState, instruments: Instruments) -> None:
         """Begin a run; UnsuitableScenario if the model lacks an instrument."""
-        instruments = by_source(instruments, self._choice, self.label)
+        instruments = by_source(instruments, self._model_choice, self.label)
         self.model = self._chosen(instruments)
         self.model.reports_all |= self.reports_all
         self.covariance = self.model.begin(start, instruments)
@@ -150,7 +150,7 @@ class KalmanEstimator(Solver):
 
     def _chosen(self, instruments: Instruments) -> ErrorModel:
         """The model of a run; subclasses may override it."""
-        return with_stated_sigmas(self._choice.choose(instruments, self.label), instruments)
+        return with_stated_sigmas(self._model_choice.choose(instruments, self.label), instruments)
 
     def update(self, measurements: Measurements) -> Estimate:
         """Take one step's measurements, each at its own time."""
@@ -278,7 +278,7 @@ class KalmanEstimator(Solver):
             self._of_kernels = self._filters_of_kernels()
         if functions["choose"] is use_nominal and not all(isinstance(f, Kernel) for f in functions.values()):
             functions["choose"] = self.choose  # a loop in Python copies an array sooner than it calls a kernel
-        return Filter(dynamics=self.dynamics, choice=self.choice(instruments), **functions)
+        return Filter(dynamics=self.dynamics, choice=self.noise_choice(instruments), **functions)
 
     def _filters_of_kernels(self) -> dict[str, Filter]:
         """The one filter that uses single readings, by the name of each instrument that the model has kernels for."""
@@ -292,11 +292,11 @@ class KalmanEstimator(Solver):
         )  # fmt: skip
         return dict.fromkeys(kernels, single)
 
-    def choice(self, instruments: Instruments) -> Choice:
+    def noise_choice(self, instruments: Instruments) -> Choice:
         """How the noise of each reading is chosen in a run."""
         own = self.adaptation
         if isinstance(own, NoiseAdaptation) and own.ruled:
-            return own.choice(self._names, self.model.size)
+            return own.noise_choice(self._names, self.model.size)
         return no_choice()
 
     def _advance(self, admitted: Sequence[Measurement], until: float, flagged: list[tuple[str, float]]) -> None:

@@ -161,7 +161,7 @@ class MidValueSelection(Solver):
         iterations: int = 15,
         spacing: float = 0.5,
     ):
-        self._choice = model
+        self._model_choice = model
         plain = KalmanEstimator(copy.deepcopy(model), iteration=iteration)
         adaptive = KalmanEstimator(copy.deepcopy(model), adaptation, copy.deepcopy(iteration))
         isolating = WindowEstimator(

@@ -238,11 +238,11 @@ class MultipleHypothesis(Solver):
             raise ValueError(
                 f"filters = {filters}: it must be 3 or more, for a start that is right or wrong in two ways"
             )
-        self._choice, self.period, self.onset, self.end, self.filters = model, period, onset, end, filters
+        self._model_choice, self.period, self.onset, self.end, self.filters = model, period, onset, end, filters
 
     def reset(self, start: InitialState, instruments: Instruments) -> None:
         """Begin a run; UnsuitableScenario if the model lacks an instrument."""
-        instruments = by_source(instruments, self._choice, self.label)
+        instruments = by_source(instruments, self._model_choice, self.label)
         self._start, self._instruments = start, instruments
         starts = starts_by_heading(start, NARROW, SPACING)
         wrong = [(uncertain_start(start, attitude=False), WRONG_POSITION)]
@@ -275,7 +275,7 @@ class MultipleHypothesis(Solver):
 
     def _made(self, start: InitialState) -> HypothesisFilter:
         """A filter that begins the run."""
-        one = HypothesisFilter(copy.deepcopy(self._choice))
+        one = HypothesisFilter(copy.deepcopy(self._model_choice))
         one.row, one.reports_all = self.label, self.reports_all
         one.reset(start, self._instruments)
         return one

@@ -195,15 +195,15 @@ class SolutionSeparation(Solver):
                 raise ValueError(f"{name} = {seconds:g} s: it must be above 0")
         if not recovery >= 0.0:
             raise ValueError(f"recovery = {recovery:g} s: it must not be negative")
-        self._choice = model
-        self.false_alarm, self.recovery = false_alarm, recovery
+        self._model_choice, self.false_alarm, self.recovery = model, false_alarm, recovery
         self.horizon, self.horizon_without_imu = horizon, horizon_without_imu
         self.risk, self.fault_probability = risk, fault_probability
 
     def _filter(
         self, exclusion: Exclusion | None = None, start: InitialState | None = None, disturbed: bool = False
     ) -> WatchedFilter:
-        one = WatchedFilter(copy.deepcopy(self._choice), exclusion, None if start is None else Iteration(_ITERATED_DEG))
+        iteration = None if start is None else Iteration(_ITERATED_DEG)
+        one = WatchedFilter(copy.deepcopy(self._model_choice), exclusion, iteration)
         one.row, one.mean_nis = self.label, {}
         stated, instruments = self._begin_with
         one.reset(start or stated, disturbed_imu(instruments) if disturbed else instruments)
@@ -213,7 +213,7 @@ class SolutionSeparation(Solver):
         """Begin a run; UnsuitableScenario if the model lacks an instrument."""
         from scipy.special import ndtri  # to import scipy.stats takes 0.8 s
 
-        instruments = by_source(instruments, self._choice, self.label)
+        instruments = by_source(instruments, self._model_choice, self.label)
         self._begin_with = start, instruments
         self._inertial = instruments.imu is not None
         self._horizon = self.horizon if self._inertial else self.horizon_without_imu

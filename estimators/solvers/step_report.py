@@ -8,7 +8,7 @@ import numpy as np
 
 from simnav.compiled import kernel
 from simnav.estimators.adaptations.noise_report import CHOSEN, NoiseReport
-from simnav.estimators.models.filtering import Readings
+from simnav.estimators.models.filtering import Readings, has_noise_chosen
 from simnav.kernel_types import IntegerVector, Matrix, Vector
 from simnav.records import Record
 from simnav.structures import length, structure
@@ -83,7 +83,7 @@ def note_readings(report: StepReport, readings: Readings, count: int) -> None:
             continue
         row = readings.instrument[k]
         at = report.index[row]
-        if at >= 0 and readings.sigma[k, 0] == readings.sigma[k, 0]:
+        if at >= 0 and has_noise_chosen(readings, k):
             chosen = report.chosen[at].view(CHOSEN)[0]
             for a in range(3):
                 chosen.sigma[a] = readings.sigma[k, a]

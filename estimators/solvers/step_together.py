@@ -9,11 +9,9 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any
 
-import numpy as np
-
 from simnav.estimators.algebra.joseph import joseph_sequence
 from simnav.estimators.models.base import Linearised
-from simnav.estimators.models.filtering import Readings, ReadingsOfSteps
+from simnav.estimators.models.filtering import Readings, ReadingsOfSteps, clear_readings
 from simnav.estimators.models.propagation import Samples
 from simnav.types import Measurement
 
@@ -55,7 +53,7 @@ def step_together(
     if predicted is None:
         return None
     readings, count, dynamics = arrays.of_instruments(measurements), len(measurements), f.dynamics
-    readings.rejected[:count], readings.sigma[:count, 0], readings.reported[:count] = False, np.nan, 0.0
+    clear_readings.unchecked(readings, count)
     nis, size = readings.nis[:count], readings.size[:count]
     joseph_sequence.unchecked(dynamics.covariance, *predicted, dynamics.correction, nis, size)
     f.retract(dynamics)

@@ -72,7 +72,7 @@ class WeightedKalmanEstimator(KalmanEstimator):
 
     def reset(self, start: InitialState, instruments: Instruments) -> None:
         """Begin a run; UnsuitableScenario if the model lacks an instrument."""
-        instruments = by_source(instruments, self._choice, self.label)
+        instruments = by_source(instruments, self._model_choice, self.label)
         super().reset(start, instruments)
         self.weighting.reset(instruments)
         self._index = {name: k for k, name in enumerate(instruments)}

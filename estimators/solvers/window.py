@@ -12,9 +12,9 @@ epoch is an iterated EKF.
 The first step of an epoch uses the elimination of the older nodes from the last epoch, as in incremental smoothing
 (M. Kaess et al., "iSAM2: Incremental smoothing and mapping using the Bayes tree", Int. J. Robotics Research 31(2),
 2012): only new factors are linearised and eliminated, and all nodes are moved. Then the weighting is called with the
-new residuals. A weight is not changed if the change of its factor's influence is within the tolerance. Nodes are
-eliminated again from the first node on whose weight has changed. All factors are linearised and eliminated again if a
-step is large, or if this would move the nodes by more than the tolerance.
+new residuals. A weight is not changed if the change of its factor's influence is within the tolerance. Elimination
+is repeated from the first node that has a factor with another weight. All factors are linearised and eliminated again
+if a step is large, or if this would move the nodes by more than the tolerance.
 
 A large step is accepted only if it does not increase the cost. Motion factors are stiff: a straight step through a
 large rotation violates the motion factors at second order, and the cost increases although the step is good (the
@@ -131,9 +131,9 @@ class WindowEstimator(LooksBack, Solver):
 
     @classmethod
     def misfit(cls, keyword: str, made: type) -> str:
-        """Why it cannot work with a piece of a class: it keeps no covariance of a prediction."""
+        """Why it cannot work with a piece of a class: it weighs motion by factors, not by a covariance."""
         if keyword == "adaptation" and getattr(made, "inflates", False):
-            return "it inflates the covariance of the prediction, and a window keeps none"
+            return "it inflates the covariance of the prediction, and a window holds the motion by factors"
         return super().misfit(keyword, made)
 
     def __init__(
@@ -161,10 +161,10 @@ class WindowEstimator(LooksBack, Solver):
             raise ValueError(f"{type(isolation).__name__} changes weights, and there is no weighting")
         if adaptation is not None and adaptation.inflates:
             raise ValueError(
-                f"{type(adaptation).__name__}, as it is set, inflates the covariance of the prediction; a window keeps "
-                "none, so that it adapts filters only"
+                f"{type(adaptation).__name__}, as it is set, inflates the covariance of the prediction; a window holds "
+                "the motion by factors, so that it adapts filters only"
             )
-        self._choice = model
+        self._model_choice = model
         if isinstance(model, (Chain, ErrorModel)):
             self.chain = chain_of(model)
         self.adaptation = adaptation
@@ -174,8 +174,8 @@ class WindowEstimator(LooksBack, Solver):
 
     def longest_lag(self, instruments: Instruments) -> float:
         """The time that the window holds [s]: an epoch is a step, or the interval of the fastest instrument in use."""
-        instruments = by_source(instruments, self._choice, self.label)
-        model = self._choice.choose(instruments, self.label)
+        instruments = by_source(instruments, self._model_choice, self.label)
+        model = self._model_choice.choose(instruments, self.label)
         rates = [sheet.rate for sheet in instruments.values() if model.observes(sheet) and sheet.rate > 0.0]
         if self.window is None or not rates:
             return inf
@@ -183,8 +183,8 @@ class WindowEstimator(LooksBack, Solver):
 
     def reset(self, start: InitialState, instruments: Instruments) -> None:
         """Begin a run; UnsuitableScenario if the model lacks an instrument."""
-        instruments = by_source(instruments, self._choice, self.label)
-        self.chain = chain_of(with_stated_sigmas(self._choice.choose(instruments, self.label), instruments))
+        instruments = by_source(instruments, self._model_choice, self.label)
+        self.chain = chain_of(with_stated_sigmas(self._model_choice.choose(instruments, self.label), instruments))
         self.chain.front.reports_all |= self.reports_all
         self.covariance = self.chain.begin(start, instruments)
         observed = [name for name, sheet in instruments.items() if self.chain.observes(sheet)]
@@ -225,7 +225,7 @@ class WindowEstimator(LooksBack, Solver):
         if not (isinstance(own, NoiseAdaptation) and own.ruled):
             return None
         step = WindowStep(
-            dynamics=chain.dynamics, choice=own.choice(chain.names, chain.size), advance=f.advance_covariance,
+            dynamics=chain.dynamics, choice=own.noise_choice(chain.names, chain.size), advance=f.advance_covariance,
             predict=f.predict, choose=choose_and_test, make_node=f.make_node, attach=f.attach,
         )  # fmt: skip
         return step if step.compiled else None

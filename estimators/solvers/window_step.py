@@ -17,7 +17,7 @@ from simnav.compiled import kernel
 from simnav.estimators.adaptations.choice import Choice, choose_noise
 from simnav.estimators.algebra.direct_update import normalised_square
 from simnav.estimators.algebra.factors import NewRows, Rows
-from simnav.estimators.models.filtering import Dynamics, Prediction, Readings
+from simnav.estimators.models.filtering import Dynamics, Prediction, Readings, clear_readings
 from simnav.estimators.models.new_factors import Growing
 from simnav.estimators.models.propagation import Samples
 from simnav.kernel_types import Matrix
@@ -95,13 +95,12 @@ def attach_readings(
         How many rows were appended.
     """
     new, n = NewRows(0, 0, 0), w.dynamics.covariance.shape[0]
+    clear_readings(readings, count)
     for k in range(count):
         time = float(readings.time[k])
         w.advance(w.dynamics, growing, samples, min(time, until))
         d = int(readings.components[k])
         prediction = Prediction(np.empty(d), np.empty((n, d)), np.empty((d, d)), np.empty((d, d)), np.empty((d, d)))
-        readings.size[k], readings.sigma[k, 0], readings.reported[k] = -1.0, np.nan, 0.0
-        readings.rejected[k] = False
         if not w.predict(w.dynamics, readings, k, prediction):
             continue
         w.choose(w.choice, w.dynamics.covariance, readings, k, prediction)

@@ -7,7 +7,8 @@ decides nothing.
 
 **Choice.** All pairs of rows are tested at once. Where no row that may be taken is significantly better than the
 plain row, the plain row is taken: nothing more is shown. Otherwise the row with the smallest error among those that
-are, and than which no other row is significantly better. A row whose page advises against it
+are, and than which no other row is significantly better. Where the plain row takes too long, the row with the smallest
+error among the others. A row whose page advises against it
 (`simnav.estimator.Estimator.advised_against`) is not taken.
 """
 
@@ -38,6 +39,7 @@ if TYPE_CHECKING:
 __all__ = ["Recommendation", "recommendation", "recommendations"]
 
 _SHOWN = 10  # rows of the table
+_LEADING = 2  # of them, the row and the plain row
 _WITH_INTERVALS = 2  # kinds of trouble whose intervals are in the table
 
 
@@ -101,13 +103,14 @@ def recommendations(
     chosen = _evidence(fitting, asked)
     known = {trouble_of(t.name) for runs in fitting for t in runs.tables}
     without = tuple(t for t in asked or troubles() if t not in known)
+    others = tuple(t for t in troubles() if not asked and t in known and t not in chosen)
     groups = tuple(filter(None, (group_of(runs, t) for t, runs in chosen.items())))
     over = None if not groups else groups[0] if len(groups) == 1 else _together(chosen)
     beside: dict[str, tuple[tuple[Elsewhere, ...], tuple[Elsewhere, ...]]] = {}
     answers = []
     for limit in limits:
         made = Recommendation(
-            tuple(instruments), tuple(chosen), without, limit, "none", "", None, None, (), 0, groups, (), ()
+            tuple(instruments), tuple(chosen), without, others, limit, "none", "", None, None, (), 0, groups, (), ()
         )
         if over is None:
             made = replace(made, why="no scenario of the results has these troubles and instruments")
@@ -223,7 +226,7 @@ def _table(answer: Recommendation) -> tables.Fitted:
     assert answer.row is not None
     assert answer.plain is not None
     few = len(answer.groups) <= _WITH_INTERVALS
-    named = {c.estimator: c for c in (answer.row, answer.plain, *answer.as_good[: _SHOWN - 2])}
+    named = {c.estimator: c for c in (answer.row, answer.plain, *answer.as_good[: _SHOWN - _LEADING])}
     columns = ["estimator", "cost ×", *(g.title for g in answer.groups), "bad runs", "95 % coverage"]
     cells = [
         [n, tables.number(c.cost), *(_cell(g, n, few) for g in answer.groups), tables.percent(c.result.bad),
@@ -231,11 +234,14 @@ def _table(answer: Recommendation) -> tables.Fitted:
         for n, c in named.items()
     ]  # fmt: skip
     silent = [within(g.title) for g in answer.groups if not g.separates]
-    interval = ", with its 95 % interval over seeds" if few else ""
+    interval = ", with the 95 % interval over seeds of each row by itself" if few else ""
     notes = [f"Error over that of {answer.plain.estimator} in the same runs{interval}."]
+    if len(named) > _LEADING:
+        order = "smallest error" if answer.confidence == "undecided" else "cheapest"
+        notes.append(f"After the first {_LEADING}, the row with the {order} is first.")
     if silent:
         notes.append(f"No two rows differ significantly in these groups: {', '.join(silent)}.")
-    if len(answer.as_good) > _SHOWN - 2:
+    if len(answer.as_good) > _SHOWN - _LEADING:
         notes.append("The document of --json has the other rows.")
     value = ["estimator", *columns[2:-2], "cost ×", "bad runs", "95 % coverage"]
     return tables.Fitted(

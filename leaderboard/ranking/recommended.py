@@ -67,6 +67,8 @@ class Answer:
         Kinds of trouble that the answer is about.
     without_evidence : tuple of str
         Kinds of trouble that were asked for, or exist, and of which no scenario speaks for the instruments.
+    on_other_tracks : tuple of str
+        Kinds of trouble of which only other tracks have scenarios for the instruments, if none was asked for.
     limit : float or None
         Milliseconds that an epoch may take.
     confidence : str
@@ -92,6 +94,7 @@ class Answer:
     instruments: tuple[str, ...]
     troubles: tuple[str, ...]
     without_evidence: tuple[str, ...]
+    on_other_tracks: tuple[str, ...]
     limit: float | None
     confidence: Confidence
     why: str

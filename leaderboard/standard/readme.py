@@ -131,7 +131,11 @@ def _older(results: Sequence[Result]) -> list[str]:
         by_row.setdefault(r.estimator, []).append(r)
     found = ((f"`{row}`", superseded_by(row.partition("(")[0], own)) for row, own in sorted(by_row.items()))
     older = [(row, versions) for row, versions in found if versions]
-    return [f"Results of an older version, until the next edition: {in_words(older)}."] if older else []
+    return (
+        [f"Some results are of an older version of their row, until the next edition: {in_words(older)}."]
+        if older
+        else []
+    )
 
 
 def _from_page(picture: str) -> str:

@@ -13,7 +13,7 @@ class JudgedPredictions:
     """The tests over the instruments of a run; the parameters are those of `PredictionTest`."""
 
     def __init__(self, instruments: Instruments, together: int = 3):
-        self._names, self._tested = list(instruments), PredictionTest(instruments, together).tested(0)
+        self._names, self._tested = list(instruments), PredictionTest(instruments, together).record(0)
 
     def fails(self, innovation: Innovation) -> bool:
         """Whether the prediction of an innovation is taken as wrong."""

@@ -14,7 +14,7 @@ def _sort(name: str) -> tuple[object, ...]:
     """The classes of solver, model and smoother, and whether there is an adaptation or a weighting."""
     estimator = make(name)
     solver = getattr(estimator, "solver", estimator)  # a row that is no declaration is its own solver
-    pieces = (getattr(solver, piece, None) for piece in ("model", "_choice", "chain", "smoother", "iteration"))
+    pieces = (getattr(solver, piece, None) for piece in ("model", "_model_choice", "chain", "smoother", "iteration"))
     there = (getattr(solver, piece, None) is not None for piece in ("adaptation", "weighting"))
     return (type(solver), *map(type, pieces), *there)
 

@@ -91,6 +91,31 @@ def test_the_command_prints_sentences_or_one_document(folder: Path) -> None:
     assert document["sentences"][0] == first
 
 
+def test_kinds_of_trouble_that_other_tracks_judge_are_named() -> None:
+    """The standard result has a receiver beside an IMU in several tracks; only what no track has is without evidence."""
+    answer = simnav.recommend(["imu", "gnss"])
+    assert answer.troubles == ("outage",)
+    assert set(answer.on_other_tracks) >= {"nothing", "noisy-fixes", "imu"}
+    assert not set(answer.on_other_tracks) & set(answer.without_evidence)
+    assert any("`noisy-fixes`" in said for said in answer.sentences)
+    assert simnav.recommend(["imu", "gnss"], troubles="imu").on_other_tracks == ()
+
+
+def test_the_sentences_say_what_was_understood_and_that_a_covariance_is_too_small() -> None:
+    said = simnav.recommend(["imu", "gps"], troubles="imu").sentences
+    assert any(s.startswith("For gnss_position and imu the evidence is 1 scenario") for s in said)
+    assert any(s.startswith("Do not trust its covariance") for s in said)
+
+
+def test_a_plain_row_that_takes_too_long_is_named() -> None:
+    answer = simnav.recommend(SHIP, troubles="outage", milliseconds=0.05)
+    assert answer.row is not None
+    assert answer.row.estimator == "ship-ekf"
+    said = answer.sentences
+    assert any(s.startswith("`ekf` takes") and s.endswith("more than the 0.05 ms that you allow.") for s in said)
+    assert any(s.startswith("Of its ") for s in said)
+
+
 def test_without_evidence_nothing_is_read(folder: Path) -> None:
     answer = simnav.recommend(["depth"], results=folder / "nowhere")
     assert answer.row is None

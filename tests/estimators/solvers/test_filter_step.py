@@ -89,7 +89,7 @@ def test_compiled_and_plain_have_the_same_bits(recording_of, row: str):
     assert (len(used) > 5) == (name in ADAPTIVE)
     assert (flagged > 5) == (row == "gated-ekf")
     if isinstance(whole.solver.adaptation, AdaptiveFactor) and name == "adkf":
-        first = [e.solver.adaptation.prediction.tested(whole.model.size).first for e in (whole, single)]
+        first = [e.solver.adaptation.prediction_test.record(whole.model.size).first for e in (whole, single)]
         np.testing.assert_array_equal(*first)
         assert first[0].all()  # the motion was inflated
 
@@ -145,7 +145,7 @@ def test_an_adaptation_that_chooses_in_its_own_way_is_asked(recording_of, run_ov
     for full in (False, True):
         adaptation = SageHusa(full=full)
         adaptation.reset(instruments)
-        assert adaptation.choice(list(instruments), 15).compiled != full  # NumPy bounds a full matrix
+        assert adaptation.noise_choice(list(instruments), 15).compiled != full  # NumPy bounds a full matrix
 
 
 def test_a_gate_counts_channels_in_python():
@@ -154,7 +154,7 @@ def test_a_gate_counts_channels_in_python():
         gate = ChiSquareGate()
         gate.reset(instruments)
         channels = any(sheet.name != instrument_of(sheet) for sheet in instruments.values())
-        assert gate.choice(list(instruments), 15).compiled != channels
+        assert gate.noise_choice(list(instruments), 15).compiled != channels
     assert channels
 
 
@@ -162,7 +162,7 @@ def test_a_gate_counts_channels_in_python():
 def test_a_factor_that_only_numpy_computes_has_no_rule(recording_of, own: dict[str, str]):
     adaptation = AdaptiveFactor(**own)
     adaptation.reset(recording_of(2, 5.0).instruments)
-    assert not adaptation.choice(list(adaptation.instruments), 15).compiled
+    assert not adaptation.noise_choice(list(adaptation.instruments), 15).compiled
 
 
 @pytest.mark.parametrize("name", ["predict", "correct", "retract"])
