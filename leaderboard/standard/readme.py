@@ -131,11 +131,7 @@ def _older(results: Sequence[Result]) -> list[str]:
         by_row.setdefault(r.estimator, []).append(r)
     found = ((f"`{row}`", superseded_by(row.partition("(")[0], own)) for row, own in sorted(by_row.items()))
     older = [(row, versions) for row, versions in found if versions]
-    return (
-        [f"Some results are of an older version of their row, until the next edition: {in_words(older)}."]
-        if older
-        else []
-    )
+    return [f"Until the next edition, some results are of an older version: {in_words(older)}."] if older else []
 
 
 def _from_page(picture: str) -> str:

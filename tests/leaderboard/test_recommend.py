@@ -92,7 +92,7 @@ def test_the_command_prints_sentences_or_one_document(folder: Path) -> None:
 
 
 def test_kinds_of_trouble_that_other_tracks_judge_are_named() -> None:
-    """The standard result has a receiver beside an IMU in several tracks; only what no track has is without evidence."""
+    """The standard result has a receiver beside an IMU in several tracks; what no track has is without evidence."""
     answer = simnav.recommend(["imu", "gnss"])
     assert answer.troubles == ("outage",)
     assert set(answer.on_other_tracks) >= {"nothing", "noisy-fixes", "imu"}
