@@ -119,7 +119,7 @@ def learned_remarks(rows: Sequence[Row]) -> tuple[str, ...]:
 def superseded_remarks(rows: Sequence[Row]) -> tuple[str, ...]:
     """Which rows have results of an older version than the one that comes with simnav."""
     found = [(r.estimator, r.superseded) for r in rows if r.superseded]
-    return (f"Results of an older version: {in_words(found)}.",) if found else ()
+    return (f"Some results are of an older version: {in_words(found)}.",) if found else ()
 
 
 def seed_remarks(scenarios: Sequence[Collection[str]]) -> tuple[str, ...]:

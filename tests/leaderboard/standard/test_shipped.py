@@ -55,7 +55,7 @@ def test_its_versions_are_those_of_today_or_the_readme_says_which_are_older() ->
     rest = replace(found, rows=())
     assert not rest, "\n".join([*rest.sentences(), "'simnav standard run' does it, then 'simnav standard publish'"])
     text = readme.marked(ROOT / "README.md")
-    said = next((line for line in text.splitlines() if line.startswith("Results of an older version")), "")
+    said = next((line for line in text.splitlines() if line.startswith("Until the next edition")), "")
     assert [row for row in found.rows if f"`{row}`" not in said] == []
 
 

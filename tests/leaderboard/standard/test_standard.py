@@ -272,7 +272,7 @@ def test_results_of_an_older_version_of_a_row_are_published_if_asked_for_and_nam
         publish(tmp_path, home / "work")
     made = publish(tmp_path, home / "work", preliminary=True)
     assert made.edition == 1
-    assert "Results of an older version, until the next edition: `gnss-only`" in (tmp_path / "README.md").read_text()
+    assert "some results are of an older version: `gnss-only`" in (tmp_path / "README.md").read_text()
     monkeypatch.setattr(outdated_results, "SIMULATOR_VERSION", 2)
     with pytest.raises(RequestError, match="the simulator now has version 2"):
         publish(tmp_path, home / "work", preliminary=True)
