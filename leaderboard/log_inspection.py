@@ -15,7 +15,8 @@ from simnav.kinds import KINDS
 from simnav.leaderboard.campaign.request import requests
 from simnav.log.channel import list_recordings
 from simnav.log.check import check_log
-from simnav.log.draft import draft, guesses
+from simnav.log.column_guesses import guesses, left_out
+from simnav.log.draft import draft
 from simnav.log.draft_readings import rewritten
 from simnav.log.inspection import Stream
 from simnav.log.readings import probable_readings
@@ -70,16 +71,26 @@ class Inspection:
 
     @property
     def unknown(self) -> tuple[str, ...]:
-        """A sentence for each table whose columns are not known by their names and sizes, so that no draft has them."""
-        told = []
+        """A sentence for what no draft has: columns that cannot be read or are not known, and half of an IMU."""
+        told, inertial = [], dict[str, str]()
         for stream in self.streams:
-            if stream.form in _TABLES and not any(guesses(stream)):
+            spoilt = list(left_out(stream))
+            told += spoilt
+            guessed = [g.quantity for g in guesses(stream)]
+            inertial |= {q: stream.name for q in guessed if q in ("angular_rate", "specific_force")}
+            if stream.form in _TABLES and not guessed and not spoilt:
                 names = ", ".join(stream.table.names[:_SHOWN])
                 more = ", ..." if len(stream.table.names) > _SHOWN else ""
                 told.append(
                     f"{stream.name}: what its columns are ({names}{more}) is not known by their names and sizes; if "
                     "they are of an instrument, add it to the scenario"
                 )
+        if len(inertial) == 1:
+            ((quantity, name),) = inertial.items()
+            other = "specific force" if quantity == "angular_rate" else "angular rate"
+            told.append(
+                f"{name}: {quantity.replace('_', ' ')}, but no stream has three axes of {other}: a draft has no IMU"
+            )
         return tuple(told)
 
 

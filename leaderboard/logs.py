@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -139,8 +140,7 @@ def inspect_log(request: InspectRequest) -> Inspection:
         if not streams or (target is None and not request.run):
             return found
         named = target.stem if target is not None else absolute(given[0]).stem
-        words = "".join(c if c.isascii() and c.isalnum() else " " for c in named.lower()).split()
-        name = "-".join(words) or "my-log"
+        name = _scenario_name(named)
         made = drafted(streams, name, f"{name}.toml" if target is None else target.name)
         if target is not None:
             write_whole(target, made.text)
@@ -290,3 +290,15 @@ def _recorded(given: str | Path | Scenario) -> Scenario:
     if scenario.log is None:
         raise RequestError(f"{scenario.id} has no [log]: it is simulated, and there is nothing to compare")
     return scenario
+
+
+def _scenario_name(file: str) -> str:
+    """A name in kebab-case and without a version, from that of a file.
+
+    >>> _scenario_name("Trip 2024"), _scenario_name("2024-05-01"), _scenario_name("Trip_v2"), _scenario_name("_")
+    ('trip-2024', 'log-2024-05-01', 'trip-v2-log', 'my-log')
+    """
+    words = "".join(c if c.isascii() and c.isalnum() else " " for c in file.lower()).split()
+    name = "-".join(words) or "my-log"
+    name = name if name[0].isalpha() else f"log-{name}"
+    return f"{name}-log" if re.search(r"-v\d+$", name) else name

@@ -37,7 +37,7 @@ def show(out: Output, request: AlignCommand) -> None:
               "A delay d is taken out by offset_s = -d of the channel; a lever arm adds to lever_arm_m of the "
               "instrument.",
               "A mounting is relative to the axes of [log.imu]; in degrees it is mounting_deg, if there was none.",
-              "Residuals are correlated, so that the sigmas are rather too small.")  # fmt: skip
+              "The sigmas allow for residuals that change slowly.")  # fmt: skip
     if request.plot is not None and curves:
         title = f"{scenario.id}: rms of what is left, over its smallest value"
         out.print(f"figure: {save_as(delay_panels(curves, title), absolute(request.plot))}")

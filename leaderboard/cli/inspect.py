@@ -10,7 +10,7 @@ from simnav.leaderboard.log_inspection import innovation_table
 from simnav.leaderboard.logs import inspect_log
 from simnav.leaderboard.ranking import tables
 from simnav.log.check import described
-from simnav.log.draft import guesses
+from simnav.log.column_guesses import guesses
 from simnav.log.draft_readings import SURE
 from simnav.log.inspection import track_of
 
@@ -43,9 +43,8 @@ def show(out: Output, request: InspectCommand) -> None:
     out.print(tables.table("what the files hold", ["stream", "format", "times", "columns, guessed"], rows))
     for sentence in looked.failed:
         out.remark(sentence)
-    if looked.draft:
-        for sentence in looked.unknown:
-            out.remark(sentence)
+    for sentence in looked.unknown:
+        out.remark(sentence)
     for reading in looked.readings:
         so = "read so" if reading.probability >= SURE else "perhaps, and only a comment of the scenario"
         out.remark(f"{so}, against its names and sizes: {reading.what} (probability {reading.shown})")

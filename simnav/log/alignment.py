@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from simnav.geometry.earth import relative_position
 from simnav.geometry.rotation import dcm_from_rpy, wrap_angle
@@ -20,6 +21,7 @@ from simnav.kinds import BODY_VELOCITY, DEPTH, HEADING, HORIZONTAL_POSITION, POS
 from simnav.log.channel import Series, list_recordings, read_channel
 from simnav.log.imu_alignment import imu_alignment
 from simnav.log.imu_series import ImuSeries, read_imu
+from simnav.log.likelihood import effective_samples
 from simnav.log.readings import ProbableReading, probable_readings
 from simnav.log.source import LogSource
 from simnav.types import KINDS, Array, NavigationStates
@@ -169,6 +171,9 @@ def _aligned(recording: str, name: str, kind: str, series: Series, source: LogSo
         return _with(blank, remark=f"there is no comparison for instruments of kind {kind!r}")
     every = max(1, len(series.time) // _MOST)
     time, value = series.time[::every], series.value[::every]
+    inside = _always_known(source, time)
+    if np.sum(inside) >= _LEAST:  # the same readings at all delays: otherwise their number would decide
+        time, value = time[inside], value[inside]
     attempts: dict[float, tuple[float, Array, Array, tuple[str, ...], Array]] = {}
 
     def cost(delay: float) -> float:
@@ -182,24 +187,25 @@ def _aligned(recording: str, name: str, kind: str, series: Series, source: LogSo
         return _with(blank, remark=f"fewer than {_LEAST} readings are where the reference is known")
     fine = np.arange(best - _COARSE, best + _COARSE + 0.5 * _FINE, _FINE)
     delay = float(min(fine, key=cost))
-    readings = attempts[delay][4].size
-    if readings * (cost(0.0) / cost(delay) - 1.0) < _SIGNIFICANT:  # no worse than without a delay
+    if (
+        _independent(attempts[delay][4]) * (cost(0.0) / cost(delay) - 1.0) < _SIGNIFICANT
+    ):  # no worse than without a delay
         delay = 0.0
     _, solution, covariance, parameters, residual = attempts[delay]
-    count = residual.size
+    count = _independent(residual)
     scatter = {
         n: float(_NORMAL * np.median(np.abs(r - np.median(r))))
         for n, r in zip(definition.errors, residual.T, strict=False)
     }
     curvature = (cost(delay + _COARSE) + cost(delay - _COARSE) - 2.0 * cost(delay)) / _COARSE**2
     sharp = curvature > 0.0 and np.isfinite(curvature)
-    sigma = float(np.sqrt(2.0 * cost(delay) / (max(count - len(solution), 1) * curvature))) if sharp else np.nan
+    sigma = float(np.sqrt(2.0 * cost(delay) / (max(count - len(solution), 1.0) * curvature))) if sharp else np.nan
     remark = ""
     if not sharp or sigma > 1.0 or abs(delay) >= _WIDEST - _FINE:
         if delay != 0.0 and np.isfinite(cost(0.0)):
             _, solution, covariance, parameters, residual = attempts[0.0]
         delay, sigma, remark = np.nan, np.nan, "the motion is too steady to tell a delay"
-    spread = np.sqrt(np.diag(covariance))
+    spread = np.sqrt(np.diag(covariance) * residual.size / _independent(residual))
     told = {n: (float(s), float(e)) for n, s, e in zip(parameters, solution, spread, strict=True)}
     if any(n.startswith("lever_arm") and e > _KNOWN for n, (_, e) in told.items()):
         told = {n: v for n, v in told.items() if not n.startswith("lever_arm")}
@@ -216,6 +222,17 @@ def _aligned(recording: str, name: str, kind: str, series: Series, source: LogSo
         remark,
         relative_costs({d: a[0] for d, a in attempts.items()}),
     )
+
+
+def _always_known(source: LogSource, time: Array) -> NDArray[np.bool_]:
+    """(n,) at which times the reference is known also before the longest delay that is tried, and after it."""
+    ends = [source.reference_states(time + shift).position for shift in (-_WIDEST, _WIDEST)]
+    return np.asarray(np.isfinite(ends).all(axis=(0, 2)), dtype=np.bool_)
+
+
+def _independent(residual: Array) -> float:
+    """Number of independent values among (n, d) residuals: those that change slowly say less than white ones."""
+    return float(sum(map(effective_samples, residual.T)))
 
 
 def relative_costs(costs: Mapping[float, float]) -> tuple[tuple[float, float], ...]:
@@ -240,7 +257,8 @@ def _fit(
     p = derivative.shape[2]
     if len(difference) < _LEAST:
         return np.inf, np.zeros(p), np.full((p, p), np.inf), names, difference
-    a, b = derivative.reshape(-1, p), difference.reshape(-1)
+    b = difference.reshape(-1)
+    a = derivative.reshape(len(b), p)
     weight: Array = np.ones(len(b))
     solution: Array = np.zeros(p)
     for _ in range(4):  # Huber's weights, with the scale of the residuals
@@ -278,7 +296,11 @@ def _models(lever_arm: Array) -> dict[str, _Model]:
 
     def velocity(states: NavigationStates, time: Array, value: Array) -> tuple[Array, Array, tuple[str, ...]]:
         difference = value[:, :2] - states.velocity[:, :2]
-        return difference, np.zeros((len(time), 2, 0)), ()
+        if not np.isfinite(states.attitude).all(axis=1).any():
+            return difference, np.zeros((len(time), 2, 0)), ()
+        dcm, rate = dcm_from_rpy(states.attitude), _rate(states)  # of the antenna
+        turning = np.asarray(dcm @ _skews(rate))[:, :2]
+        return difference - turning @ lever_arm, turning, arms
 
     def heading(states: NavigationStates, time: Array, value: Array) -> tuple[Array, Array, tuple[str, ...]]:
         difference = wrap_angle(value - states.attitude[:, 2:])

@@ -27,7 +27,7 @@ from simnav.types import KINDS, Array
 __all__ = ["COURSE_FROM", "GAP", "MOST", "Streams", "comparisons"]
 
 #: Times at which streams are compared at most; interval of the IMU [s].
-MOST, _INTERVAL = 600, 1.0
+MOST, _INTERVAL = 593, 1.0  # a prime number: in hours of a log they do not keep step with fixes that are held out
 #: Holes of the reference that are bridged, in its usual spacings.
 GAP = 3.0
 #: A course has a meaning from this speed on [m/s]; over so many seconds it is taken.
@@ -161,7 +161,7 @@ class Streams:
         """Times of the comparisons [s]."""
         first = max(float(self.position.time[0]), self.begin)
         last = float(self.position.time[-1])
-        step = _INTERVAL * max(1.0, float(np.ceil((last - first) / (_INTERVAL * MOST))))
+        step = max(_INTERVAL, (last - first) / MOST)
         return np.asarray(first + step * np.arange(max(0, int((last - first) / step))), dtype=np.float64)
 
     def places(self, time: Array) -> Array:
@@ -456,8 +456,9 @@ def _velocity_and_positions(s: Streams) -> Residual | None:
 
 def _picked(series: Series, begin: float) -> tuple[Array, Array]:
     inside = np.flatnonzero(series.time >= begin)
-    pick = inside[:: max(1, -(-len(inside) // MOST))]
-    return series.time[pick], series.value[pick]
+    if len(inside) > MOST:
+        inside = inside[np.linspace(0, len(inside) - 1, MOST).round().astype(np.intp)]
+    return series.time[inside], series.value[inside]
 
 
 def _rotated(s: Streams, time: Array) -> tuple[Array, Array] | None:
@@ -533,8 +534,8 @@ def _water_speed(s: Streams, name: str) -> Residual | None:
     if pose is None:
         return None
     ahead = velocity[:, 0] * np.cos(pose[:, 2]) + velocity[:, 1] * np.sin(pose[:, 2])
-    return _residual(value - ahead[:, None], 2.0 * _SPEED, (_constant(len(time), 1), 0.7),
-                     (_scaled(value), 0.1))  # fmt: skip
+    return _residual(value - ahead[:, None], 1.5 * _SPEED, (_constant(len(time), 1), 0.7),
+                     (_scaled(value), 0.05))  # fmt: skip
 
 
 def _depth(s: Streams, name: str) -> Residual | None:

@@ -14,12 +14,13 @@ import json
 import warnings
 from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from simnav.geometry.rotation import dcm_from_rpy, wrap_angle
-from simnav.kinds import BODY_VELOCITY, HEADING, VELOCITY
+from simnav.kinds import BODY_VELOCITY, DEPTH, HEADING, VELOCITY
 from simnav.log.attitude_readings import of_attitude
 from simnav.log.channel import Series, read_channel, skip_of
 from simnav.log.comparisons import COURSE_FROM, Streams, comparisons
@@ -27,6 +28,7 @@ from simnav.log.hypotheses import FLIPS, Reading, flip, shown, with_series, writ
 from simnav.log.imu_series import read_imu
 from simnav.log.inertial import Inertial
 from simnav.log.likelihood import Fit, Residual, fit, log_ratios
+from simnav.log.position_readings import ABOVE, of_positions
 from simnav.log.units import DIMENSIONS, factor
 from simnav.spec import SpecError
 from simnav.types import KINDS, Array
@@ -45,8 +47,8 @@ _FAR, _PART, _TELLING = 12.0, 0.5, 3.0
 _FLOOR = 0.1
 #: What speaks so much against a reading is not made good by other comparisons, which are left out.
 _AGAINST = -40.0
-#: Delays that are tried [s]; `simnav.log.alignment` finds shorter ones.
-_DELAYS = np.arange(0.5, 5.01, 0.5)
+#: Delays that are tried [s]; `simnav.log.alignment` finds shorter ones. UTC is 18 s behind GPS, and 37 s behind TAI.
+_DELAYS = np.array([*np.arange(0.5, 5.01, 0.5), 18.0, 37.0])
 #: Readings whose log likelihoods differ by less are told apart by the number of changes.
 _SAME = 1.0
 #: So many of the likeliest readings of a stream are also tried with each delay, and those with usual axes.
@@ -125,11 +127,24 @@ class ProbableReading:
 
 @dataclass(frozen=True, eq=False)
 class _Tried:
-    """A reading, the logarithm of its likelihood over that of the present one, and of the part of squares it leaves."""
+    """A reading beside the present one.
+
+    Attributes
+    ----------
+    reading : Reading
+        The reading.
+    ratio : float
+        Logarithm of its likelihood over that of the present one.
+    left : float
+        Logarithm of the part of the squares that it leaves.
+    unit : float
+        How much less improbable the parameters are with its unit; 0 for a reading in the same unit.
+    """
 
     reading: Reading
     ratio: float
     left: float
+    unit: float
 
 
 def probable_readings(scenario: Scenario, recording: str) -> list[ProbableReading]:
@@ -242,7 +257,7 @@ def _tried(
     other = reading.alter(streams)
     square = reading.times**2
     noise = _noise(other.series(reading.stream).value) / square if square > 1.0 else 0.0
-    ratio, left = 0.0, 0.0
+    ratio, left, relief = 0.0, 0.0, 0.0
     for parts in involved:
         residual = compared[parts](other) if ratio > _AGAINST else None
         if residual is None:
@@ -252,10 +267,11 @@ def _tried(
         mean_square = fitted.mean_square / square if square < 1.0 else fitted.mean_square - own * (square - 1.0)
         fitted = replace(fitted, mean_square=mean_square)
         each = log_ratios(fitted, present[parts])
+        relief += present[parts].penalty - fitted.penalty
         ratio += float(each.sum()) - fitted.penalty + present[parts].penalty
         before, after = (f.mean_square + _FLOOR * f.size**2 for f in (present[parts], fitted))
         left += float(np.sum(np.log(after / before)[np.abs(each) > _TELLING]))
-    return _Tried(reading, ratio, left)
+    return _Tried(reading, ratio, left, relief if reading.times != 1.0 else 0.0)
 
 
 def _noise(value: Array) -> float:
@@ -267,7 +283,7 @@ def _noise(value: Array) -> float:
 
 def _told(stream: str, tried: list[_Tried]) -> tuple[Reading, ProbableReading] | None:
     """The likeliest reading of one stream, with its probability, if it is far more likely than the present one."""
-    smaller = [t for t in tried if t.left < np.log(_PART)]
+    smaller = [t for t in tried if t.left < np.log(_PART) or t.unit > _FAR]  # a current of 7 m/s is a wrong unit
     if not smaller or (top := max(t.ratio for t in smaller)) < _FAR:
         return None
     alike = [t for t in smaller if t.ratio > top - _SAME]
@@ -300,10 +316,11 @@ def _readings(log: RecordedSpec, s: Streams) -> Iterator[Reading]:
             yield from _of_heading(name, table, where, series)
             yield from _as_course(name, series, s)
         elif where.columns and len(components) == 1:
-            yield from _of_scalar(name, table, where, series)
-        if equation == HEADING or equation in (BODY_VELOCITY, VELOCITY) or not axes:
+            yield from _of_scalar(name, table, where, series, equation == DEPTH)
+        of_reference = KINDS[kind].geodetic and where.file == log.reference.position.file  # its clock is the same
+        if not of_reference and (equation == HEADING or equation in (BODY_VELOCITY, VELOCITY) or not axes):
             yield from _late(name, table, where.offset, series)
-    yield from _of_positions(log, s)
+    yield from of_positions(log, s)
     if s.velocity is not None and log.reference.velocity is not None and log.reference.velocity.columns:
         yield from _of_vector("reference.velocity", "log.reference.velocity", log.reference.velocity, s.velocity, False)
     if s.attitude is not None and log.reference.attitude is not None and log.reference.attitude.columns:
@@ -397,13 +414,21 @@ def _reference_late(log: RecordedSpec, s: Streams) -> Iterator[Reading]:
     parts = [n for n in ("position", "velocity", "attitude") if getattr(log.reference, n) is not None]
     if s.imu is None and not s.instruments:
         return
+    files = {getattr(log.reference, n).file for n in parts}
+    same = [n for n in s.instruments if log.instruments[n].file in files]  # of one clock with it
+
+    def alter(t: Streams, by: float) -> Streams:
+        for n in same:
+            t = with_series(n, time=t.series(n).time - by)(t)
+        return t.altered(late=by)
+
+    channels = {f"log.reference.{n}": getattr(log.reference, n) for n in parts}
+    channels |= {f"log.instruments.{n}": log.instruments[n] for n in same}
+    told = " and ".join(["the reference", *map(repr, same)])
     for by in _both_ways():
-        changes = tuple(
-            (f"log.reference.{n}", "offset_s", _rounded(getattr(log.reference, n).offset - by)) for n in parts
-        )
-        yield Reading("reference", tuple(f"reference.{n}" for n in parts),
-                       lambda t, by=by: t.altered(late=by), 1.5, f"the reference is {_late_by(by)}",  # type: ignore[misc]
-                       changes, by)  # fmt: skip
+        changes = tuple((table, "offset_s", _rounded(channel.offset - by)) for table, channel in channels.items())
+        yield Reading("reference", (*(f"reference.{n}" for n in parts), *same), partial(alter, by=by), 1.5,
+                       f"{told} {'are' if same else 'is'} {_late_by(by)}", changes, by)  # fmt: skip
 
 
 def _units_of(channel: ChannelSpec | LogInstrumentSpec, count: int) -> tuple[str, ...]:
@@ -492,8 +517,8 @@ def _as_course(name: str, series: Series, s: Streams) -> Iterator[Reading]:
     yield Reading(name, (name,), with_series(name, value=value), 1.0, what, (), apart="reference.position")
 
 
-def _of_scalar(name: str, table: str, where: LogInstrumentSpec, series: Series) -> Iterator[Reading]:
-    """Sign and unit of a speed or a depth."""
+def _of_scalar(name: str, table: str, where: LogInstrumentSpec, series: Series, depth: bool) -> Iterator[Reading]:
+    """Sign and unit of a speed or a depth; a depth is not above the sea."""
     present = _units_of(where, 1)[0]
     units = next((g for g in (("m_s", "kn", "km_h", "cm_s", "mm_s"), ("m", "ft", "cm", "km")) if present in g), ())
     for sign in FLIPS:
@@ -504,76 +529,9 @@ def _of_scalar(name: str, table: str, where: LogInstrumentSpec, series: Series) 
             changes += [(table, "units", unit)] if unit != present else []
             times = factor(unit) / factor(present)
             value = sign * times * series.value
+            if depth and sign < 0.0 and float(np.nanmedian(value)) < -ABOVE:
+                continue
             text = f"{name!r} is {'minus ' if sign < 0.0 else ''}{where.columns[0]}"
             text += f" in {unit}" if unit != present else ""
             yield Reading(name, (name,), with_series(name, value=value),
                            float(len(changes)), text, tuple(changes), times=times)  # fmt: skip
-
-
-def _of_positions(log: RecordedSpec, s: Streams) -> Iterator[Reading]:
-    """Latitude and longitude exchanged or with another sign: of the reference, of each fix, and of all of one file."""
-    fixes = [n for n, (kind, _, _) in s.instruments.items() if KINDS[kind].geodetic and log.instruments[n].columns]
-    channels: dict[str, Any] = {n: log.instruments[n] for n in fixes}
-    if log.reference.position.columns:
-        channels["reference.position"] = log.reference.position
-    groups: list[tuple[str, ...]] = [(n,) for n in channels]
-    if len(channels) > 1:
-        groups.append(tuple(channels))
-
-    def swapped(value: Array, swap: bool, north: float, east: float, local: Any) -> Array:
-        new = value.copy()
-        if local is None:
-            new[:, :2] = value[:, 1::-1] if swap else value[:, :2]
-            new[:, :2] *= north, east
-            return new
-        # Of a local frame the axes are exchanged about its origin.
-        away = value[:, :2] - (local.latitude, local.longitude)
-        across = np.cos(local.latitude)
-        metres = away * (1.0, across)
-        metres = (metres[:, ::-1] if swap else metres) * (north, east)
-        new[:, :2] = metres / (1.0, across) + (local.latitude, local.longitude)
-        return new
-
-    for group in groups:
-        for swap, north, east in itertools.product((False, True), FLIPS, FLIPS):
-            if not swap and north > 0.0 and east > 0.0:
-                continue
-            ways: dict[str, Array] = {}
-            changes: list[tuple[str, str, Any]] = []
-            for name in group:
-                channel = channels[name]
-                local = None if channel.frame == "geodetic" else log.origin
-                series = s.position if name == "reference.position" else s.instruments[name][1]
-                ways[name] = swapped(series.value, swap, north, east, local)
-                a, b = (1, 0) if channel.frame == "enu" else (0, 1)
-                first, second = channel.columns[a], channel.columns[b]
-                columns = list(channel.columns)
-                columns[a], columns[b] = (second, first) if swap else (first, second)
-                columns[a] = columns[a] if north > 0.0 else flip(columns[a])
-                columns[b] = columns[b] if east > 0.0 else flip(columns[b])
-                table = f"log.{name}" if name == "reference.position" else f"log.instruments.{name}"
-                if channel.frame == "ned" and swap and north > 0.0 and east > 0.0:
-                    ways[name][:, 2:] *= -1.0  # about the sea, near enough
-                    changes.append((table, "frame", "enu"))
-                else:
-                    changes.append((table, "columns", columns))
-            if any(np.abs(v[:, 0]).max() > 0.5 * np.pi for v in ways.values()):
-                continue
-            what = " and ".join(filter(None, [
-                "latitude and longitude (north and east) are exchanged" if swap else "",
-                "north has the other sign" if north < 0.0 else "",
-                "east has the other sign" if east < 0.0 else ""]))  # fmt: skip
-            yield Reading(
-                group[0] if len(group) == 1 else "positions", group, _positions_as(ways),
-                0.9 * swap + (north < 0.0) + (east < 0.0) + 0.4 * (len(group) > 1), f"{' and '.join(group)}: {what}",
-                tuple(changes),
-            )  # fmt: skip
-
-
-def _positions_as(ways: Mapping[str, Array]) -> Callable[[Streams], Streams]:
-    def alter(t: Streams) -> Streams:
-        for name, value in ways.items():
-            t = with_series(name, value=value)(t)
-        return t
-
-    return alter

@@ -8,8 +8,9 @@ import pytest
 from simnav.leaderboard.logs import export
 from simnav.log import LogError, LogSource
 from simnav.log.check import check_log, described
+from simnav.log.column_guesses import guesses
 from simnav.log.delimited import read_csv
-from simnav.log.draft import draft, guesses
+from simnav.log.draft import draft
 from simnav.log.inspection import inspect_log, streams_of
 from simnav.scenario import load
 from tests.cases.log_files import CASES

@@ -15,6 +15,7 @@ import pytest
 from simnav.leaderboard.log_inspection import drafted
 from simnav.leaderboard.logs import align, inspect_log
 from simnav.leaderboard.results.formats import write
+from simnav.log.alignment import align as align_log
 from simnav.log.check import check_log
 from simnav.log.inspection import inspect_log as inspect_files
 from simnav.log.likelihood import Residual, effective_samples, fit, log_ratios
@@ -141,34 +142,89 @@ IN_FILES = {
     "dvl forward, left, up, and late": ("dvl", {"starboard_m_s": -1.0, "down_m_s": -1.0}, 2.0,
                                         'columns = ["forward_m_s", "-starboard_m_s", "-down_m_s"] of '
                                         "[log.instruments.dvl]; offset_s = -2.0 of [log.instruments.dvl]"),
+    "gnss with the leap seconds": ("gnss", {}, 18.0, "offset_s = -18.0 of [log.instruments.gnss]"),
     "gyroscope z in one turn": ("imu", {"angular_rate_z_deg_s": -1.0}, 0.0,
                                 '"angular_rate_y_deg_s", "-angular_rate_z_deg_s"] of [log.imu]'),
 }  # fmt: skip
 
 
-@pytest.fixture(scope="module")
-def exported(tmp_path_factory):
-    folder, voyage = tmp_path_factory.mktemp("exported"), load("open-sea")
-    write("recording", "csv", record(voyage.model_copy(update={"duration": 400.0}), 1), folder / "run")
-    return folder / "run", drafted(inspect_files([folder / "run"])[0], "exported", "exported.toml").text
+def export(folder: Path, scenario: str, duration: float, seed: int) -> Path:
+    """The files of the beginning of a simulated voyage."""
+    voyage = load(scenario).model_copy(update={"duration": duration})
+    write("recording", "csv", record(voyage, seed), folder)
+    return folder
 
 
-@pytest.mark.parametrize("wrong", IN_FILES if ALL else ["dvl in knots"])
-def test_files_with_another_unit_other_axes_and_one_turn(exported, wrong, tmp_path):
-    folder, draft = exported
-    shutil.copytree(folder, tmp_path / "run")
-    name, factors, late, right = IN_FILES[wrong]
-    with (folder / f"{name}.csv").open() as given, (tmp_path / "run" / f"{name}.csv").open("w") as file:
+def changed_file(file: Path, target: Path, factors: dict[str, float], late: float = 0.0) -> None:
+    """Write a table with some columns multiplied, and its times later."""
+    with file.open() as given, target.open("w") as written:
         rows = csv.DictReader(given)
         assert rows.fieldnames is not None
-        changed = csv.DictWriter(file, rows.fieldnames)
+        changed = csv.DictWriter(written, rows.fieldnames)
         changed.writeheader()
         for row in rows:
             values = {key: float(row[key]) * factor for key, factor in factors.items()}
             changed.writerow(row | values | {"time_s": float(row["time_s"]) + late})
+
+
+@pytest.fixture(scope="module")
+def exported(tmp_path_factory):
+    folder = export(tmp_path_factory.mktemp("exported") / "run", "open-sea", 400.0, 1)
+    return folder, drafted(inspect_files([folder])[0], "exported", "exported.toml").text
+
+
+@pytest.fixture
+def ship(tmp_path):
+    """A quarter of an hour of a ship with a speed log, 4 m of noise of its fixes, and a nearly straight course."""
+    return export(tmp_path / "run", "ship-field", 900.0, 4004)
+
+
+@pytest.mark.parametrize("wrong", IN_FILES if ALL else ["dvl in knots", "gnss with the leap seconds"])
+def test_files_with_another_unit_other_axes_and_one_turn(exported, wrong, tmp_path):
+    folder, draft = exported
+    shutil.copytree(folder, tmp_path / "run")
+    name, factors, late, right = IN_FILES[wrong]
+    changed_file(folder / f"{name}.csv", tmp_path / "run" / f"{name}.csv", factors, late)
     (found,) = probable_readings(parse(draft.replace(str(folder), str(tmp_path / "run"))), "")
     assert right in found.sentence()
     assert found.probability > 0.9
+
+
+def test_fixes_that_are_held_out_are_not_late_beside_those_of_the_same_receiver(ship):
+    """A reference between two fixes has less noise than at a fix; that is no delay."""
+    (ship / "truth.csv").unlink()
+    assert drafted(inspect_files([ship])[0], "ship", "ship.toml").readings == ()
+
+
+def test_a_speed_log_in_knots_is_no_current_of_seven_metres_a_second(ship):
+    changed_file(ship / "speed_log.csv", ship / "other.csv", {"speed_m_s": 1.0 / 0.514444})
+    text = (ship / "other.csv").read_text().replace("speed_m_s", "speed", 1)
+    (ship / "speed_log.csv").write_text(text)
+    (ship / "other.csv").unlink()
+    (found,) = drafted(inspect_files([ship])[0], "ship", "ship.toml").readings
+    assert found.changes == (("log.instruments.speed_log", "units", '"kn"'),)
+
+
+def test_on_a_straight_course_a_delay_is_not_told_from_a_lever_arm(ship):
+    found = {a.instrument: a for a in align_log(parse(drafted(inspect_files([ship])[0], "ship", "ship.toml").text))}
+    assert found["gnss"].remark == "the motion is too steady to tell a delay"
+    assert abs(found["gnss"].parameters["lever_arm_x"][0]) < 1.0
+
+
+def test_the_velocity_of_a_receiver_is_aligned_with_its_lever_arm(exported):
+    found = {a.instrument: a for a in align_log(parse(exported[1]))}["gnss_velocity"]
+    assert found.delay == pytest.approx(0.0, abs=0.05)
+    for axis, arm in zip("xyz", (-4.0, 0.5, -12.0), strict=True):
+        assert found.parameters[f"lever_arm_{axis}"][0] == pytest.approx(arm, abs=4.0)
+
+
+def test_a_height_that_is_counted_downwards_is_not_the_fault_of_the_depth(tmp_path):
+    folder = export(tmp_path / "run", "auv-survey", 200.0, 4001)
+    changed_file(folder / "truth.csv", folder / "other.csv", {"height_m": -1.0})
+    (folder / "other.csv").replace(folder / "truth.csv")
+    (found,) = drafted(inspect_files([folder])[0], "auv", "auv.toml").readings
+    assert found.changes[0][:2] == ("log.reference.position", "columns")
+    assert "-height_m" in found.changes[0][2]
 
 
 def test_a_course_is_no_heading(log):

@@ -5,13 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from simnav.leaderboard.log_inspection import drafted
+from simnav.leaderboard.log_inspection import Inspection, drafted
 from simnav.leaderboard.results.files import write_whole
 from simnav.log import LogError, LogWarning
 from simnav.log.channel import check_cells, no_fix, read_channel
 from simnav.log.check import check_log
+from simnav.log.column_guesses import guesses
 from simnav.log.delimited import lines_above, read_csv
-from simnav.log.draft import draft, guesses
+from simnav.log.draft import draft
 from simnav.log.draft_readings import rewritten
 from simnav.log.files import FileSpec
 from simnav.log.imu_series import read_imu
@@ -36,6 +37,44 @@ def with_times(path, unit: float, name: str) -> None:
     scale = 1e-3 if path.stem.startswith("imu") else 1.0
     new = [f"{round((float(t) - first) * scale / unit)},{rest}" for t, rest in cells]
     path.write_text("\n".join([f"{name},{header.split(',', 1)[1]}", *new]) + "\n")
+
+
+@pytest.mark.parametrize(
+    ("file", "column", "says"),
+    [
+        ("gnss", "latitude_deg", "line 4, column 'latitude_deg': 'bad' is not a number; a draft has no position"),
+        (
+            "imu",
+            "angular_rate_y",
+            "line 4, column 'angular_rate_y': 'bad' is not a number; a draft has no angular rate",
+        ),
+    ],
+)
+def test_a_cell_that_is_no_number_is_said_and_no_other_column_is_taken(tmp_path, file, column, says):
+    tables = {
+        "gnss": ("time_s,latitude_deg,longitude_deg,height_m", "50.0,-5.0,10.0"),
+        "imu": (
+            "time_s," + ",".join(f"{q}_{a}" for q in ("angular_rate", "specific_force") for a in "xyz"),
+            "0,0,0,0,0,-9.8",
+        ),
+    }
+    for name, (header, row) in tables.items():
+        rows = [f"{k},{row}".split(",") for k in range(20)]
+        if name == file:
+            rows[2][header.split(",").index(column)] = "bad"
+        write_whole(tmp_path / f"{name}.csv", "\n".join([header, *map(",".join, rows)]) + "\n")
+    found = Inspection(*map(tuple, inspect_log([tmp_path])))
+    assert any(says in sentence for sentence in found.unknown)
+    guessed = {g.quantity for s in found.streams for g in guesses(s)}
+    assert guessed == ({"angular_rate", "specific_force"} if file == "gnss" else {"position", "specific_force"})
+    assert any("a draft has no IMU" in sentence for sentence in found.unknown) == (file == "imu")
+
+
+def test_longitude_and_height_alone_are_no_position(tmp_path):
+    rows = "\n".join(f"{k},-5.0,10.0" for k in range(20))
+    write_whole(tmp_path / "gnss.csv", f"time_s,longitude_deg,height_m\n{rows}\n")
+    (stream,) = inspect_log([tmp_path])[0]
+    assert not list(guesses(stream))
 
 
 @pytest.mark.parametrize("name", ["time", "time_s"])
