@@ -105,7 +105,7 @@ def check(estimator: EstimatorLike, **parameters: Any) -> Report:
     Returns
     -------
     simnav.testing.contract_check.Report
-        It calls the estimator as all tables do: one of a file has the name of the file.
+        It calls the estimator as all tables do (`EstimatorRequest.label`).
 
     Raises
     ------

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 from simnav.estimator import Estimator, describe, find, make, names, register
+from simnav.estimator.files import shown_name
 from simnav.estimator.late_arrivals import LATE
 from simnav.estimator.looking_back import LAGS
 from simnav.estimator.lookup import LOOSE, former_names_of
@@ -46,7 +47,7 @@ class EstimatorRequest:
     parameters : mapping
         Keyword arguments of its constructor. Former names of a row of simnav or of a class become present ones.
     label : str
-        Name in tables. Default: name and parameters.
+        Name in tables. Default: `simnav.estimator.files.shown_name`, and parameters.
     cls : type or None
         The class itself, where it was given as such: workers are sent it, for they may not find it by its name.
     point : str
@@ -70,7 +71,7 @@ class EstimatorRequest:
             object.__setattr__(self, "parameters", parameters)
         if not self.label:
             settings = ",".join(f"{k}={v}" for k, v in self.parameters.items())
-            plain = re.sub(r"\.py(?=$|:\w+$)", "", os.path.basename(self.name))
+            plain = shown_name(self.name)
             object.__setattr__(self, "label", f"{plain}({settings})" if settings else plain)
 
     def _formerly(self) -> Mapping[str, str]:
@@ -190,7 +191,8 @@ def together(found: Iterable[EstimatorRequest]) -> list[EstimatorRequest]:
         other = by_label.setdefault(r.label, r)
         if (_source(other), other.point) != (_source(r), r.point):
             raise RequestError(
-                f"{other.name} and {r.name}: the rows of both would be called {r.label!r}; give one file another name"
+                f"{other.name} and {r.name}: the rows of both would be called {r.label!r}; give one of them another "
+                "name"
             )
     for label, alike in lookalikes(by_label).items():
         raise RequestError(f"estimator {label!r} can be taken for {alike!r} in a table; give it another name")
@@ -198,15 +200,16 @@ def together(found: Iterable[EstimatorRequest]) -> list[EstimatorRequest]:
 
 
 def _source(found: EstimatorRequest) -> str:
-    """The name, or the file with its whole path."""
-    return os.path.realpath(found.name) if file_of(found.name) else found.name
+    """The name, or the file with its whole path; its label says which class is meant."""
+    file = file_of(found.name)
+    return os.path.realpath(file) if file else found.name
 
 
 def _has_a_name_of_its_own(found: EstimatorRequest) -> None:
     """RequestError where a file is called as a row that comes with simnav: tables would show it as that row."""
-    stem = re.fullmatch(r"(.*)\.py", os.path.basename(found.name))
-    if stem and stem[1] in names() and comes_with_simnav(find(stem[1])):
-        raise RequestError(f"{found.name}: {stem[1]!r} is a row that comes with simnav; give the file another name")
+    base = found.label.partition("(")[0]
+    if file_of(found.name) and base in names() and comes_with_simnav(find(base)):
+        raise RequestError(f"{found.name}: {base!r} is a row that comes with simnav; give it another name")
 
 
 def _no_estimator(given: object) -> RequestError:

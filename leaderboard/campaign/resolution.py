@@ -79,7 +79,8 @@ def resolve(request: EstimatorRequest, confinement: str, hidden: Sequence[Path])
             found, why = None, str(error)
     if found is None:
         reason = re.sub(r"^(Estimator|Request)Error: ", "", why)
-        raise RequestError(reason if request.name in reason else f"estimator {request.name!r}: {reason}")
+        told = any(name in reason for name in (request.name, repr(request.label.partition("(")[0])))
+        raise RequestError(reason if told else f"estimator {request.name!r}: {reason}")
     if found["reference"]:
         raise RequestError(
             f"estimator {request.name!r} declares itself a reference; in a campaign only simnav's own references are "

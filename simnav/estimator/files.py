@@ -3,14 +3,36 @@
 from __future__ import annotations
 
 import inspect
+import os
+import re
 import types
 from pathlib import Path
 
 from simnav.estimator.contract import Estimator, EstimatorError
-from simnav.estimator.registry import discover, forget, kebab, register
+from simnav.estimator.registry import discover, forget, kebab, register, registered_in
 from simnav.plugins import import_file
 
-__all__ = ["class_in_file"]
+__all__ = ["class_in_file", "shown_name"]
+
+
+def shown_name(name_or_path: str) -> str:
+    """What tables call an estimator: its name; of a file the one that it registers, as far as its text tells.
+
+    The file is not imported. Where it registers nothing, or several classes and none was asked for, it is called as the
+    file.
+
+    Examples
+    --------
+    >>> shown_name("ekf"), shown_name("filters/nobody.py"), shown_name("nobody.py:MyFilter")
+    ('ekf', 'nobody', 'nobody:MyFilter')
+    """
+    path = re.fullmatch(r"(.*)\.py(:\w+)?", name_or_path, flags=re.DOTALL)
+    if path is None:
+        return os.path.basename(name_or_path)
+    there, asked = registered_in(Path(f"{path[1]}.py")), path[2] or ""
+    if not asked and len(there) == 1:
+        return next(iter(there.values()))
+    return there.get(asked[1:], os.path.basename(path[1]) + asked)
 
 
 def class_in_file(path: Path, wanted: str | None) -> type[Estimator]:

@@ -5,6 +5,8 @@ Entry points are loaded when a name is first asked for; one that fails is named 
 
 from __future__ import annotations
 
+import ast
+import contextlib
 import re
 import sys
 import warnings
@@ -32,11 +34,14 @@ __all__ = [
     "point_of",
     "register",
     "registered",
+    "registered_in",
     "restore",
     "snapshot",
 ]
 
 GROUP = "simnav.estimators"
+
+_NAME = re.compile(r"[a-z][a-z0-9]*(-[a-z0-9]+)*")
 
 E = TypeVar("E", bound=type[Estimator])
 
@@ -65,7 +70,7 @@ def register(name: str, aliases: Sequence[str] = ()) -> Callable[[E], E]:
         message says by whom and where). Defining the same class again replaces it, as in a notebook.
     """
     for n in (name, *aliases):
-        if not re.fullmatch(r"[a-z][a-z0-9]*(-[a-z0-9]+)*", n):
+        if not _NAME.fullmatch(n):
             raise EstimatorError(f"estimator name {n!r} is not kebab-case; {kebab(n)!r} would be")
 
     def wrap(cls: E) -> E:
@@ -114,8 +119,45 @@ def registered(name: str) -> type[Estimator]:
     if known not in _classes:
         near = closest(name, [*_classes, *_aliases])
         hint = near if "did you mean" in near else "; 'simnav list estimators' shows those that are known here"
+        if file := _file_here(name):
+            hint = f"; give its file: {file}"
         raise EstimatorError(f"unknown estimator {name!r}{hint}")
     return _classes[known]
+
+
+def registered_in(file: Path) -> dict[str, str]:
+    """The names under which a file registers its classes, by class, as its text says: it is not run.
+
+    Only a name that is written out in a decorator is found. A file that cannot be read registers none.
+    """
+    found: dict[str, str] = {}
+    with contextlib.suppress(OSError, SyntaxError, ValueError, RecursionError, MemoryError), warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # whoever runs the file says what is odd in it
+        for item in ast.parse(file.read_bytes()).body:
+            if isinstance(item, ast.ClassDef) and (name := next(filter(None, map(_name_in, item.decorator_list)), "")):
+                found[item.name] = name
+    return found
+
+
+def _name_in(decorator: ast.expr) -> str:
+    """The name in ``@register("name")``; empty where it is another decorator, or the name is not written out."""
+    if isinstance(decorator, ast.Call) and ast.unparse(decorator.func).rpartition(".")[2] == register.__name__:
+        for given in (*decorator.args[:1], *(k.value for k in decorator.keywords if k.arg == "name")):
+            if isinstance(given, ast.Constant) and isinstance(given.value, str) and _NAME.fullmatch(given.value):
+                return given.value
+    return ""
+
+
+def _file_here(name: str) -> str:
+    """The file of the present folder that registers a name, or is called so, as it is asked for; empty without one."""
+    with contextlib.suppress(OSError):
+        for file in sorted(Path().glob("*.py")):
+            if file.stem == name:
+                return file.name
+            there = registered_in(file) if name.encode() in file.read_bytes() else {}
+            if cls := next((cls for cls, known in there.items() if known == name), ""):
+                return file.name if len(there) == 1 else f"{file.name}:{cls}"
+    return ""
 
 
 def aliases_of(name: str) -> tuple[str, ...]:

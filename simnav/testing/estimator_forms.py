@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 from pathlib import Path
 from typing import Any, TypeAlias
 
 from simnav.estimator import Estimator, make
+from simnav.estimator.files import shown_name
 
 __all__ = ["EstimatorLike", "Factory", "factories", "factory_of", "label_of", "listed"]
 
@@ -87,7 +87,7 @@ def label_of(estimator: EstimatorLike) -> str:
     if callable(what):
         name = getattr(what, "name", "") or getattr(what, "__name__", "") or type(what).__name__
     else:
-        name = os.path.basename(str(what)).replace(".py", "")
+        name = shown_name(str(what))
     settings = ",".join(f"{key}={value}" for key, value in parameters.items())
     return f"{name}({settings})" if settings else str(name)
 

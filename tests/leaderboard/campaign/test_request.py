@@ -51,10 +51,51 @@ def test_a_file_that_is_called_as_one_of_our_rows_is_refused(asked, tmp_path: Pa
     (tmp_path / "a").mkdir()
     for folder in (tmp_path, tmp_path / "a"):
         (folder / "ekf.py").write_text(STILL)
-    with pytest.raises(
-        RequestError, match=r"ekf\.py: 'ekf' is a row that comes with simnav; give the file another name"
-    ):
+    with pytest.raises(RequestError, match=r"ekf\.py: 'ekf' is a row that comes with simnav; give it another name"):
         requests(asked)
+
+
+def registering(*names: str) -> str:
+    """A file that registers classes A, B and so on."""
+    parts = [STILL.replace("class Still", f'@simnav.register("{n}")\nclass {c}') for n, c in zip(names, "ABC")]
+    return "\n".join(["import simnav", *parts])
+
+
+@pytest.mark.parametrize(
+    ("text", "asked", "label"),
+    [
+        (registering("my-still"), "f.py", "my-still"),
+        (registering("my-still"), "f.py:A:gain=2", "my-still(gain=2)"),
+        (registering("my-still").replace('("', '(name="'), "f.py", "my-still"),
+        (registering("first", "second"), "f.py", "f"),
+        (registering("first", "second"), "f.py:B", "second"),
+        (registering("first") + STILL, "f.py", "first"),
+        (registering("first") + STILL, "f.py:Still", "f:Still"),
+        (registering("No Kebab"), "f.py", "f"),
+        (registering("x").replace('"x"', "NAME"), "f.py", "f"),
+        (STILL, "f.py", "f"),
+        ("def", "f.py", "f"),
+        ("raise SystemExit\n" + registering("unrun"), "f.py", "unrun"),
+    ],
+)
+def test_a_file_is_shown_by_the_name_that_it_registers(
+    text: str, asked: str, label: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "f.py").write_text(text)
+    assert [r.label for r in requests(asked)] == [label]
+
+
+def test_the_name_that_a_file_registers_must_be_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.chdir(tmp_path)
+    for name in ("a", "b"):
+        (tmp_path / f"{name}.py").write_text(registering("mine"))
+    (tmp_path / "c.py").write_text(registering("ekf"))
+    with pytest.raises(RequestError, match=r"a\.py and b\.py: the rows of both would be called 'mine'"):
+        requests("a.py,b.py")
+    with pytest.raises(RequestError, match=r"c\.py: 'ekf' is a row that comes with simnav; give it another name"):
+        requests("ekf,c.py")
+    assert [r.label for r in requests("a.py,a.py:A")] == ["mine"]
 
 
 def test_two_files_of_one_name_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):

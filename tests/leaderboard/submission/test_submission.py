@@ -119,7 +119,7 @@ def test_a_bundle_holds_what_is_needed_and_no_more(made: Path, tmp_path: Path) -
     bundle = open_bundle(made, tmp_path)
     assert sorted(p.name for p in (tmp_path / "source").iterdir()) == ["gain.json", "helper.py", "my_last_fix.py"]
     (row,) = bundle.contents.estimators
-    assert (row.label, row.name) == ("my_last_fix:MyLastFix(gain=0.9)", "my_last_fix.py:MyLastFix")
+    assert (row.label, row.name) == ("my-last-fix(gain=0.9)", "my_last_fix.py:MyLastFix")
     assert row.parameters == {"gain": "0.9"}
     assert bundle.contents.runs == {"clean-voyages-v1": 2}
     results = store.load(bundle.results)
@@ -172,7 +172,7 @@ def test_a_package_travels_as_a_wheel_and_is_never_imported_here(
 
 def test_a_bundle_is_merged_like_a_folder_of_results(made: Path, tmp_path: Path) -> None:
     merged = simnav.merge([made], tmp_path / "out")
-    assert [(r.estimator, r.seed) for r in merged] == [("my_last_fix:MyLastFix(gain=0.9)", k) for k in range(2)]
+    assert [(r.estimator, r.seed) for r in merged] == [("my-last-fix(gain=0.9)", k) for k in range(2)]
     bad = changed(made, tmp_path / "bad.zip", better_source, hashes=False)
     with pytest.raises(RequestError, match="was changed"):
         simnav.merge([bad], tmp_path / "other")
@@ -270,7 +270,7 @@ def worse_and_fewer(folder: Path) -> None:
     [
         (worse_and_fewer, ("1 runs are missing, such as seed 1", "horizontal_rmse is", "relative difference 0.1)")),
         (better_source, ("the results were not made with this source",)),
-        (without_a_score, ("my_last_fix:MyLastFix(gain=0.9) on clean-voyages-v1, seed 0: the results lack r95",)),
+        (without_a_score, ("my-last-fix(gain=0.9) on clean-voyages-v1, seed 0: the results lack r95",)),
     ],
 )
 @pytest.mark.usefixtures("here")
@@ -536,7 +536,7 @@ def test_what_cannot_be_passed_on_gets_a_sentence(tmp_path: Path) -> None:
 def test_a_name_of_simnav_is_refused(made: Path, tmp_path: Path) -> None:
     def renamed(folder: Path) -> None:
         text = (folder / "bundle.json").read_text()
-        (folder / "bundle.json").write_text(text.replace("my_last_fix:MyLastFix(gain=0.9)", "oracle"))
+        (folder / "bundle.json").write_text(text.replace("my-last-fix(gain=0.9)", "oracle"))
 
     with pytest.raises(RequestError, match="oracle is a name of one of simnav's own estimators"):
         open_bundle(changed(made, tmp_path / "bad.zip", renamed, hashes=False), tmp_path / "open")

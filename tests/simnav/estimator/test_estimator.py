@@ -184,6 +184,23 @@ def test_unknown_names_suggest_the_nearest():
         find("ship-ekv")
 
 
+@pytest.mark.parametrize(
+    ("name", "file"),
+    [("alpha-beta", "alpha_beta.py"), ("alpha_beta", "alpha_beta.py"), ("first", "two.py:A"), ("odd", "odd.py")],
+)
+def test_an_unknown_name_of_a_file_that_is_here_hints_at_it(
+    name: str, file: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    """Nothing is imported for it."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "a.py").write_text('def f(:  # "alpha-beta", "first"')
+    (tmp_path / "alpha_beta.py").write_text('raise SystemExit\n@register("alpha-beta")\nclass A: ...\n')
+    (tmp_path / "two.py").write_text('@register("first")\nclass A: ...\n@register("second")\nclass B: ...\n')
+    (tmp_path / "odd.py").write_text("")
+    with pytest.raises(EstimatorError, match=rf"unknown estimator '{name}'; give its file: {file}$"):
+        find(name)
+
+
 def test_a_scenario_is_no_estimator():
     with pytest.raises(EstimatorError, match=r"'channel.toml' is a scenario and no estimator"):
         find("channel.toml")

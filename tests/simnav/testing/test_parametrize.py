@@ -192,7 +192,10 @@ def test_what_is_wrong_is_said_when_tests_are_collected(call, error: type[Except
         call()
 
 
-def test_what_may_be_given():
+def test_what_may_be_given(tmp_path):
+    (tmp_path / "f.py").write_text('@register("mine")\nclass A: ...')
+    assert list(factories(tmp_path / "f.py")) == ["mine"]
+
     def mine():
         raise AssertionError("nothing is made while tests are collected")
 
