@@ -14,7 +14,7 @@ from simnav.estimator.looking_back import LAGS, lags_of
 from simnav.leaderboard.campaign.options import RunOptions, shared
 from simnav.leaderboard.campaign.request import EstimatorLike, EstimatorRequest, Estimators, requests, together
 from simnav.leaderboard.campaign.request import request as one_request
-from simnav.leaderboard.campaign.suitability import require_suitable, with_long_windows
+from simnav.leaderboard.campaign.suitability import require_suitable, suited, with_long_windows
 from simnav.leaderboard.results.errors import RequestError, StoreError, mistakes
 from simnav.leaderboard.results.scratch import scratch
 
@@ -147,10 +147,17 @@ def run(request: RunRequest) -> RunReport:
 def evaluate(request: EvaluateRequest) -> EvaluationReport:
     """Compare estimators with the baselines.
 
+    A scenario on which none of the estimators can run is left out.
+
     Returns
     -------
     EvaluationReport
         The place of each estimator, and its differences from the baselines.
+
+    Raises
+    ------
+    RequestError
+        If one of the estimators can run on no scenario: before anything is run.
     """
     from simnav.leaderboard.ranking.ranking import rank
     from simnav.leaderboard.ranking.reports import EvaluationReport
@@ -160,7 +167,8 @@ def evaluate(request: EvaluateRequest) -> EvaluationReport:
     if not request.estimators:
         raise RequestError("no estimator was asked for; name those that should be evaluated")
     mine = requests(request.estimators, request.parameters)
-    chosen, seeds = scenarios_of(request.scenarios), seeds_of(request.seed, request.runs)
+    seeds = seeds_of(request.seed, request.runs)
+    chosen, left_out = suited(scenarios_of(request.scenarios), mine)
     everyone = together([*mine, *baselines_or(request.against, chosen)])
     with _folder(request.results) as folder:
         _run(request, chosen, everyone, seeds, folder)
@@ -176,6 +184,7 @@ def evaluate(request: EvaluateRequest) -> EvaluationReport:
         seeds,
         tuple(standing(by, r.label, s) for r in mine for s, by in by_scenario.items()),
         None if request.results is None else folder,
+        left_out,
     )
 
 
@@ -295,6 +304,7 @@ def sweep(request: SweepRequest) -> Sweep:
         raise RequestError("no estimator was asked for; name those whose error should be seen against the dial")
     chosen, mine = scenario_of(request.scenario), requests(request.estimators, request.parameters)
     checked_score(request.score, request.limit)
+    require_suitable(chosen, mine)
     turned = chosen_dials(chosen, parse_dials(request.dials))
     found, seeds = settings(chosen, turned), seeds_of(request.seed, request.runs)
     folder = absolute(request.output or Path("results") / f"sweep-{chosen.name}")

@@ -14,6 +14,7 @@ from .session_class import receive
 
 if TYPE_CHECKING:
     from simnav.estimator import Estimator
+    from simnav.estimator.needs import Needs
 
 __all__ = ["Entrant"]
 
@@ -34,6 +35,8 @@ class Entrant:
         Declared version of the estimator.
     own : str
         Digest of the user's own code alone; empty for an estimator that comes with simnav.
+    needs : tuple
+        As of `simnav.estimator.Estimator`; of an estimator of others, and empty where it does not tell them.
     kernels : tuple of str
         Modules of simnav whose kernels it may call, which are then loaded before it begins; ``simnav``: all.
     code : bytes
@@ -58,6 +61,7 @@ class Entrant:
     learned: Mapping[str, Any] = field(default_factory=dict)
     version: int = 1
     own: str = ""
+    needs: Needs = ()
     kernels: tuple[str, ...] = ("simnav",)
 
     @property

@@ -13,6 +13,7 @@ from typing import Any
 
 from simnav.estimator import EstimatorError, find
 from simnav.estimator.looking_back import inner_of
+from simnav.estimator.needs import Needs, NeedsError, checked_needs
 from simnav.estimator.registry import is_own_reference, point_of
 from simnav.leaderboard.campaign.confinement.attempt import describe, prepare
 from simnav.leaderboard.campaign.confinement.isolation import isolate
@@ -93,6 +94,7 @@ def resolve(request: EstimatorRequest, confinement: str, hidden: Sequence[Path])
     return replace(
         entrant, source=source or with_library(found["source"]), learned_from=learned_from, learned=learned,
         version=found["version"], own=found["source"], kernels=tuple(found.get("kernels", ("simnav",))),
+        needs=_needs(found["needs"]),
     )  # fmt: skip
 
 
@@ -109,8 +111,15 @@ def _describe(entrant: Entrant) -> dict[str, Any]:
     cls = type(inner_of(made))
     return {
         "reference": cls.reference, "source": own_code(cls), "learned_from": declared_ranges(made),
-        "version": cls.version,
+        "version": cls.version, "needs": made.needs,
     }  # fmt: skip
+
+
+def _needs(told: object) -> Needs:
+    """What an estimator says that it needs; none where that cannot be read: each run says so."""
+    with contextlib.suppress(NeedsError):
+        return checked_needs(told)
+    return ()
 
 
 def variant_of(entrant: Entrant, recording: str) -> str:

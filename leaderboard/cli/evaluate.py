@@ -26,6 +26,6 @@ def show(out: Output, request: EvaluateRequest) -> None:
     for label in report.estimators:
         own = [r for r in report.results if r.estimator == label]
         if own and all(r.status == "unsuitable" for r in own):
-            raise RequestError(f"{label} does not suit {', '.join(sorted(report.scenarios))}: {own[0].reason}")
+            raise RequestError(f"{label} cannot run on {', '.join(sorted(report.scenarios))}: {own[0].reason}")
         if any(r.tried and r.status != "ok" for r in own):
             out.code = FAILED

@@ -123,6 +123,8 @@ class EvaluationReport(_Report):
         One for each estimator in question and scenario.
     folder : Path or None
         Folder of the results, if they were kept.
+    left_out : sequence of str
+        Sentences on scenarios that were asked for, and on which none of the estimators in question can run.
     """
 
     estimators: tuple[str, ...]
@@ -130,6 +132,7 @@ class EvaluationReport(_Report):
     seeds: Sequence[int]
     standings: tuple[Standing, ...]
     folder: Path | None
+    left_out: Sequence[str] = ()
 
     def headline(self) -> str:
         """The verdict on each estimator and scenario."""
@@ -144,7 +147,7 @@ class EvaluationReport(_Report):
     def verdicts(self) -> list[str]:
         """A sentence on each estimator and scenario: its places, and its error beside the plain row's."""
         plain = {s: t.plain for t in self.ranking.tracks for s in t.scenarios}
-        return [stand.verdict(plain.get(stand.scenario, "")) for stand in self.standings]
+        return [*(stand.verdict(plain.get(stand.scenario, "")) for stand in self.standings), *self.left_out]
 
     def to_dict(self) -> dict[str, Any]:
         """What ``simnav evaluate --json`` prints."""
@@ -153,6 +156,7 @@ class EvaluationReport(_Report):
             "estimators": list(self.estimators),
             "scenarios": list(self.scenarios),
             "seeds": list(self.seeds),
+            "left_out": list(self.left_out),
             "ranking": self.ranking.to_dict(),
             "comparisons": as_json(self.standings),
             "results": None if self.folder is None else str(self.folder),

@@ -90,7 +90,7 @@ class Standing:
         """The places that it may have among all, in words."""
         if self.place is None or self.last is None:
             ran = any(r.estimator == self.estimator for r in self.rows)
-            return "is a reference and has no place" if ran else "does not suit it"
+            return "is a reference and has no place" if ran else "cannot run"
         if self.place == self.last:
             return f"is {self.place} of {self.of}"
         return f"may be {self.place} to {self.last} of {self.of}"

@@ -265,7 +265,7 @@ def describe(server: EstimatorServer, entrant: Entrant, limits: Limits) -> dict[
     -------
     dict
         ``reference``, ``source`` (a digest), ``version``, modules whose ``kernels`` it may call, and ``learned_from``
-        as it was told, not checked.
+        and ``needs`` as it was told, not checked.
 
     Raises
     ------
@@ -287,5 +287,5 @@ def describe(server: EstimatorServer, entrant: Entrant, limits: Limits) -> dict[
     known = isinstance(said, list) and len(said) < 100 and all(isinstance(m, str) and len(m) < 200 for m in said)
     return {
         "reference": facts.get("reference") is True, "source": source, "learned_from": facts.get("learned_from", []),
-        "version": version, "kernels": tuple(said or ()) if known else (ALL,),
+        "version": version, "kernels": tuple(said or ()) if known else (ALL,), "needs": facts.get("needs", ()),
     }  # fmt: skip

@@ -99,13 +99,15 @@ class _Session:
                 "version": cls.version, "kernels": kernel_modules(file_of(entrant.name)),
             }  # fmt: skip
             try:
-                facts["learned_from"] = declared_ranges(entrant.make())
+                made = entrant.make()
+                facts["learned_from"] = declared_ranges(made)
+                facts["needs"] = made.needs
             except Exception as error:  # of its constructor: each run will say so
                 if isinstance(error, EstimatorError) and (error.__cause__ is None or entrant.parameters):
                     raise  # what was asked for does not fit
         except BaseException as error:
             return _failure("error", named(error))
-        return answer(Up.DONE, json.dumps(facts).encode())
+        return answer(Up.DONE, json.dumps(facts, default=repr).encode())
 
     def reset(self, body: bytes) -> bytes:
         try:

@@ -394,8 +394,33 @@ def test_evaluate_of_a_broken_estimator_is_a_failure(here):
     words = ["evaluate", "mine.py", "-s", "pond.toml", "-n", "2", "--against", "gnss-only", "--workers", "1"]
     result = call(*words, "--set", "choice=raise", code=1)
     assert "broken on purpose" in result.stdout
-    assert "it needs terrain_fix" in complaint_of(call(*words, "--set", "choice=unsuitable", code=2))
     assert "it refuses a scenario" in call(*words, "--set", "choice=refuse", code=1).stdout
+
+
+def test_evaluate_leaves_out_what_does_not_suit_before_anything_runs(here, monkeypatch):
+    """What an estimator of a file needs is known without a run."""
+    (here / "blind.toml").write_text(
+        re.sub(r'name = "pond"', 'name = "blind"', POND).replace(
+            "gnss_position]\nsigma_m = [1.0, 1.0, 2.0]", "depth]\nsigma_m = 1.0"
+        )
+    )
+    words = ["evaluate", "mine.py", "--against", "gnss-only", "-n", "2", "--workers", "1"]
+    shown = call(*words, "-s", "blind.toml,pond.toml").stdout
+    left_out = "mine cannot run on blind-v1, which is left out: it needs gnss_position; there is none."
+    assert shown.strip().splitlines()[-1] == left_out
+    assert "blind-v1" not in shown.replace(left_out, "")
+
+    monkeypatch.setattr("simnav.leaderboard.campaign.campaign.run_campaign", None)
+    why = "it needs gnss_position; there is none; nothing was run"
+    assert f"mine cannot run on blind-v1: {why}" in complaint_of(call(*words, "-s", "blind.toml", code=2))
+    ours = call("evaluate", "gnss-only", "-s", "blind.toml", code=2)
+    assert "gnss-only cannot run on blind-v1: it needs gnss_position or gnss_receiver" in complaint_of(ours)
+    sweep = ["sweep", "blind.toml", "--dial", "duration_s=20,30", "-e", "mine.py"]
+    assert f"mine cannot run on blind-v1: {why}" in complaint_of(call(*sweep, code=2))
+    claim = ["paper", "claim", "mine.py", "--than", "gnss-only", "--gain", "5", "--scenario", "blind.toml"]
+    assert f"mine cannot run on blind-v1: {why}" in complaint_of(call(*claim, code=2))
+    unsuitable = call(*words, "-s", "pond.toml", "--set", "choice=unsuitable", code=2)
+    assert "it needs terrain_fix; there is none; nothing was run" in complaint_of(unsuitable)
 
 
 def complaint_of(result) -> str:

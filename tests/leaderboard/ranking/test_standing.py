@@ -59,7 +59,8 @@ def test_the_verdict_is_one_sentence(plain: str, said: str) -> None:
 
 def test_where_it_does_not_suit_there_is_no_place() -> None:
     found = standing(group(runs("ekf", 1.0, SPREAD))["pond-v1"], "mine", "pond-v1")
-    assert (found.place, found.last, found.places) == (None, None, "does not suit it")
+    assert (found.place, found.last, found.places) == (None, None, "cannot run")
+    assert found.verdict("ekf") == "mine cannot run on pond-v1."
 
 
 def test_a_reference_has_no_place_but_a_ratio() -> None:
