@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from . import tables
-from .statistics import compare, smallest_p_value
+from .statistics import FEWEST, compare, smallest_p_value
 
 if TYPE_CHECKING:
     from .runs import Runs
@@ -96,7 +96,9 @@ class Standing:
         return f"may be {self.place} to {self.last} of {self.of}"
 
     def verdict(self, plain: str = "") -> str:
-        """One sentence: its places, and its error beside that of the plain row where that was run.
+        """One sentence: its places, and its error beside that of the plain row.
+
+        Where the plain row was not run, or is the one in question, it is the best of the others that are ranked.
 
         Parameters
         ----------
@@ -104,14 +106,17 @@ class Standing:
             Label of the plain row.
         """
         said = f"{self.estimator} {self.places} on {self.scenario}"
-        beside = next((r for r in self.rows if r.estimator == plain and r.ratio is not None), None)
-        if beside is None or beside.ratio is None or self.estimator == plain:
+        others = [r for r in self.rows if r.ratio is not None and not r.reference]
+        beside = next((r for r in others if r.estimator == plain), others[0] if others else None)
+        if beside is None or beside.ratio is None:
             return f"{said}."
         between = ""
         if beside.ratio_low is not None and beside.ratio_high is not None and math.isfinite(beside.ratio_low):
             between = f" (95 %: {tables.number(beside.ratio_low)} to {tables.number(beside.ratio_high)} times)"
         chance = "" if _apart(beside) else "; the difference may be chance"
-        return f"{said}; its error is {tables.number(beside.ratio)} times that of {plain}{between}{chance}."
+        if smallest_p_value(beside.runs) >= _LEVEL:
+            chance = f"; fewer than {FEWEST} seeds cannot show a difference"
+        return f"{said}; its error is {tables.number(beside.ratio)} times that of {beside.estimator}{between}{chance}."
 
 
 def standing(by: Mapping[str, Runs], mine: str, scenario: str) -> Standing:
@@ -164,26 +169,27 @@ def standing_table(stand: Standing) -> tables.Fitted:
     smoothed = any(r.smoothed_horizontal_rmse is not None for r in stand.rows)
     for r in stand.rows:
         better = "" if r.better is None else tables.percent(r.better)
-        ratio = "" if r.ratio is None else tables.interval(r.ratio, r.ratio_low, r.ratio_high)
+        to_it = "" if r.ratio is None else tables.interval(r.ratio, r.ratio_low, r.ratio_high)
         p = "" if r.p_value is None else ("< 0.001" if r.p_value < 0.001 else f"{r.p_value:.3f}")
         p = p if r.p_value is None or smallest_p_value(r.runs) < _LEVEL else tables.MISSING  # too few seeds to decide
         rows.append([r.estimator + (" *" if r.reference else ""), f"{r.failed} of {r.runs}",
                      tables.interval(r.horizontal_rmse, r.low, r.high),
-                     tables.number(r.smoothed_horizontal_rmse) if smoothed else "", ratio, better, p])  # fmt: skip
+                     tables.number(r.smoothed_horizontal_rmse) if smoothed else "", to_it, better, p])  # fmt: skip
     mine = stand.estimator
     with_interval = " with its 95 % interval" if any(math.isfinite(r.low) for r in stand.rows) else ""
     told = any(r.reference for r in stand.rows)
-    columns = ["estimator", "failed", "horizontal RMSE [m]", "smoothed [m]", f"{mine} / it", f"{mine} better in", "p"]
+    ratio = f"{mine} ÷ this row"
+    columns = ["estimator", "failed", "horizontal RMSE [m]", "smoothed [m]", ratio, f"{mine} better in", "p"]
     return tables.Fitted(
         f"{stand.scenario}: {mine} {stand.places}",
         columns,
         rows,
-        ["estimator", f"{mine} / it", "p", "horizontal RMSE [m]", "smoothed [m]", "failed", f"{mine} better in"],
+        ["estimator", ratio, "p", "horizontal RMSE [m]", "smoothed [m]", "failed", f"{mine} better in"],
         numeric=columns[1:],
         dim=[i for i, r in enumerate(stand.rows) if r.reference],
         strong=[i for i, r in enumerate(stand.rows) if r.estimator == mine],
         caption=f"Median over the seeds{with_interval}. Ratio: geometric mean over the same seeds; below 1 "
         "the estimator is better; a run that only one of the two failed counts 1000. p: studentised bootstrap. "
-        "Intervals and p-values need 6 seeds." + (" * reference: told the truth." if told else ""),
+        f"Intervals and p-values need {FEWEST} seeds." + (" * reference: told the truth." if told else ""),
         explained={"smoothed [m]": "Smoothed: the same of the smoothed trajectories; all else is in real time."},
     )

@@ -42,19 +42,29 @@ def test_the_places_are_those_that_chance_allows() -> None:
 def test_a_few_seeds_decide_nothing() -> None:
     found = stand(3)
     assert (found.place, found.last, found.of) == (1, 4, 4)
-    assert found.verdict("ekf").endswith("times that of ekf; the difference may be chance.")
+    assert found.verdict("ekf").endswith("times that of ekf; fewer than 6 seeds cannot show a difference.")
+    assert "seeds cannot show" not in stand(6).verdict("ekf")
+    assert stand(30).verdict("same").endswith("; the difference may be chance.")
 
 
 @pytest.mark.parametrize(
     ("plain", "said"),
     [
         ("ekf", r"its error is 0\.6\d+ times that of ekf \(95 %: 0\.\d+ to 0\.\d+ times\)\."),
-        ("mine", r"mine may be 2 to 3 of 4 on pond-v1\."),
-        ("nobody", r"mine may be 2 to 3 of 4 on pond-v1\."),
+        ("mine", r"mine may be 2 to 3 of 4 on pond-v1; its error is 2\.\d+ times that of best \(95 %: .* times\)\."),
+        ("nobody", r"its error is 2\.\d+ times that of best \(95 %: .* times\)\."),
     ],
 )
 def test_the_verdict_is_one_sentence(plain: str, said: str) -> None:
     assert re.search(f"{said}$", stand(30).verdict(plain))
+
+
+def test_the_first_row_is_told_its_gain_over_the_next() -> None:
+    told = [replace(r, reference=True) for r in runs("oracle", 0.4, SPREAD)]
+    by = group([*told, *runs("best", 0.5, SPREAD), *runs("next", 1.0, SPREAD), *runs("last", 2.0, SPREAD)])["pond-v1"]
+    gain = "best is 1 of 3 on pond-v1; its error is 0.500 times that of next"
+    assert standing(by, "best", "pond-v1").verdict("best").startswith(gain)
+    assert standing({"best": by["best"]}, "best", "pond-v1").verdict("best") == "best is 1 of 1 on pond-v1."
 
 
 def test_where_it_does_not_suit_there_is_no_place() -> None:
