@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import zlib
 from dataclasses import replace
 from pathlib import Path
@@ -57,6 +58,15 @@ def test_its_versions_are_those_of_today_or_the_readme_says_which_are_older() ->
     text = readme.marked(ROOT / "README.md")
     said = next((line for line in text.splitlines() if line.startswith("Until the next edition")), "")
     assert [row for row in found.rows if f"`{row}`" not in said] == []
+
+
+def test_the_answer_in_the_guide_is_that_of_today() -> None:
+    """After new results, the first lines of the command's output take the place of those in the page."""
+    page = (ROOT / "docs/how-to/choose-an-estimator.md").read_text(encoding="utf-8")
+    command, shown = re.findall(r"^```\n(.*?)^```", page, re.DOTALL | re.MULTILINE)[:2]
+    assert command == "simnav recommend imu gnss dvl gyrocompass --trouble lying-fixes\n"
+    answer = simnav.recommend(["imu", "gnss", "dvl", "gyrocompass"], troubles="lying-fixes")
+    assert shown.splitlines() == list(answer.sentences)
 
 
 def test_the_readme_the_board_and_the_history_are_made_from_it(results: list[Result], ranking: Ranking) -> None:
