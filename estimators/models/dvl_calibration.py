@@ -157,7 +157,7 @@ class DvlCalibrationModel(InertialModel):
         eta, dl = self._values(at.misalignment), self._values(at.lever_arm)
         k, tau = float(self._values(at.scale)[0]), float(self._values(at.delay)[0])
         u, raw, to_body = np.empty(3), np.empty((3, ERROR.accelerometer_bias)), self.dcm.T
-        observe.unchecked(Aid(DVL, sheet.lever_arm + dl, -1, -1), np.zeros(3), self._state(), u, raw)
+        observe.unchecked(Aid(DVL, sheet.lever_arm + dl), np.zeros(3), self._state(), u, raw)
         u *= -1.0  # measured minus predicted
         turn = skew(self.raw_rate - self.bias[TRIAD.gyroscopes] - to_body @ earth_rate(float(self.position[0])))
         force = self.raw_force - self.bias[TRIAD.accelerometers]

@@ -18,9 +18,13 @@ from simnav.records import Record
 from simnav.types import Array, Measurement
 
 __all__ = [
-    "Aid", "AidTable", "Dynamics", "ModelFunctions", "Prediction", "Readings", "ReadingsOfSteps", "SigmaPoints",
-    "aid_of", "aid_table", "clear_readings", "has_noise_chosen", "room_for",
+    "NOWHERE", "Aid", "AidTable", "Dynamics", "ModelFunctions", "Prediction", "Readings", "ReadingsOfSteps",
+    "SigmaPoints", "aid_of", "aid_table", "clear_readings", "has_noise_chosen", "room_for",
 ]  # fmt: skip
+
+
+#: Index of a state that an instrument does not have.
+NOWHERE = -1
 
 
 class Aid(NamedTuple):
@@ -33,14 +37,14 @@ class Aid(NamedTuple):
     lever_arm : (3,) array
         In body axes [m].
     bias_at, scale_at : int
-        Index in the error state of its first bias, and of its scale factor; -1 for none. Of an inertial model there
-        are three misalignments after a DVL's scale factor, and the current, north and east, after a log's bias.
+        Index in the error state of its first bias, and of its scale factor; `NOWHERE` for none. Of an inertial model
+        there are three misalignments after a DVL's scale factor, and the current, north and east, after a log's bias.
     """
 
-    code: int
-    lever_arm: Vector
-    bias_at: int
-    scale_at: int
+    code: int = 0
+    lever_arm: Vector = np.zeros(3)
+    bias_at: int = NOWHERE
+    scale_at: int = NOWHERE
 
     def __deepcopy__(self, memo: object) -> Aid:
         """Itself: it never changes, and an estimator that takes late readings is copied in each step."""
@@ -232,7 +236,8 @@ class Prediction(NamedTuple):
     innovation : (d,) array
         Measured minus predicted, in the units of ``KINDS[kind].errors``.
     cross, predicted : (n, d), (d, d) array
-        P H' and H P H', with the covariance P of the model's error and the Jacobian H of the reading.
+        P H' and H P H', with the covariance P of the model's error and the Jacobian H of the reading. The first is
+        empty where a rule is asked through `simnav.estimators.adaptations.noise.NoiseAdaptation.adapt`.
     nominal, noise : (d, d) array
         Covariance R of the noise by the datasheet, and that which is used.
     """

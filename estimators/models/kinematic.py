@@ -153,7 +153,7 @@ class KinematicModel(FunctionModel):
         sheets, aids, noise = [self.instruments[name] for name in names], [], []
         for sheet in sheets:
             velocity, arm = equation_of(sheet).is_fix, np.array(sheet.lever_arm, dtype=np.float64)
-            aids.append(Aid(A_VELOCITY if velocity else A_POSITION, arm, -1, -1))
+            aids.append(Aid(A_VELOCITY if velocity else A_POSITION, arm))
             swinging = (TILT_RATE if velocity else TILT) ** 2 * float(arm @ arm)
             noise.append(sheet.sigma**2 + swinging + (sheet.bias**2 + SEAWAY**2 if velocity else 0.0))
         return aid_table(aids, [3] * len(aids), noise)

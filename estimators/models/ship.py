@@ -205,7 +205,7 @@ class ShipModel(FlatStateModel, MovingModel):
         north, east = start.velocity[:2].tolist()
         self.x[SHIP.speed] = cos(psi) * north + sin(psi) * east
         residual, H, noise = np.empty(2), np.zeros((2, n)), np.empty((2, 2))
-        ground = Aid(VELOCITY, np.zeros(3), -1, -1)
+        ground = Aid(VELOCITY)
         observe_ship(ground, filled(SHIP_NOISE), self.position, self.x, north, east, residual, H, noise)
         cross = P @ H.T
         horizontal = slice(ERROR.velocity, ERROR.velocity + 2)

@@ -20,7 +20,7 @@ from simnav.kernel_types import Matrix, Stack, Vector
 from simnav.structures import structure
 from simnav.types import Array
 
-from .filtering import Aid
+from .filtering import NOWHERE, Aid
 from .inertial_errors import ERROR
 
 __all__ = [
@@ -421,7 +421,7 @@ def describe_ship(x: Vector, covariance: Matrix, sway: float, velocity: Vector, 
         Rows and columns of horizontal position, horizontal velocity and heading are overwritten (`InertialErrors`).
     """
     n = x.size
-    aid = Aid(VELOCITY, np.zeros(3), -1, -1)
+    aid = Aid(VELOCITY, np.zeros(3), NOWHERE, NOWHERE)
     G = np.zeros((2, n))
     velocity[0], velocity[1] = reading(aid, x, G)
     rows = np.zeros((5, n))  # of G P, G being of position, velocity, heading

@@ -23,7 +23,7 @@ import numpy as np
 
 from simnav.compiled import kernel
 from simnav.estimators.models.base import Linearised
-from simnav.estimators.models.filtering import Aid
+from simnav.estimators.models.filtering import NOWHERE, Aid
 from simnav.estimators.models.inertial import InertialModel
 from simnav.estimators.models.inertial_errors import ERROR, PART, TRIAD
 from simnav.estimators.models.measurements import (
@@ -109,7 +109,7 @@ def observe_tangent(
     nothing, ours = np.empty(0), np.empty((3, ERROR.calibration))
     gyroscopes = state.bias[3:]  # GTSAM has them behind the accelerometers
     at = State(there.position, there.velocity, there.dcm, state.rate, gyroscopes, nothing)
-    d = observe_inertial(Aid(code, arm, -1, -1), value, at, error, ours)
+    d = observe_inertial(Aid(code, arm, NOWHERE, NOWHERE), value, at, error, ours)
     for i in range(d):
         error[i] = -error[i]
         for j in range(TANGENT.accelerometer_bias):

@@ -205,9 +205,9 @@ class WindowEstimator(LooksBack, Solver):
             predict=self.predict, choose=self.choose, make_node=self.make_node, attach=self.attach,
         )  # fmt: skip
         self._cost_test = CostTest()
-        quantities = ["residual", "weight", *(["innovation", "nis"] if self.adaptation else [])]
+        always, chosen = ("residual", "weight"), ("innovation", "nis") if self.adaptation else ()
         names = [*observed, "motion"]
-        self._blank = {f"{q}.{n}": np.nan for q in quantities for n in names if n != "motion" or q in quantities[:2]}
+        self._blank = {f"{q}.{n}": np.nan for q in (*always, *chosen) for n in names if n != "motion" or q in always}
         self._labels = [(f"residual.{name}", f"weight.{name}") for name in self.chain.names]
         self._blank |= {"iterations": 0.0, "cost": np.nan, "variance_factor": np.nan, "inconsistent": 0.0}
 
