@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -153,7 +154,7 @@ def _columns(stream: Stream, quantity: str) -> list[str]:
     return [name for part in found for name in part] if all(needed) else []
 
 
-def _is_mostly_numbers(cells: Sequence[object]) -> bool:
+def _is_mostly_numbers(cells: NDArray[Any]) -> bool:
     """Whether a column with text is one of numbers, some of which are spoilt."""
     some = [c for c in cells[:: max(1, len(cells) // 1000)] if c is not None]
     return sum(map(_is_number, some)) > 0.8 * len(some)
