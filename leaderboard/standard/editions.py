@@ -1,4 +1,7 @@
-"""Pages of the editions of the board: each stays as it was when newer results take the place of its own."""
+"""Pages of the editions of the board: the tables of each stay when newer results take the place of its own.
+
+The latest edition has its tables on the page, and as CSV and LaTeX. Those of older ones are CSV, for the site's size.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +25,7 @@ _COLUMNS = ("rank", "estimator", "score", "95 % interval", "runs", "failed", "ve
 
 @dataclass(frozen=True)
 class EditionPage:
-    """An edition as a page of a site, with its tables as CSV and LaTeX.
+    """An edition as a page of a site.
 
     Attributes
     ----------
@@ -91,7 +94,8 @@ class EditionPage:
         place.mkdir(exist_ok=True)
         for name, caption, rows in self.tables:
             write_whole(place / f"{name}.csv", csv_text([_COLUMNS, *rows]))
-            write_whole(place / f"{name}.tex", _latex(f"{TITLE}. {self.title}. {caption}.", rows))
+            if self.latest:
+                write_whole(place / f"{name}.tex", _latex(f"{TITLE}. {self.title}. {caption}.", rows))
         page = environment().get_template("edition.html")
         write_whole(folder / self.page, page.render(edition=self, columns=_COLUMNS, page=self.page, site=site))
 

@@ -297,6 +297,7 @@ def test_a_change_of_simulator_scenario_or_benchmark_is_said(
 
 
 def test_an_edition_keeps_its_page_with_csv_and_latex(home: Path, tmp_path: Path) -> None:
+    (tmp_path / "older").mkdir()
     lines = [line for line in history.read(home / "history.csv") if line.edition == 1]
     (page,) = pages_of(lines)
     page.install(tmp_path, SiteFacts("0.1.0", "today", total=4))
@@ -308,6 +309,11 @@ def test_an_edition_keeps_its_page_with_csv_and_latex(home: Path, tmp_path: Path
         assert (tmp_path / name).stat().st_size > 100
     (table,) = (tmp_path / "edition-1").glob("*.tex")
     assert table.read_text().count(r"\\") == 1 + len(lines)
+    replace(page, latest=False).install(tmp_path / "older", SiteFacts("0.1.0", "today", total=4))
+    text = (tmp_path / "older" / "edition-1.html").read_text()
+    links = re.findall(r'href="(edition-1/[^"]+)"', text)
+    assert links
+    assert all(name.endswith(".csv") and (tmp_path / "older" / name).stat().st_size > 100 for name in links)
     assert [p.number for p in pages_of(history.read(home / "history.csv"))][-1] == 1
 
 
