@@ -171,7 +171,7 @@ def write_parquet(document: Document, path: Path) -> list[Path]:
         every = every.set_column(k, every.schema.field(k), shorter)
     rest = [name for name in every.column_names if name not in real]
     with complete_file(path) as part:
-        pq.write_table(every, part, compression="zstd", compression_level=9, use_dictionary=rest,
+        pq.write_table(every, part, compression="zstd", compression_level=15, use_dictionary=rest,
                        use_byte_stream_split=real)  # fmt: skip
     return [path]
 
