@@ -3,7 +3,7 @@
 Simulated logs whose instruments have other errors than their datasheets say (`tests.identification.coverage`), and
 voyages of the catalogue, are written as files and drafted by names and sizes, as 'simnav log inspect' does. The DVL of
 the first is late by a fraction of a second, which is between the delays that are compared (0 and 0.5 s): to say 0.5 s
-is no error there if it is late by `LATE` or more.
+is no error there if it is late by `LATE` or more. Hours of a ship have no file of the truth.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import warnings
 from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from simnav.leaderboard.log_inspection import drafted
 from simnav.leaderboard.results.formats import write
@@ -21,6 +21,9 @@ from simnav.log.inspection import inspect_log
 from simnav.scenario import load
 from simnav.source import record
 from tests.identification.coverage import simulated
+
+if TYPE_CHECKING:
+    from simnav.recording import Recording
 
 __all__ = ["parts", "readings_of", "rows"]
 
@@ -43,15 +46,25 @@ def readings_of(seed: int) -> list[str]:
         scenario = load(NAMES[seed // 2 % len(NAMES)])
         short = {"duration": min(scenario.duration, LENGTH), "faults": ()}
         recording = record(scenario.model_copy(update=short), 5800 + seed)
+    return [f"seed {seed}: {text}" for text in _told(recording, True) if text not in right]
+
+
+def _told(recording: Recording, with_truth: bool) -> list[str]:
+    """What is missing in the files of a recording, or read otherwise."""
     with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
         warnings.simplefilter("ignore")
         write("recording", "csv", recording, Path(folder) / "run")
+        if not with_truth:
+            (Path(folder) / "run" / "truth.csv").unlink()
         made = drafted(inspect_log([Path(folder) / "run"])[0], "right", "right.toml")
-    return [
-        f"seed {seed}: {text}"
-        for text in (made.missing, *(r.what for r in made.readings))
-        if text and text not in right
-    ]
+    return [text for text in (made.missing, *(r.what for r in made.readings)) if text]
+
+
+def _hours_without_truth() -> list[str]:
+    """Ships with a receiver, a compass and a log, whose fixes are the only reference."""
+    scenario = load("ship-field")
+    return [f"{scenario.name}, seed {k}: {text}" for k in range(4000, 4000 + LOGS)
+            for text in _told(record(scenario, k), False)]  # fmt: skip
 
 
 def _part(number: int) -> list[str]:
@@ -60,7 +73,10 @@ def _part(number: int) -> list[str]:
 
 def parts() -> Mapping[str, Callable[[], Any]]:
     """Twenty logs each."""
-    return {f"logs {LOGS * k} to {LOGS * (k + 1) - 1}": partial(_part, k) for k in range(PARTS)}
+    found: dict[str, Callable[[], Any]] = {
+        f"logs {LOGS * k} to {LOGS * (k + 1) - 1}": partial(_part, k) for k in range(PARTS)
+    }
+    return found | {"hours of a ship without a truth": _hours_without_truth}
 
 
 def rows(found: Mapping[str, Any]) -> Iterator[tuple[str, str, str, bool]]:
