@@ -107,7 +107,8 @@ def _gaps(answer: Answer) -> list[str]:
     said = []
     if answer.on_other_tracks:
         others = _joined([f"`{name}`" for name in answer.on_other_tracks])
-        said.append(f"You can ask with --trouble for {others}, too: other tracks have scenarios of it.")
+        them = "them" if len(answer.on_other_tracks) > 1 else "it"
+        said.append(f"Other tracks judge {others}; ask for {them} with --trouble.")
     if answer.without_evidence:
         said.append(f"No evidence for these instruments with: {', '.join(_titles(answer.without_evidence))}.")
     return said
