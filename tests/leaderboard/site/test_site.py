@@ -391,7 +391,7 @@ def test_files_of_many_runs_are_short(folder, results, tmp_path, monkeypatch):
         a, b = rounded[name], whole[name]
         assert a.null_count == b.null_count, name
         if b.type == "double":
-            np.testing.assert_allclose(a.to_numpy(), b.to_numpy(), rtol=2e-5, err_msg=name)
+            np.testing.assert_allclose(a.to_numpy(), b.to_numpy(), rtol=2.0**-13, err_msg=name)
         else:
             assert a.equals(b), name
 

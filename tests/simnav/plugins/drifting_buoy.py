@@ -87,7 +87,7 @@ class DriftingBuoy(FunctionModel):
 
     def table(self, names):
         sheets = [self.sheets[name] for name in names]
-        aids = [Aid(0, np.zeros(3), -1, -1) for _ in sheets]
+        aids = [Aid() for _ in sheets]  # no lever arm, bias or scale
         return aid_table(aids, [2] * len(aids), [sheet.sigma[:2] ** 2 for sheet in sheets])
 
     def estimate(self, covariance):
