@@ -187,9 +187,8 @@ def _aligned(recording: str, name: str, kind: str, series: Series, source: LogSo
         return _with(blank, remark=f"fewer than {_LEAST} readings are where the reference is known")
     fine = np.arange(best - _COARSE, best + _COARSE + 0.5 * _FINE, _FINE)
     delay = float(min(fine, key=cost))
-    if (
-        _independent(attempts[delay][4]) * (cost(0.0) / cost(delay) - 1.0) < _SIGNIFICANT
-    ):  # no worse than without a delay
+    independent = _independent(attempts[delay][4])
+    if independent * (cost(0.0) / cost(delay) - 1.0) < _SIGNIFICANT:  # no worse than without a delay
         delay = 0.0
     _, solution, covariance, parameters, residual = attempts[delay]
     count = _independent(residual)
