@@ -358,6 +358,11 @@ def _times(path: Path, table: Table, units: Mapping[str, str]) -> dict[str, Any]
                 table.column(named)  # raises: it names the cell that is no number
             second = names[names.index(named) + 1] if names.index(named) + 1 < len(names) else None
             if second is None or not re.match(r"\d{4}[-/]", first):
+                if (_TIME.match(named) or _DATE.match(named)) and re.search(r"\d", first):
+                    raise LogError(
+                        f"{path}, line {table.line[0]}, column {named!r}: {first!r} is no known form of a time; write "
+                        "seconds, or year, month and day like 2024-05-01T10:00:00Z"
+                    ) from None
                 raise LogError(f"{path}: no column holds the times; there are: {', '.join(names)}") from None
             return {"time": (named, second)}
         return {"time": named, "time_unit": "iso"}

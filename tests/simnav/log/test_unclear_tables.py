@@ -70,6 +70,14 @@ def test_a_cell_that_is_no_number_is_said_and_no_other_column_is_taken(tmp_path,
     assert any("a draft has no IMU" in sentence for sentence in found.unknown) == (file == "imu")
 
 
+@pytest.mark.parametrize("time", ["05/01/2024 10:00:0", "01.05.2024 10:00:0", "10:00:0"])
+def test_a_time_of_an_unknown_form_is_quoted(tmp_path, time):
+    rows = "\n".join(f"{time}{k},50.0,-5.0,10.0" for k in range(9))
+    write_whole(tmp_path / "gnss.csv", f"time,latitude_deg,longitude_deg,height_m\n{rows}\n")
+    (said,) = inspect_log([tmp_path])[1]
+    assert f"gnss.csv, line 2, column 'time': '{time}0' is no known form of a time; write seconds, or year" in said
+
+
 def test_longitude_and_height_alone_are_no_position(tmp_path):
     rows = "\n".join(f"{k},-5.0,10.0" for k in range(20))
     write_whole(tmp_path / "gnss.csv", f"time_s,longitude_deg,height_m\n{rows}\n")
