@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simnav.geometry.earth import relative_position
-from simnav.geometry.rotation import dcm_from_rpy, wrap_angle
+from simnav.geometry.rotation import dcm_from_rpy, skew, wrap_angle
 from simnav.kinds import BODY_VELOCITY, DEPTH, HEADING, HORIZONTAL_POSITION, POSITION, VELOCITY, WATER_SPEED
 from simnav.log.channel import Series, list_recordings, read_channel
 from simnav.log.imu_alignment import imu_alignment
@@ -291,14 +291,14 @@ def _models(lever_arm: Array) -> dict[str, _Model]:
     def body(states: NavigationStates, time: Array, value: Array) -> tuple[Array, Array, tuple[str, ...]]:
         dcm, rate = dcm_from_rpy(states.attitude), _rate(states)
         own = np.einsum("nji,nj->ni", dcm, states.velocity) + np.cross(rate, lever_arm)
-        return value - own, _skews(rate), arms
+        return value - own, skew(rate), arms
 
     def velocity(states: NavigationStates, time: Array, value: Array) -> tuple[Array, Array, tuple[str, ...]]:
         difference = value[:, :2] - states.velocity[:, :2]
         if not np.isfinite(states.attitude).all(axis=1).any():
             return difference, np.zeros((len(time), 2, 0)), ()
         dcm, rate = dcm_from_rpy(states.attitude), _rate(states)  # of the antenna
-        turning = np.asarray(dcm @ _skews(rate))[:, :2]
+        turning = np.asarray(dcm @ skew(rate))[:, :2]
         return difference - turning @ lever_arm, turning, arms
 
     def heading(states: NavigationStates, time: Array, value: Array) -> tuple[Array, Array, tuple[str, ...]]:
@@ -338,11 +338,3 @@ def _rate(states: NavigationStates) -> Array:
     small = 0.5 * np.stack([turned[:, i, j] - turned[:, j, i] for i, j in pairs], axis=-1)
     rate = small / np.maximum(between, 1e-9)[:, None]
     return np.vstack([rate[:1], 0.5 * (rate[1:] + rate[:-1]), rate[-1:]]) if len(rate) else np.zeros((len(dcm), 3))
-
-
-def _skews(vector: Array) -> Array:
-    """(n, 3, 3) matrices of cross products: [v]x u is v x u."""
-    x, y, z = vector.T
-    zero = np.zeros_like(x)
-    rows = np.array([[zero, -z, y], [z, zero, -x], [-y, x, zero]])
-    return np.moveaxis(rows, -1, 0)

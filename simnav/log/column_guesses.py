@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simnav.log.channel import no_fix
-from simnav.log.inspection import Stream
+from simnav.log.inspection import Stream, is_number
 from simnav.log.table import LogError
 from simnav.log.units import dimension, spelt
 from simnav.types import Array
@@ -157,15 +157,7 @@ def _columns(stream: Stream, quantity: str) -> list[str]:
 def _is_mostly_numbers(cells: NDArray[Any]) -> bool:
     """Whether a column with text is one of numbers, some of which are spoilt."""
     some = [c for c in cells[:: max(1, len(cells) // 1000)] if c is not None]
-    return sum(map(_is_number, some)) > 0.8 * len(some)
-
-
-def _is_number(cell: object) -> bool:
-    try:
-        float(str(cell))
-    except ValueError:
-        return False
-    return True
+    return sum(is_number(str(c)) for c in some) > 0.8 * len(some)
 
 
 def left_out(stream: Stream) -> Iterator[str]:

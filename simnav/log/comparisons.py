@@ -16,7 +16,7 @@ import numpy as np
 from scipy.ndimage import uniform_filter1d
 
 from simnav.geometry.earth import displace, earth_rate, gravity, relative_position
-from simnav.geometry.rotation import dcm_from_rotation_vector, dcm_from_rpy, rotation_vector_from_dcm, wrap_angle
+from simnav.geometry.rotation import dcm_from_rotation_vector, dcm_from_rpy, rotation_vector_from_dcm, skew, wrap_angle
 from simnav.kinds import BODY_VELOCITY, DEPTH, HEADING, HORIZONTAL_POSITION, POSITION, VELOCITY, WATER_SPEED
 from simnav.log.channel import Series
 from simnav.log.inertial import Inertial
@@ -252,13 +252,6 @@ def _interpolated(series: Series) -> Callable[[Array], Array]:
     return at
 
 
-def _skews(vector: Array) -> Array:
-    """(n, 3, 3) matrices of cross products: [v]x u is v x u."""
-    x, y, z = vector.T
-    zero = np.zeros_like(x)
-    return np.moveaxis(np.array([[zero, -z, y], [z, zero, -x], [-y, x, zero]]), -1, 0)
-
-
 def _scaled(value: Array) -> Array:
     """(n, d, 1) derivatives by the scale of an instrument: its readings, as means over a few.
 
@@ -353,7 +346,7 @@ def _turn_of_attitude(s: Streams) -> Residual | None:
     turned = np.asarray(rotation_vector_from_dcm(np.swapaxes(a, 1, 2) @ b))
     turned += _INTERVAL * np.einsum("nji,j->ni", a, earth_rate(float(s.position.value[0, 0])))
     turned[~known] = np.nan
-    return _residual(own - turned, _TURN, (_constant(n, 3) * _INTERVAL, _GYROSCOPE), (_skews(own), _MOUNTING))
+    return _residual(own - turned, _TURN, (_constant(n, 3) * _INTERVAL, _GYROSCOPE), (skew(own), _MOUNTING))
 
 
 def _turn_of_gravity(s: Streams) -> Residual | None:
@@ -369,7 +362,7 @@ def _turn_of_gravity(s: Streams) -> Residual | None:
     later = _imu(s).turns(middle, middle + _INTERVAL) - _imu(s).turns(time, middle)
     rates = [_imu(s).turns(t - 0.5, t + 0.5) for t in (time, time + _INTERVAL, time + 2.0 * _INTERVAL)]
     jerk = rates[2] - 2.0 * rates[1] + rates[0]  # of the lever arm from the point about which the vessel rolls
-    return _residual(difference, _FORCE, (_skews(jerk), _ARM), (_constant(len(time), 3), 0.01), (_skews(later), 0.3))
+    return _residual(difference, _FORCE, (skew(jerk), _ARM), (_constant(len(time), 3), 0.01), (skew(later), 0.3))
 
 
 def _force(s: Streams) -> Residual | None:
@@ -387,8 +380,8 @@ def _force(s: Streams) -> Residual | None:
     pull = np.einsum("nji,nj->ni", dcm, up + change)
     pull[~known] = np.nan
     turned = [_imu(s).turns(t - 0.5, t + 0.5) for t in (time, time + _INTERVAL)]
-    return _residual(own - pull, _FORCE, (_constant(n, 3), _ACCELEROMETER), (_skews(own), _MOUNTING),
-                     (_skews(turned[1] - turned[0]), _ARM))  # fmt: skip
+    return _residual(own - pull, _FORCE, (_constant(n, 3), _ACCELEROMETER), (skew(own), _MOUNTING),
+                     (skew(turned[1] - turned[0]), _ARM))  # fmt: skip
 
 
 def _force_along_course(s: Streams) -> Residual | None:
@@ -403,7 +396,7 @@ def _force_along_course(s: Streams) -> Residual | None:
     place = s.position.value[0]
     wanted = np.stack([c * change[:, 0] + e * change[:, 1], c * change[:, 1] - e * change[:, 0],
                        change[:, 2] - float(gravity(place[0], place[2]))], axis=-1)  # fmt: skip
-    return _residual(own - wanted, 2.0 * _FORCE, (_constant(n, 3), _ACCELEROMETER), (_skews(own), _MOUNTING))
+    return _residual(own - wanted, 2.0 * _FORCE, (_constant(n, 3), _ACCELEROMETER), (skew(own), _MOUNTING))
 
 
 def _yaw_change(s: Streams, time: Array, span: float) -> Array:
@@ -492,8 +485,8 @@ def _body_velocity(s: Streams, name: str) -> Residual | None:
     dcm, rate = turned
     own = np.einsum("nji,nj->ni", dcm, s.velocities(time)) + np.cross(rate, arm)
     size = float(np.hypot(_SPEED, _BETWEEN * s.between**0.5)) if s.velocity is not None else 2.0 * _SPEED
-    return _residual(value - own, size, (_constant(len(time), 3), _DVL_BIAS), (_skews(value), _MOUNTING),
-                     (_skews(rate), _ARM), (_scaled(value), _SCALE))  # fmt: skip
+    return _residual(value - own, size, (_constant(len(time), 3), _DVL_BIAS), (skew(value), _MOUNTING),
+                     (skew(rate), _ARM), (_scaled(value), _SCALE))  # fmt: skip
 
 
 def _velocity(s: Streams, name: str) -> Residual | None:
@@ -501,7 +494,7 @@ def _velocity(s: Streams, name: str) -> Residual | None:
     time, value = _picked(s.instruments[name][1], s.begin)
     velocity = s.velocities(time)
     turned = _rotated(s, time)
-    arm = () if turned is None else ((np.nan_to_num(turned[0]) @ _skews(turned[1]), _ANTENNA),)
+    arm = () if turned is None else ((np.nan_to_num(turned[0]) @ skew(turned[1]), _ANTENNA),)
     return _residual(value - velocity, 2.0 * _SPEED, (_constant(len(time), 3), _DVL_BIAS), *arm)
 
 
@@ -554,4 +547,4 @@ def _magnetic_field(s: Streams, name: str) -> Residual | None:
     own = np.einsum("nji,j->ni", turned[0], s.field[name]) / strength
     known = np.nan_to_num(own)
     return _residual(value / strength - own, 0.05, (_constant(len(time), 3), 0.2),
-                     (_skews(known), _MOUNTING), (known[:, :, None], 0.1))  # fmt: skip
+                     (skew(known), _MOUNTING), (known[:, :, None], 0.1))  # fmt: skip

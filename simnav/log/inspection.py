@@ -31,7 +31,7 @@ from simnav.log.time_units import MONTH, other_unit
 from simnav.log.units import dimension, factor, spelt, units_row
 from simnav.types import Array
 
-__all__ = ["WITH_TOPICS", "Stream", "inspect_log", "streams_of", "track_of"]
+__all__ = ["WITH_TOPICS", "Stream", "inspect_log", "is_number", "streams_of", "track_of"]
 
 #: Ending of a file -> its format, where its content says nothing.
 _ENDINGS = {
@@ -354,7 +354,7 @@ def _times(path: Path, table: Table, units: Mapping[str, str]) -> dict[str, Any]
         try:
             utc_seconds(first)
         except ValueError:
-            if _is_number(first):
+            if is_number(first):
                 table.column(named)  # raises: it names the cell that is no number
             second = names[names.index(named) + 1] if names.index(named) + 1 < len(names) else None
             if second is None or not re.match(r"\d{4}[-/]", first):
@@ -370,7 +370,8 @@ def _times(path: Path, table: Table, units: Mapping[str, str]) -> dict[str, Any]
     return {"time": named, "time_unit": _time_unit(told, np.asarray(values, dtype=np.float64))}
 
 
-def _is_number(text: str) -> bool:
+def is_number(text: str) -> bool:
+    """Whether a text is a number."""
     try:
         float(text)
     except ValueError:
