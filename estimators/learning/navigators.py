@@ -240,6 +240,7 @@ def navigate(
             longest = max(longest, until[b] - now[b])
     blocks = np.empty((int(longest / BLOCK) + 4, BLOCK_NUMBERS))
     transition, process_noise = np.empty((15, 15)), np.empty((15, 15))
+    unmeasured = np.zeros((imu.time.shape[1], 6))  # the IMU measures at all times
     for b in range(active.size):
         if not active[b]:
             continue
@@ -264,7 +265,11 @@ def navigate(
                 s = imu.number[b]
                 moved = Motion(position[b], velocity[b], dcm[b], bias[b], state.memory[b], state.turn[b], clock[b])
                 samples = Samples(
-                    imu.time[b, :s], imu.interval[b, :s], imu.angular_rate[b, :s], imu.specific_force[b, :s]
+                    imu.time[b, :s],
+                    imu.interval[b, :s],
+                    imu.angular_rate[b, :s],
+                    imu.specific_force[b, :s],
+                    unmeasured[:s],
                 )
                 first, blocks_used = advance_inertial(moved, samples, first, stop, sensors[b], blocks)
                 accumulate_error(blocks, blocks_used, sensors[b], transition, process_noise)

@@ -29,12 +29,9 @@ from .channel_readings import ChannelReadings
 from .filtering import Dynamics, ModelFunctions, aid_table
 from .measurement_functions import MeasurementFunction
 from .named_state import NamedState
-from .propagation import Samples
+from .propagation import NO_SAMPLES, Samples
 
-__all__ = ["NO_SAMPLES", "ErrorModel", "Linearised"]
-
-#: Of a step without an IMU.
-NO_SAMPLES = Samples(np.empty(0), np.empty(0), np.empty((0, 3)), np.empty((0, 3)))
+__all__ = ["ErrorModel", "Linearised"]
 
 
 class Linearised(NamedTuple):

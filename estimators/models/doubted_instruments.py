@@ -14,8 +14,6 @@ Source: B. Friedland, *Treatment of bias in recursive filtering*, IEEE TAC 14(4)
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -39,10 +37,6 @@ _PLACE = 1e-4
 #: Places of the biases of the IMU in the error of the inertial model.
 _GYROSCOPE = np.arange(ERROR.gyroscope_bias, ERROR.accelerometer_bias)
 _ACCELEROMETER = np.arange(ERROR.accelerometer_bias, ERROR.calibration)
-
-
-#: Time for which the error of a saturated gyroscope lasts: about half a roll [s].
-SATURATED = 1.0
 
 
 @dataclass(frozen=True)
@@ -199,18 +193,6 @@ class DoubtingModel(ErrorModel):
         covariance[own.states] = 0.0
         covariance[:, own.states] = 0.0
         covariance[own.states, own.states] = own.variance
-
-    @contextmanager
-    def saturated(self, rate: float) -> Iterator[None]:
-        """A step in which a gyroscope saturates at a rate [rad/s]: it is wrong by about so much for `SATURATED` s."""
-        if rate == 0.0:
-            yield
-            return
-        noise = self.imu_noise.view(IMU_NOISE)[0]
-        usual = float(noise["gyroscope"])
-        noise["gyroscope"] = max(usual, rate**2 * SATURATED)
-        yield
-        noise["gyroscope"] = usual
 
     def take_over_doubts(self, other: DoubtingModel) -> None:
         """Copy of another model which instruments are doubted."""

@@ -20,12 +20,13 @@ from numpy.typing import NDArray
 
 from simnav.types import Array, Measurement
 
-from .base import NO_SAMPLES, Linearised
+from .base import Linearised
 from .chain import chain_of
 from .columns import Columns
 from .filtering import AidTable, Dynamics
 from .flat_state import FlatStateModel
 from .moving_chain import MovingChain, MovingModel, States
+from .propagation import NO_SAMPLES
 
 __all__ = ["FunctionChain", "FunctionModel"]
 

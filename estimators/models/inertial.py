@@ -38,7 +38,6 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from simnav.compiled import ready
 from simnav.estimates import Estimates
 from simnav.estimator import UnsuitableScenario
 from simnav.estimator.needs import AID, IMU, Needs
@@ -58,7 +57,7 @@ from simnav.types import (
     Measurement,
 )
 
-from .base import NO_SAMPLES, ErrorModel, Linearised
+from .base import ErrorModel, Linearised
 from .channel_readings import channel_readings_of
 from .covariance_propagation import carry_errors
 from .declared_errors import CURRENT, bias_of, bias_of_triad
@@ -66,6 +65,7 @@ from .delayed import is_delayed
 from .equations import EQUATIONS, equation_of
 from .error_states import merged, merged_states
 from .filtering import Aid, AidTable, Dynamics, ModelFunctions, aid_table
+from .flat_lines import FlatLineTest
 from .flat_state import FlatStateModel
 from .inertial_errors import ERROR, PART
 from .inertial_functions import INERTIAL_FUNCTIONS
@@ -83,7 +83,6 @@ from .propagation import (
     INERTIAL_STATE,
     MOTION_NUMBERS,
     TURN_TIME,
-    Samples,
     motion_of,
 )
 from .state_blocks import StateBlocks
@@ -134,7 +133,7 @@ class InertialModel(FlatStateModel):
 
     delayed: bool = False
     state = ("position", "velocity", "dcm", "bias", "calibration")
-    memory = ("numbers",)
+    memory = ("numbers", "flat_line_memory")
     constant: ClassVar[tuple[str, ...]] = (
         "instruments", "bias_at", "scale_at", "uncalibrated", "own", "many", "_many_of", "_beyond", "_fused",
     )  # fmt: skip
@@ -170,6 +169,11 @@ class InertialModel(FlatStateModel):
         self._viewed = State(self.position, self.velocity, self.dcm, self.raw_rate, self.bias, self.calibration)
 
     @property
+    def flat_line_memory(self) -> Array:
+        """What the flat-line test of the IMU remembers."""
+        return self._flat_lines.memory
+
+    @property
     def time(self) -> float:
         """Time of the state [s]."""
         return float(self._time[0])
@@ -196,6 +200,7 @@ class InertialModel(FlatStateModel):
         self.instruments = instruments = with_lever_arms(instruments)
         self.transition, self.process_noise = np.empty((_NAV, _NAV)), np.empty((_NAV, _NAV))
         self.next_sample, self._since = np.zeros(1, np.int64), start.time
+        self._flat_lines = FlatLineTest(imu)
         self.load(None)
         self.blocks = StateBlocks(_MOTION)
         self._imu(imu)
@@ -345,12 +350,7 @@ class InertialModel(FlatStateModel):
     def load(self, imu: ImuSamples | None) -> None:
         """Take the IMU samples of the step that follows."""
         self.next_sample[0] = 0
-        if imu is None or len(imu) == 0:
-            self.samples = NO_SAMPLES
-        else:
-            self.samples = Samples(
-                ready(imu.time), ready(imu.interval), ready(imu.angular_rate), ready(imu.specific_force)
-            )
+        self.samples = self._flat_lines.samples(imu)
 
     def propagate(self, covariance: Array, until: float) -> None:
         """Advance the state and its covariance through the samples loaded."""

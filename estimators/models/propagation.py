@@ -48,7 +48,10 @@ __all__ = [
     "HELD_VELOCITY",
     "IMU_NOISE",
     "INERTIAL_STATE",
+    "LARGEST_FORCE",
+    "LARGEST_RATE",
     "MOTION_NUMBERS",
+    "NO_SAMPLES",
     "TURN_TIME",
     "Motion",
     "SampleInterval",
@@ -66,7 +69,8 @@ __all__ = [
 BLOCK = 0.2
 #: Time over which the turn rate is averaged, and for which a scale-factor error is taken to last in a turn [s].
 TURN_TIME = 60.0
-#: What a step without IMU data adds: velocity [m/s/sqrt(s)] and attitude [rad/sqrt(s)] random walk.
+#: What a time without IMU data adds, for each axis that does not measure: random walks of velocity [m/s/sqrt(s)] and
+#: attitude [rad/sqrt(s)].
 HELD_VELOCITY, HELD_ATTITUDE = 0.3, 0.03
 #: Samples above these limits are not plausible for a marine vehicle [rad/s], [m/s^2].
 LARGEST_RATE, LARGEST_FORCE = 50.0, 500.0
@@ -74,10 +78,12 @@ LARGEST_RATE, LARGEST_FORCE = 50.0, 500.0
 GRAVITY_FLATTENING = 0.0053024
 
 #: A block over which the error is propagated at once: its length and the part of it without data [s]; latitude, height,
-#: velocity, elements of the mean DCM, mean specific force in north-east-down, and averaged body rate.
+#: velocity, elements of the mean DCM, mean specific force in north-east-down, averaged body rate, and the noise that is
+#: added for each axis of the IMU while it does not measure [rad^2], [m^2/s^2].
 ERROR_BLOCK = structure(
-    length=float, held=float, latitude=float, height=float, velocity=3, dcm=(3, 3), specific_force=3, rate=3
-)
+    length=float, held=float, latitude=float, height=float, velocity=3, dcm=(3, 3), specific_force=3, rate=3,
+    unmeasured=6,
+)  # fmt: skip
 #: Time of the state, end of the last sample used, and seconds held so far [s]; that sample's mean rate and force; the
 #: mean rate of the one before; and the rate at the time of the state, extrapolated from both: a mean is half a sample
 #: old, which over the lever arm of a DVL in a seaway would be taken for a misalignment.
@@ -107,12 +113,20 @@ class Samples(NamedTuple):
         Ends of the samples, and their lengths [s].
     angular_rate, specific_force : (k, 3) array
         Means over the intervals [rad/s], [m/s^2].
+    unmeasured : (k, 6) array
+        Noise density of the values that the IMU did not measure, 0 of the others; gyroscopes first [rad^2/s],
+        [m^2/s^3] (`simnav.estimators.models.flat_lines`).
     """
 
     time: Vector
     interval: Vector
     angular_rate: Matrix
     specific_force: Matrix
+    unmeasured: Matrix
+
+
+#: No samples.
+NO_SAMPLES = Samples(np.empty(0), np.empty(0), np.empty((0, 3)), np.empty((0, 3)), np.empty((0, 6)))
 
 
 class Motion(NamedTuple):
@@ -256,6 +270,21 @@ def _add_noise(Q: Array, block: Any, noise: Any) -> None:
         Q[ERROR.attitude + i, ERROR.attitude + i] += HELD_ATTITUDE * HELD_ATTITUDE * held
         Q[ERROR.gyroscope_bias + i, ERROR.gyroscope_bias + i] += noise.gyroscope_walk * dt
         Q[ERROR.accelerometer_bias + i, ERROR.accelerometer_bias + i] += noise.accelerometer_walk * dt
+    _add_unmeasured(Q, block)
+
+
+@helper
+def _add_unmeasured(Q: Array, block: Any) -> None:
+    """Add half the noise of the axes that did not measure in a block to Q."""
+    dcm = block.dcm
+    for axis in range(3):
+        turn, push = 0.5 * block.unmeasured[axis], 0.5 * block.unmeasured[3 + axis]
+        if turn > 0.0 or push > 0.0:
+            for i in range(3):
+                for j in range(3):
+                    both = dcm[i, axis] * dcm[j, axis]
+                    Q[ERROR.attitude + i, ERROR.attitude + j] += both * turn
+                    Q[ERROR.velocity + i, ERROR.velocity + j] += both * push
 
 
 @kernel
@@ -429,6 +458,8 @@ def advance_inertial(
                 before[r, c] = dcm[r, c]
                 mean[r, c] = 0.0
         held, s0, s1, s2 = 0.0, 0.0, 0.0, 0.0
+        for r in range(6):
+            block.unmeasured[r] = 0.0
         while t < end - eps:
             covered = next_interval(clock, samples, i, t, end, nominal)
             i, stop, whole = covered.sample, covered.stop, covered.whole
@@ -456,6 +487,9 @@ def advance_inertial(
                     for r in range(6):
                         state.increments[r] = keep[r]
                 s0, s1, s2 = s0 + w0 * dt, s1 + w1 * dt, s2 + w2 * dt
+                if i < samples.time.size:
+                    for r in range(6):
+                        block.unmeasured[r] += dt * samples.unmeasured[i, r]
             for r in range(3):
                 for c in range(3):
                     mean[r, c] += dcm[r, c] * dt

@@ -72,9 +72,11 @@ class SageHusaKf(_Adaptive, adaptation=SageHusa):
         It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
     5
         As of ``iae``.
+    6
+        Values that the IMU did not measure are replaced (`FlatLineTest`).
     """
 
-    version = 5
+    version = 6
 
 
 @register("sage-husa-paper")
@@ -101,9 +103,11 @@ class SageHusaPaper(
         failure in one direction on, and a compass while another instrument finds the prediction wrong.
     4
         It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
+    5
+        Values that the IMU did not measure are replaced (`FlatLineTest`).
     """
 
-    version = 4
+    version = 5
 
 
 @register("iae")
@@ -134,9 +138,11 @@ class Iae(_Adaptive, adaptation=piece(InnovationBased, source="innovation")):
     5
         Innovations of a log that persist are taken as a wrong prediction, whatever its witnesses say, if they grew
         little by little: an instrument that begins to be wrong is wrong at once (`simnav.estimators.onset`).
+    6
+        Values that the IMU did not measure are replaced (`FlatLineTest`).
     """
 
-    version = 5
+    version = 6
 
 
 @register("iae-paper")
@@ -149,7 +155,14 @@ class IaePaper(_Adaptive, adaptation=INNOVATIONS_AS_PRINTED):
 
     Source: G. Mao, K. Wang, T. Fu, *Robust GNSS/INS integrated navigation algorithm based on adaptive factor graph
     optimization*, 2025, eqs. 16-20.
+
+    Versions
+    --------
+    2
+        Values that the IMU did not measure are replaced (`FlatLineTest`).
     """
+
+    version = 2
 
 
 @register("iae-fixed")
@@ -178,9 +191,11 @@ class IaeFixed(_Adaptive, adaptation=piece(FixedWindow, source="innovation")):
         It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
     5
         As of ``iae``.
+    6
+        Values that the IMU did not measure are replaced (`FlatLineTest`).
     """
 
-    version = 5
+    version = 6
     formerly = _FORMERLY
 
 
@@ -210,9 +225,11 @@ class Rae(_Adaptive, adaptation=piece(FixedWindow, source="residual", newest=Fal
         It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
     5
         As of ``iae``.
+    6
+        Values that the IMU did not measure are replaced (`FlatLineTest`).
     """
 
-    version = 5
+    version = 6
     formerly = _FORMERLY
 
 
@@ -243,9 +260,11 @@ class Adkf(_Adaptive, adaptation=AdaptiveFactor):
         It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
     5
         As of ``iae``.
+    6
+        Values that the IMU did not measure are replaced (`FlatLineTest`).
     """
 
-    version = 5
+    version = 6
 
 
 @register("adkf-paper")
@@ -262,9 +281,11 @@ class AdkfPaper(_Adaptive, adaptation=piece(AdaptiveFactor, preset="paper", c0=N
     --------
     2
         It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
+    3
+        Values that the IMU did not measure are replaced (`FlatLineTest`).
     """
 
-    version = 2
+    version = 3
 
 
 @register("adkf-23")
@@ -287,9 +308,11 @@ class Adkf23(Row, solver=KalmanEstimator, model=DvlCalibrationModel, adaptation=
         It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
     3
         As of ``iae``.
+    4
+        Values that the IMU did not measure are replaced (`FlatLineTest`).
     """
 
-    version = 3
+    version = 4
 
 
 @register("igg3")
@@ -319,9 +342,11 @@ class Igg3(_Adaptive, adaptation=Igg3Weights):
         It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
     5
         As of ``iae``.
+    6
+        Values that the IMU did not measure are replaced (`FlatLineTest`).
     """
 
-    version = 5
+    version = 6
 
 
 @register("huber-kf")
@@ -347,9 +372,11 @@ class HuberKf(_Adaptive, adaptation=HuberWeights):
         It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
     5
         As of ``iae``.
+    6
+        Values that the IMU did not measure are replaced (`FlatLineTest`).
     """
 
-    version = 5
+    version = 6
 
 
 @register("gated-ekf")
@@ -380,9 +407,11 @@ class GatedEkf(_Adaptive, adaptation=ChiSquareGate):
         It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
     5
         As of ``iae``.
+    6
+        Values that the IMU did not measure are replaced (`FlatLineTest`).
     """
 
-    version = 5
+    version = 6
 
 
 @register("fading-ekf")
@@ -395,9 +424,11 @@ class FadingEkf(_Adaptive, adaptation=FadingMemory):
     --------
     2
         It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
+    3
+        Values that the IMU did not measure are replaced (`FlatLineTest`).
     """
 
-    version = 2
+    version = 3
 
 
 @register("vb-akf")
@@ -427,9 +458,11 @@ class VbAkf(_Adaptive, adaptation=VariationalBayes):
         It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
     5
         As of ``iae``.
+    6
+        Values that the IMU did not measure are replaced (`FlatLineTest`).
     """
 
-    version = 5
+    version = 6
 
 
 @register("mckf")
@@ -458,9 +491,11 @@ class Mckf(_Adaptive, adaptation=piece(MaximumCorrentropy, smallest=1e-3)):
         It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
     5
         As of ``iae``.
+    6
+        Values that the IMU did not measure are replaced (`FlatLineTest`).
     """
 
-    version = 5
+    version = 6
 
 
 @register("imm")
@@ -494,6 +529,8 @@ class Imm(Row, solver=ImmEstimator, model=Suitable):
     6
         Innovations of a log that persist are taken as a wrong prediction, whatever its witnesses say, if they grew
         little by little: an instrument that begins to be wrong is wrong at once (`simnav.estimators.onset`).
+    7
+        Values that the IMU did not measure are replaced (`FlatLineTest`).
     """
 
-    version = 6
+    version = 7

@@ -43,7 +43,7 @@ class _Adaptive(Row, solver=KalmanEstimator, model=Suitable, iteration=poor_head
 
 @register("sage-husa")
 class SageHusaKf(_Adaptive, adaptation=SageHusa):
-    version = 5
+    version = 6
     def __init__(
         self,
         *,
@@ -60,7 +60,7 @@ class SageHusaKf(_Adaptive, adaptation=SageHusa):
 class SageHusaPaper(
     _Adaptive, adaptation=piece(SageHusa, defaults={"fading": 1.0, "prior": 0, "lowest": 0.5, "scope": "fixes"})
 ):
-    version = 4
+    version = 5
     def __init__(
         self,
         *,
@@ -75,7 +75,7 @@ class SageHusaPaper(
 
 @register("iae")
 class Iae(_Adaptive, adaptation=piece(InnovationBased, source="innovation")):
-    version = 5
+    version = 6
     def __init__(
         self,
         *,
@@ -96,6 +96,7 @@ class Iae(_Adaptive, adaptation=piece(InnovationBased, source="innovation")):
 
 @register("iae-paper")
 class IaePaper(_Adaptive, adaptation=INNOVATIONS_AS_PRINTED):
+    version = 2
     def __init__(
         self,
         *,
@@ -116,7 +117,7 @@ class IaePaper(_Adaptive, adaptation=INNOVATIONS_AS_PRINTED):
 
 @register("iae-fixed")
 class IaeFixed(_Adaptive, adaptation=piece(FixedWindow, source="innovation")):
-    version = 5
+    version = 6
     formerly = _FORMERLY
     def __init__(
         self,
@@ -134,7 +135,7 @@ class IaeFixed(_Adaptive, adaptation=piece(FixedWindow, source="innovation")):
 
 @register("rae")
 class Rae(_Adaptive, adaptation=piece(FixedWindow, source="residual", newest=False)):
-    version = 5
+    version = 6
     formerly = _FORMERLY
     def __init__(
         self,
@@ -151,7 +152,7 @@ class Rae(_Adaptive, adaptation=piece(FixedWindow, source="residual", newest=Fal
 
 @register("adkf")
 class Adkf(_Adaptive, adaptation=AdaptiveFactor):
-    version = 5
+    version = 6
     def __init__(
         self,
         *,
@@ -167,7 +168,7 @@ class Adkf(_Adaptive, adaptation=AdaptiveFactor):
 
 @register("adkf-paper")
 class AdkfPaper(_Adaptive, adaptation=piece(AdaptiveFactor, preset="paper", c0=None, c1=None, together=0)):
-    version = 2
+    version = 3
     def __init__(
         self,
         *,
@@ -179,7 +180,7 @@ class AdkfPaper(_Adaptive, adaptation=piece(AdaptiveFactor, preset="paper", c0=N
 
 @register("adkf-23")
 class Adkf23(Row, solver=KalmanEstimator, model=DvlCalibrationModel, adaptation=AdaptiveFactor, iteration=poor_heading):
-    version = 3
+    version = 4
     def __init__(
         self,
         *,
@@ -198,7 +199,7 @@ class Adkf23(Row, solver=KalmanEstimator, model=DvlCalibrationModel, adaptation=
 
 @register("igg3")
 class Igg3(_Adaptive, adaptation=Igg3Weights):
-    version = 5
+    version = 6
     def __init__(
         self,
         *,
@@ -209,7 +210,7 @@ class Igg3(_Adaptive, adaptation=Igg3Weights):
 
 @register("huber-kf")
 class HuberKf(_Adaptive, adaptation=HuberWeights):
-    version = 5
+    version = 6
     def __init__(
         self,
         *,
@@ -219,7 +220,7 @@ class HuberKf(_Adaptive, adaptation=HuberWeights):
 
 @register("gated-ekf")
 class GatedEkf(_Adaptive, adaptation=ChiSquareGate):
-    version = 5
+    version = 6
     def __init__(
         self,
         *,
@@ -230,7 +231,7 @@ class GatedEkf(_Adaptive, adaptation=ChiSquareGate):
 
 @register("fading-ekf")
 class FadingEkf(_Adaptive, adaptation=FadingMemory):
-    version = 2
+    version = 3
     def __init__(
         self,
         *,
@@ -240,7 +241,7 @@ class FadingEkf(_Adaptive, adaptation=FadingMemory):
 
 @register("vb-akf")
 class VbAkf(_Adaptive, adaptation=VariationalBayes):
-    version = 5
+    version = 6
     def __init__(
         self,
         *,
@@ -255,7 +256,7 @@ class VbAkf(_Adaptive, adaptation=VariationalBayes):
 
 @register("mckf")
 class Mckf(_Adaptive, adaptation=piece(MaximumCorrentropy, smallest=1e-3)):
-    version = 5
+    version = 6
     def __init__(
         self,
         *,
@@ -267,7 +268,7 @@ class Mckf(_Adaptive, adaptation=piece(MaximumCorrentropy, smallest=1e-3)):
 
 @register("imm")
 class Imm(Row, solver=ImmEstimator, model=Suitable):
-    version = 6
+    version = 7
     def __init__(
         self,
         *,

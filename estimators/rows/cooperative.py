@@ -20,4 +20,11 @@ class EkfCi(Row, solver=KalmanEstimator, model=WithMessages, adaptation=Covarian
 
     Source: S. J. Julier and J. K. Uhlmann, *A non-divergent estimation algorithm in the presence of unknown
     correlations*, American Control Conference, 1997.
+
+    Versions
+    --------
+    2
+        Values that the IMU did not measure are replaced (`FlatLineTest`).
     """
+
+    version = 2

@@ -11,6 +11,7 @@ __all__ = ["EkfCi"]
 
 @register("ekf-ci")
 class EkfCi(Row, solver=KalmanEstimator, model=WithMessages, adaptation=CovarianceIntersection, iteration=poor_heading):
+    version = 2
     def __init__(
         self,
         *,

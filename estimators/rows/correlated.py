@@ -15,4 +15,11 @@ class GaussMarkovEkf(Row, solver=KalmanEstimator, model=CorrelatedFixes, iterati
 
     Source: A. Gelb (ed.), *Applied Optimal Estimation*, 1974, section 3.6; P. D. Groves, *Principles of GNSS, Inertial,
     and Multisensor Integrated Navigation Systems*, 2013, section 14.2.
+
+    Versions
+    --------
+    2
+        Values that the IMU did not measure are replaced (`FlatLineTest`).
     """
+
+    version = 2

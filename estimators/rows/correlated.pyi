@@ -10,6 +10,7 @@ __all__ = ["GaussMarkovEkf"]
 
 @register("gm-ekf", aliases=("gauss-markov-ekf",))
 class GaussMarkovEkf(Row, solver=KalmanEstimator, model=CorrelatedFixes, iteration=poor_heading):
+    version = 2
     def __init__(
         self,
         *,

@@ -32,9 +32,11 @@ class Federated(Row, solver=piece(FederatedEstimator, reset_locals=True), model=
     --------
     2
         It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
+    3
+        Values that the IMU did not measure are replaced (`FlatLineTest`).
     """
 
-    version = 2
+    version = 3
 
 
 @register("federated-no-reset")
@@ -54,6 +56,8 @@ class FederatedNoReset(Row, solver=piece(FederatedEstimator, reset_locals=False)
     --------
     2
         It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
+    3
+        Values that the IMU did not measure are replaced (`FlatLineTest`).
     """
 
-    version = 2
+    version = 3

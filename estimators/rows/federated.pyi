@@ -9,7 +9,7 @@ __all__ = ["Federated", "FederatedNoReset"]
 
 @register("federated")
 class Federated(Row, solver=piece(FederatedEstimator, reset_locals=True), model=InertialModel):
-    version = 2
+    version = 3
     def __init__(
         self,
         *,
@@ -21,7 +21,7 @@ class Federated(Row, solver=piece(FederatedEstimator, reset_locals=True), model=
 
 @register("federated-no-reset")
 class FederatedNoReset(Row, solver=piece(FederatedEstimator, reset_locals=False), model=InertialModel):
-    version = 2
+    version = 3
     def __init__(
         self,
         *,

@@ -24,7 +24,14 @@ class GtsamFixedLag(Row, solver=FixedLagEstimator):
     Raw observations of satellites and other readings that a Python function predicts are left out.
 
     Source: F. Dellaert and others, GTSAM 4.3.
+
+    Versions
+    --------
+    2
+        Values that the IMU did not measure are replaced (`FlatLineTest`).
     """
+
+    version = 2
 
 
 @register("gtsam-isam2")
@@ -32,7 +39,14 @@ class GtsamIsam2(Row, solver=Isam2Estimator):
     """GTSAM's ISAM2 over the whole run; smoothed: its last estimate of all nodes.
 
     Source: M. Kaess et al., *iSAM2: incremental smoothing and mapping using the Bayes tree*, IJRR 31(2), 2012.
+
+    Versions
+    --------
+    2
+        Values that the IMU did not measure are replaced (`FlatLineTest`).
     """
+
+    version = 2
 
 
 @register("gtsam-batch")
@@ -40,7 +54,14 @@ class GtsamBatch(Row, solver=BatchEstimator):
     """In real time ``gtsam-fixed-lag``; smoothed: full-batch Levenberg-Marquardt over the same graph.
 
     Source: F. Dellaert and others, GTSAM 4.3.
+
+    Versions
+    --------
+    2
+        Values that the IMU did not measure are replaced (`FlatLineTest`).
     """
+
+    version = 2
 
     real_time_as = "gtsam-fixed-lag"
 
@@ -51,6 +72,13 @@ class GtsamGnc(Row, solver=GncEstimator):
 
     Source: H. Yang, P. Antonante, V. Tzoumas and L. Carlone, *Graduated non-convexity for robust spatial perception*,
     IEEE Robotics and Automation Letters 5(2), 2020.
+
+    Versions
+    --------
+    2
+        Values that the IMU did not measure are replaced (`FlatLineTest`).
     """
+
+    version = 2
 
     real_time_as = "gtsam-fixed-lag"

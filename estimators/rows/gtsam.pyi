@@ -9,6 +9,7 @@ __all__ = ["GtsamBatch", "GtsamFixedLag", "GtsamGnc", "GtsamIsam2"]
 
 @register("gtsam-fixed-lag")
 class GtsamFixedLag(Row, solver=FixedLagEstimator):
+    version = 2
     def __init__(
         self,
         *,
@@ -19,6 +20,7 @@ class GtsamFixedLag(Row, solver=FixedLagEstimator):
 
 @register("gtsam-isam2")
 class GtsamIsam2(Row, solver=Isam2Estimator):
+    version = 2
     def __init__(
         self,
         *,
@@ -28,6 +30,7 @@ class GtsamIsam2(Row, solver=Isam2Estimator):
 
 @register("gtsam-batch")
 class GtsamBatch(Row, solver=BatchEstimator):
+    version = 2
     real_time_as = "gtsam-fixed-lag"
     def __init__(
         self,
@@ -40,6 +43,7 @@ class GtsamBatch(Row, solver=BatchEstimator):
 
 @register("gtsam-gnc")
 class GtsamGnc(Row, solver=GncEstimator):
+    version = 2
     real_time_as = "gtsam-fixed-lag"
     def __init__(
         self,

@@ -41,9 +41,11 @@ class StudentTKf(Row, solver=KalmanEstimator, model=Suitable, adaptation=Student
     5
         Innovations of a log that persist are taken as a wrong prediction, whatever its witnesses say, if they grew
         little by little: an instrument that begins to be wrong is wrong at once (`simnav.estimators.onset`).
+    6
+        Values that the IMU did not measure are replaced (`FlatLineTest`).
     """
 
-    version = 5
+    version = 6
 
 
 @register("student-t-rts")
@@ -75,7 +77,9 @@ class StudentTRts(StudentTKf, smoother=StudentTSmoother):
         It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
     5
         As of ``student-t``.
+    6
+        Values that the IMU did not measure are replaced (`FlatLineTest`).
     """
 
-    version = 5
+    version = 6
     formerly = _FORMERLY

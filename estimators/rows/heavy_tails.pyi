@@ -13,7 +13,7 @@ _FORMERLY = {"dof": "adaptation__dof", "smoothed_dof": "smoother__dof"}
 
 @register("student-t")
 class StudentTKf(Row, solver=KalmanEstimator, model=Suitable, adaptation=StudentT, iteration=poor_heading):
-    version = 5
+    version = 6
     def __init__(
         self,
         *,
@@ -24,7 +24,7 @@ class StudentTKf(Row, solver=KalmanEstimator, model=Suitable, adaptation=Student
 
 @register("student-t-rts")
 class StudentTRts(StudentTKf, smoother=StudentTSmoother):
-    version = 5
+    version = 6
     formerly = _FORMERLY
     def __init__(
         self,

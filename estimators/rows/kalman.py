@@ -26,7 +26,14 @@ class Ekf(Row, solver=KalmanEstimator, model=InertialModel, iteration=poor_headi
     Every measurement is used, at its own time; no gating, no adaptation.
 
     Source: P. D. Groves, *Principles of GNSS, Inertial, and Multisensor Integrated Navigation Systems*, 2013.
+
+    Versions
+    --------
+    2
+        Values that the IMU did not measure are replaced (`FlatLineTest`).
     """
+
+    version = 2
 
 
 @register("ekf-23", aliases=("ekf-paper-003",))
@@ -35,7 +42,14 @@ class Ekf23(Row, solver=KalmanEstimator, model=DvlCalibrationModel, iteration=po
 
     Source: Z. Zhan, C. Liu, K. Jin et al., *GNSS/SINS/DVL integrated navigation algorithm based on adaptive
     differential Kalman filtering*, PLoS One 21(2), 2026.
+
+    Versions
+    --------
+    2
+        Values that the IMU did not measure are replaced (`FlatLineTest`).
     """
+
+    version = 2
 
 
 @register("ekf-9", aliases=("ekf-paper-000",))
@@ -47,7 +61,14 @@ class Ekf9(Row, solver=KalmanEstimator, model=NineStateModel, iteration=poor_hea
 
     Source: M. Guo, B. Wang, L. Wei et al., *Robust INS/GNSS/DVL integrated navigation for MASS based on
     gradient-adaptive factor graph optimization*, 2026.
+
+    Versions
+    --------
+    2
+        Values that the IMU did not measure are replaced (`FlatLineTest`).
     """
+
+    version = 2
 
 
 @register("iekf", aliases=("iterated-ekf",))
@@ -56,7 +77,14 @@ class IteratedEkf(Row, solver=KalmanEstimator, model=InertialModel, iteration=pi
 
     Source: B. M. Bell and F. W. Cathey, *The iterated Kalman filter update as a Gauss-Newton method*, IEEE TAC 38(2),
     1993.
+
+    Versions
+    --------
+    2
+        Values that the IMU did not measure are replaced (`FlatLineTest`).
     """
+
+    version = 2
 
 
 @register("inekf", aliases=("invariant-ekf",))
@@ -65,7 +93,14 @@ class InvariantEkf(Row, solver=InvariantKalmanEstimator, model=InertialModel):
 
     Source: A. Barrau and S. Bonnabel, *The invariant extended Kalman filter as a stable observer*, IEEE TAC 62(4),
     2017.
+
+    Versions
+    --------
+    2
+        Values that the IMU did not measure are replaced (`FlatLineTest`).
     """
+
+    version = 2
 
 
 @register("kf", aliases=("linear-kf",))
@@ -77,7 +112,14 @@ class Kf(Row, solver=LinearKalmanEstimator, model=InertialModel):
     that admits it (``python -m tests.audit silence``).
 
     Source: P. S. Maybeck, *Stochastic Models, Estimation, and Control*, vol. 1, 1979.
+
+    Versions
+    --------
+    2
+        Values that the IMU did not measure are replaced (`FlatLineTest`).
     """
+
+    version = 2
 
 
 @register("kf-9")
@@ -89,7 +131,14 @@ class Kf9(Row, solver=piece(LinearKalmanEstimator, defaults={"feedback": 1.0}), 
     instruments. Source: P. S. Maybeck, *Stochastic Models, Estimation, and Control*, vol. 1, 1979, section 6.3; the
     states are those of M. Guo, B. Wang, L. Wei et al., *Robust INS/GNSS/DVL integrated navigation for MASS based on
     gradient-adaptive factor graph optimization*, 2026.
+
+    Versions
+    --------
+    2
+        Values that the IMU did not measure are replaced (`FlatLineTest`).
     """
+
+    version = 2
 
 
 @register("kf-23", aliases=("kf-paper-003",))
@@ -102,7 +151,14 @@ class Kf23(Row, solver=LinearKalmanEstimator, model=DvlCalibrationModel):
 
     Source: Z. Zhan, C. Liu, K. Jin et al., *GNSS/SINS/DVL integrated navigation algorithm based on adaptive
     differential Kalman filtering*, PLoS One 21(2), 2026.
+
+    Versions
+    --------
+    2
+        Values that the IMU did not measure are replaced (`FlatLineTest`).
     """
+
+    version = 2
 
 
 @register("ship-ekf")
@@ -141,4 +197,11 @@ class PureInertial(Row, solver=KalmanEstimator, model=UnaidedModel):
     no measurement.
 
     Source: P. D. Groves, *Principles of GNSS, Inertial, and Multisensor Integrated Navigation Systems*, 2013.
+
+    Versions
+    --------
+    2
+        Values that the IMU did not measure are replaced (`FlatLineTest`).
     """
+
+    version = 2

@@ -20,6 +20,7 @@ __all__ += ["ShipEkf", "ShipEkfStanding"]
 
 @register("ekf", aliases=("eskf",))
 class Ekf(Row, solver=KalmanEstimator, model=InertialModel, iteration=poor_heading):
+    version = 2
     def __init__(
         self,
         *,
@@ -29,6 +30,7 @@ class Ekf(Row, solver=KalmanEstimator, model=InertialModel, iteration=poor_headi
 
 @register("ekf-23", aliases=("ekf-paper-003",))
 class Ekf23(Row, solver=KalmanEstimator, model=DvlCalibrationModel, iteration=poor_heading):
+    version = 2
     def __init__(
         self,
         *,
@@ -40,6 +42,7 @@ class Ekf23(Row, solver=KalmanEstimator, model=DvlCalibrationModel, iteration=po
 
 @register("ekf-9", aliases=("ekf-paper-000",))
 class Ekf9(Row, solver=KalmanEstimator, model=NineStateModel, iteration=poor_heading):
+    version = 2
     def __init__(
         self,
         *,
@@ -54,6 +57,7 @@ class Ekf9(Row, solver=KalmanEstimator, model=NineStateModel, iteration=poor_hea
 
 @register("iekf", aliases=("iterated-ekf",))
 class IteratedEkf(Row, solver=KalmanEstimator, model=InertialModel, iteration=piece(Iteration, above_deg=0.0)):
+    version = 2
     def __init__(
         self,
         *,
@@ -64,6 +68,7 @@ class IteratedEkf(Row, solver=KalmanEstimator, model=InertialModel, iteration=pi
 
 @register("inekf", aliases=("invariant-ekf",))
 class InvariantEkf(Row, solver=InvariantKalmanEstimator, model=InertialModel):
+    version = 2
     def __init__(
         self,
         *,
@@ -73,6 +78,7 @@ class InvariantEkf(Row, solver=InvariantKalmanEstimator, model=InertialModel):
 
 @register("kf", aliases=("linear-kf",))
 class Kf(Row, solver=LinearKalmanEstimator, model=InertialModel):
+    version = 2
     def __init__(
         self,
         *,
@@ -82,6 +88,7 @@ class Kf(Row, solver=LinearKalmanEstimator, model=InertialModel):
 
 @register("kf-9")
 class Kf9(Row, solver=piece(LinearKalmanEstimator, defaults={"feedback": 1.0}), model=NineStateModel):
+    version = 2
     def __init__(
         self,
         *,
@@ -96,6 +103,7 @@ class Kf9(Row, solver=piece(LinearKalmanEstimator, defaults={"feedback": 1.0}), 
 
 @register("kf-23", aliases=("kf-paper-003",))
 class Kf23(Row, solver=LinearKalmanEstimator, model=DvlCalibrationModel):
+    version = 2
     def __init__(
         self,
         *,
@@ -136,4 +144,5 @@ class GnssOnly(Row, solver=KalmanEstimator, model=KinematicModel):
 
 @register("inertial", aliases=("pure-inertial",))
 class PureInertial(Row, solver=KalmanEstimator, model=UnaidedModel):
+    version = 2
     def __init__(self) -> None: ...

@@ -39,9 +39,11 @@ class NetEkf(Row, solver=KalmanEstimator, model=Suitable, iteration=poor_heading
     3
         Innovations of a log that persist are taken as a wrong prediction, whatever its witnesses say, if they grew
         little by little: an instrument that begins to be wrong is wrong at once (`simnav.estimators.onset`).
+    4
+        Values that the IMU did not measure are replaced (`FlatLineTest`).
     """
 
-    version = 3
+    version = 4
 
 
 @register("net-fgo")
@@ -67,9 +69,11 @@ class NetFgo(
     2
         As version 4 of ``huber-fgo``.
         The network learned anew: before, its target counted a noise step twice.
+    3
+        Values that the IMU did not measure are replaced (`FlatLineTest`).
     """
 
-    version = 2
+    version = 3
 
 
 @register("beams-ekf")
@@ -92,7 +96,14 @@ class BeamsEkf(
     Source: ours (``estimators/training/velocity_network.py``), in the manner of N. Cohen and I. Klein, *BeamsNet: a
     data-driven approach enhancing Doppler velocity log measurements for autonomous underwater vehicle navigation*,
     Engineering Applications of Artificial Intelligence 114, 2022.
+
+    Versions
+    --------
+    2
+        Values that the IMU did not measure are replaced (`FlatLineTest`).
     """
+
+    version = 2
 
 
 @register("net-ekf-20000")
@@ -111,9 +122,11 @@ class NetEkf20000(NetEkf, adaptation=piece(LearnedNoise, budget=20_000)):
     --------
     2
         As of ``iae``.
+    3
+        Values that the IMU did not measure are replaced (`FlatLineTest`).
     """
 
-    version = 2
+    version = 3
 
 
 @register("net-fgo-20000")
@@ -126,9 +139,14 @@ class NetFgo20000(NetFgo, weighting=piece(LearnedWeights, budget=20_000)):
     (1.07). It does not notice that it is lost, as on ``wrong-start`` (2.1 times the error of ``ekf``).
 
     Source: as ``net-fgo``.
+
+    Versions
+    --------
+    2
+        Values that the IMU did not measure are replaced (`FlatLineTest`).
     """
 
-    version = 1
+    version = 2
 
 
 @register("beams-ekf-20000")
@@ -140,6 +158,11 @@ class BeamsEkf20000(BeamsEkf, velocity=piece(PredictedVelocity, budget=20_000)):
     of ``ekf``.
 
     Source: as ``beams-ekf``.
+
+    Versions
+    --------
+    2
+        Values that the IMU did not measure are replaced (`FlatLineTest`).
     """
 
-    version = 1
+    version = 2

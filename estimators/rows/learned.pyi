@@ -16,7 +16,7 @@ __all__ = ["BeamsEkf", "BeamsEkf20000", "NetEkf", "NetEkf20000", "NetFgo", "NetF
 
 @register("net-ekf")
 class NetEkf(Row, solver=KalmanEstimator, model=Suitable, iteration=poor_heading, adaptation=LearnedNoise):
-    version = 3
+    version = 4
     def __init__(
         self,
         *,
@@ -34,7 +34,7 @@ class NetFgo(
     weighting=LearnedWeights,
     isolation=FaultIsolation,
 ):
-    version = 2
+    version = 3
     def __init__(
         self,
         *,
@@ -58,6 +58,7 @@ class BeamsEkf(
     velocity=PredictedVelocity,
     iteration=poor_heading,
 ):
+    version = 2
     def __init__(
         self,
         *,
@@ -70,7 +71,7 @@ class BeamsEkf(
 
 @register("net-ekf-20000")
 class NetEkf20000(NetEkf, adaptation=piece(LearnedNoise, budget=20_000)):
-    version = 2
+    version = 3
     def __init__(
         self,
         *,
@@ -81,7 +82,7 @@ class NetEkf20000(NetEkf, adaptation=piece(LearnedNoise, budget=20_000)):
 
 @register("net-fgo-20000")
 class NetFgo20000(NetFgo, weighting=piece(LearnedWeights, budget=20_000)):
-    version = 1
+    version = 2
     def __init__(
         self,
         *,
@@ -98,7 +99,7 @@ class NetFgo20000(NetFgo, weighting=piece(LearnedWeights, budget=20_000)):
 
 @register("beams-ekf-20000")
 class BeamsEkf20000(BeamsEkf, velocity=piece(PredictedVelocity, budget=20_000)):
-    version = 1
+    version = 2
     def __init__(
         self,
         *,

@@ -24,7 +24,14 @@ class EkfLoose(Row, solver=KalmanEstimator, model=InertialModel, iteration=poor_
 
     Source: P. D. Groves, *Principles of GNSS, Inertial, and Multisensor Integrated Navigation Systems*, 2nd ed., 2013,
     section 14.1.2.
+
+    Versions
+    --------
+    2
+        Values that the IMU did not measure are replaced (`FlatLineTest`).
     """
+
+    version = 2
 
     loose = True
 
@@ -42,9 +49,11 @@ class GatedEkfLoose(Row, solver=KalmanEstimator, model=Suitable, adaptation=ChiS
         It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
     3
         As of ``iae``.
+    4
+        Values that the IMU did not measure are replaced (`FlatLineTest`).
     """
 
-    version = 3
+    version = 4
 
     loose = True
 
@@ -68,8 +77,10 @@ class GncFgoLoose(
         It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
     3
         As version 4 of ``huber-fgo``.
+    4
+        Values that the IMU did not measure are replaced (`FlatLineTest`).
     """
 
-    version = 3
+    version = 4
 
     loose = True

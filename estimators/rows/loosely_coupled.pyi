@@ -16,6 +16,7 @@ __all__ = ["EkfLoose", "GatedEkfLoose", "GncFgoLoose"]
 
 @register("ekf-loose")
 class EkfLoose(Row, solver=KalmanEstimator, model=InertialModel, iteration=poor_heading):
+    version = 2
     loose = True
     def __init__(
         self,
@@ -26,7 +27,7 @@ class EkfLoose(Row, solver=KalmanEstimator, model=InertialModel, iteration=poor_
 
 @register("gated-ekf-loose")
 class GatedEkfLoose(Row, solver=KalmanEstimator, model=Suitable, adaptation=ChiSquareGate, iteration=poor_heading):
-    version = 3
+    version = 4
     loose = True
     def __init__(
         self,
@@ -44,7 +45,7 @@ class GncFgoLoose(
     weighting=GraduatedNonConvexity,
     isolation=FaultIsolation,
 ):
-    version = 3
+    version = 4
     loose = True
     def __init__(
         self,

@@ -23,7 +23,14 @@ class HeadingBankEkf(Row, solver=HeadingBank, model=Suitable):
     With a heading known to 15 degrees or better it is the plain EKF. Source: D. T. Magill, *Optimal adaptive estimation
     of sampled stochastic processes*, IEEE TAC 10(4), 1965; H. W. Sorenson and D. L. Alspach, *Recursive Bayesian
     estimation using Gaussian sums*, Automatica 7(4), 1971.
+
+    Versions
+    --------
+    2
+        Values that the IMU did not measure are replaced (`FlatLineTest`).
     """
+
+    version = 2
 
 
 @register("solution-separation")
@@ -57,9 +64,11 @@ class SolutionSeparationEkf(Row, solver=SolutionSeparation, model=Suitable):
     4
         A fix that no other fix or log is heard beside has the IMU alone against it, which may as well be wrong. It is
         not left out as a gross error after a gap, or if the one before was improbable in about the same direction.
+    5
+        Values that the IMU did not measure are replaced (`FlatLineTest`).
     """
 
-    version = 4
+    version = 5
     advised_against = True
 
 
@@ -101,9 +110,11 @@ class MidValue(
         As version 4 of ``huber-fgo``.
     6
         As of ``vb-akf``.
+    7
+        Values that the IMU did not measure are replaced (`FlatLineTest`).
     """
 
-    version = 6
+    version = 7
 
 
 @register("mh-ekf")
@@ -113,10 +124,9 @@ class MultipleHypothesisEkf(Row, solver=MultipleHypothesis, model=DoubtedInstrum
     It says which instrument is wrong, since when and with which probability (diagnostics ``doubt.NAME`` and
     ``since.NAME``), and flags the measurements of one that is.
 
-    Gyroscopes that saturate are known by readings that repeat, but not where they do so from the start. Beside a
-    receiver alone a fix that is wrong for minutes cannot be told from a wrong IMU. With two
-    instruments wrong at once it may blame a third one, as ``training-voyages`` 51007 and 51021 show (a wrong fix, and a
-    DVL that reports zero).
+    Beside a receiver alone a fix that is wrong for minutes cannot be told from a wrong IMU. With two instruments wrong
+    at once it may blame a third one, as ``training-voyages`` 51007 and 51021 show (a wrong fix, and
+    a DVL that reports zero).
 
     Source: D. T. Magill, *Optimal adaptive estimation of sampled stochastic processes*, IEEE TAC 10(4), 1965; A. S.
     Willsky and H. L. Jones, *A generalized likelihood ratio approach to the detection and estimation of jumps in linear
@@ -128,6 +138,9 @@ class MultipleHypothesisEkf(Row, solver=MultipleHypothesis, model=DoubtedInstrum
         The evidence counts readings of one time of several channels (satellites, beams, points of a terrain), too.
     3
         A start whose heading is not known to 15 deg is a bank of headings.
+    4
+        Values that the IMU did not measure are replaced (`FlatLineTest`), so gyroscopes that saturate are no case of
+        their own.
     """
 
-    version = 3
+    version = 4

@@ -18,6 +18,7 @@ __all__ = ["HeadingBankEkf", "MidValue", "MultipleHypothesisEkf", "SolutionSepar
 
 @register("heading-bank")
 class HeadingBankEkf(Row, solver=HeadingBank, model=Suitable):
+    version = 2
     def __init__(
         self,
         *,
@@ -27,7 +28,7 @@ class HeadingBankEkf(Row, solver=HeadingBank, model=Suitable):
 
 @register("solution-separation")
 class SolutionSeparationEkf(Row, solver=SolutionSeparation, model=Suitable):
-    version = 4
+    version = 5
     advised_against = True
     def __init__(
         self,
@@ -50,7 +51,7 @@ class MidValue(
     isolation=FaultIsolation,
     iteration=poor_heading,
 ):
-    version = 6
+    version = 7
     def __init__(
         self,
         *,
@@ -76,7 +77,7 @@ class MidValue(
 
 @register("mh-ekf")
 class MultipleHypothesisEkf(Row, solver=MultipleHypothesis, model=DoubtedInstruments):
-    version = 3
+    version = 4
     def __init__(
         self,
         *,

@@ -32,9 +32,11 @@ class PolicyEkf(PolicyEstimator):
     --------
     2
         It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
+    3
+        Values that the IMU did not measure are replaced (`FlatLineTest`).
     """
 
-    version = 2
+    version = 3
 
     def __init__(self, file: str = ""):
         super().__init__(file or str(Path(__file__).parents[1] / "learning" / "policy_ekf.npz"))

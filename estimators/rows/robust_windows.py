@@ -51,9 +51,11 @@ class HuberFgo(_Robust, weighting=piece(TunedMEstimator, weight=huber)):
         Where the motion gets less weight, the states of vessel and IMU may change, but not the errors of instruments:
         a bias of the receiver explained fixes that contradicted a wrong motion. Fixes without a log are asked with a
         looser motion from test to test until they agree.
+    5
+        Values that the IMU did not measure are replaced (`FlatLineTest`).
     """
 
-    version = 4
+    version = 5
 
 
 @register("tukey-fgo")
@@ -76,9 +78,11 @@ class TukeyFgo(_Robust, weighting=piece(TunedMEstimator, weight=tukey)):
         As of ``huber-fgo``.
     4
         As of ``huber-fgo``.
+    5
+        Values that the IMU did not measure are replaced (`FlatLineTest`).
     """
 
-    version = 4
+    version = 5
 
 
 @register("cauchy-fgo")
@@ -98,9 +102,11 @@ class CauchyFgo(_Robust, weighting=piece(TunedMEstimator, weight=cauchy)):
         As of ``huber-fgo``.
     4
         As of ``huber-fgo``.
+    5
+        Values that the IMU did not measure are replaced (`FlatLineTest`).
     """
 
-    version = 4
+    version = 5
 
 
 @register("gm-fgo")
@@ -123,9 +129,11 @@ class GmFgo(_Robust, weighting=piece(TunedMEstimator, weight=geman_mcclure)):
         As of ``huber-fgo``.
     4
         As of ``huber-fgo``.
+    5
+        Values that the IMU did not measure are replaced (`FlatLineTest`).
     """
 
-    version = 4
+    version = 5
 
 
 @register("dcs-fgo")
@@ -149,9 +157,11 @@ class DcsFgo(_Robust, weighting=DynamicCovarianceScaling):
         As of ``huber-fgo``.
     4
         As of ``huber-fgo``.
+    5
+        Values that the IMU did not measure are replaced (`FlatLineTest`).
     """
 
-    version = 4
+    version = 5
 
 
 @register("switchable-fgo")
@@ -174,9 +184,11 @@ class SwitchableFgo(_Robust, weighting=SwitchableConstraints):
         As of ``huber-fgo``.
     4
         As of ``huber-fgo``.
+    5
+        Values that the IMU did not measure are replaced (`FlatLineTest`).
     """
 
-    version = 4
+    version = 5
 
 
 @register("gnc-fgo")
@@ -212,9 +224,11 @@ class GncFgo(
         The motion is suspected, too, where the weighting has rejected measurements, and where there is no log.
     6
         As version 4 of ``huber-fgo``.
+    7
+        Values that the IMU did not measure are replaced (`FlatLineTest`).
     """
 
-    version = 6
+    version = 7
 
 
 @register("max-mixture-fgo")
@@ -234,9 +248,11 @@ class MaxMixtureFgo(_Robust, weighting=MaxMixture):
         As of ``huber-fgo``.
     4
         As of ``huber-fgo``.
+    5
+        Values that the IMU did not measure are replaced (`FlatLineTest`).
     """
 
-    version = 4
+    version = 5
 
 
 @register("ga-fgo")
@@ -258,9 +274,11 @@ class GaFgo(_Window, weighting=piece(GradientAdaptive, fewest=5)):
         It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
     3
         Where the motion gets less weight, the states of vessel and IMU may change, but not the errors of instruments.
+    4
+        Values that the IMU did not measure are replaced (`FlatLineTest`).
     """
 
-    version = 3
+    version = 4
 
 
 @register("ga-fgo-paper")
@@ -274,6 +292,8 @@ class GaFgoPaper(SwFgoPaper, weighting=piece(GradientAdaptive, defaults={"preset
     --------
     2
         It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
+    3
+        Values that the IMU did not measure are replaced (`FlatLineTest`).
     """
 
-    version = 2
+    version = 3

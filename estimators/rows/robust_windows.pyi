@@ -44,7 +44,7 @@ class _Robust(_Window, isolation=FaultIsolation):
 
 @register("huber-fgo")
 class HuberFgo(_Robust, weighting=piece(TunedMEstimator, weight=huber)):
-    version = 4
+    version = 5
     def __init__(
         self,
         *,
@@ -61,7 +61,7 @@ class HuberFgo(_Robust, weighting=piece(TunedMEstimator, weight=huber)):
 
 @register("tukey-fgo")
 class TukeyFgo(_Robust, weighting=piece(TunedMEstimator, weight=tukey)):
-    version = 4
+    version = 5
     def __init__(
         self,
         *,
@@ -78,7 +78,7 @@ class TukeyFgo(_Robust, weighting=piece(TunedMEstimator, weight=tukey)):
 
 @register("cauchy-fgo")
 class CauchyFgo(_Robust, weighting=piece(TunedMEstimator, weight=cauchy)):
-    version = 4
+    version = 5
     def __init__(
         self,
         *,
@@ -95,7 +95,7 @@ class CauchyFgo(_Robust, weighting=piece(TunedMEstimator, weight=cauchy)):
 
 @register("gm-fgo")
 class GmFgo(_Robust, weighting=piece(TunedMEstimator, weight=geman_mcclure)):
-    version = 4
+    version = 5
     def __init__(
         self,
         *,
@@ -112,7 +112,7 @@ class GmFgo(_Robust, weighting=piece(TunedMEstimator, weight=geman_mcclure)):
 
 @register("dcs-fgo")
 class DcsFgo(_Robust, weighting=DynamicCovarianceScaling):
-    version = 4
+    version = 5
     def __init__(
         self,
         *,
@@ -130,7 +130,7 @@ class DcsFgo(_Robust, weighting=DynamicCovarianceScaling):
 
 @register("switchable-fgo")
 class SwitchableFgo(_Robust, weighting=SwitchableConstraints):
-    version = 4
+    version = 5
     def __init__(
         self,
         *,
@@ -151,7 +151,7 @@ class GncFgo(
     solver=piece(WindowEstimator, defaults={"tolerance": 0.05, "iterations": 15}, every_sample=False),
     weighting=GraduatedNonConvexity,
 ):
-    version = 6
+    version = 7
     def __init__(
         self,
         *,
@@ -170,7 +170,7 @@ class GncFgo(
 
 @register("max-mixture-fgo")
 class MaxMixtureFgo(_Robust, weighting=MaxMixture):
-    version = 4
+    version = 5
     def __init__(
         self,
         *,
@@ -187,7 +187,7 @@ class MaxMixtureFgo(_Robust, weighting=MaxMixture):
 
 @register("ga-fgo")
 class GaFgo(_Window, weighting=piece(GradientAdaptive, fewest=5)):
-    version = 3
+    version = 4
     def __init__(
         self,
         *,
@@ -204,7 +204,7 @@ class GaFgo(_Window, weighting=piece(GradientAdaptive, fewest=5)):
 
 @register("ga-fgo-paper")
 class GaFgoPaper(SwFgoPaper, weighting=piece(GradientAdaptive, defaults={"preset": "paper"}, fewest=5)):
-    version = 2
+    version = 3
     def __init__(
         self,
         *,

@@ -19,7 +19,14 @@ class Ukf(Row, solver=SigmaPointEstimator, model=InertialPoints):
     """Unscented Kalman filter on the manifold: the states of ``ekf``, moments by sigma points.
 
     Source: S. J. Julier and J. K. Uhlmann, *Unscented filtering and nonlinear estimation*, Proc. IEEE 92, 2004.
+
+    Versions
+    --------
+    2
+        Values that the IMU did not measure are replaced (`FlatLineTest`).
     """
+
+    version = 2
 
 
 @register("ukf-9")
@@ -29,7 +36,14 @@ class Ukf9(Row, solver=SigmaPointEstimator, model=NineStatePoints):
     The points and weights are those of ``ukf``, because the paper prints none. Like ``ekf-9`` it does not notice that
     its sigmas are too large for good instruments. Source: M. Guo, B. Wang, L. Wei et al.,
     *Robust INS/GNSS/DVL integrated navigation for MASS based on gradient-adaptive factor graph optimization*, 2026.
+
+    Versions
+    --------
+    2
+        Values that the IMU did not measure are replaced (`FlatLineTest`).
     """
+
+    version = 2
 
 
 @register("ckf")
@@ -40,7 +54,14 @@ class Ckf(Row, solver=_CUBATURE, model=InertialPoints):
     round the circle, and it finds the heading late. ``ukf`` has its points nearer and does not.
 
     Source: I. Arasaratnam and S. Haykin, *Cubature Kalman filters*, IEEE TAC 54, 2009.
+
+    Versions
+    --------
+    2
+        Values that the IMU did not measure are replaced (`FlatLineTest`).
     """
+
+    version = 2
 
 
 @register("ship-ukf")

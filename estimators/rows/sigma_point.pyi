@@ -13,6 +13,7 @@ _CUBATURE = piece(SigmaPointEstimator, alpha=1.0, beta=0.0, kappa=0.0)
 
 @register("ukf")
 class Ukf(Row, solver=SigmaPointEstimator, model=InertialPoints):
+    version = 2
     def __init__(
         self,
         *,
@@ -24,6 +25,7 @@ class Ukf(Row, solver=SigmaPointEstimator, model=InertialPoints):
 
 @register("ukf-9")
 class Ukf9(Row, solver=SigmaPointEstimator, model=NineStatePoints):
+    version = 2
     def __init__(
         self,
         *,
@@ -40,6 +42,7 @@ class Ukf9(Row, solver=SigmaPointEstimator, model=NineStatePoints):
 
 @register("ckf")
 class Ckf(Row, solver=_CUBATURE, model=InertialPoints):
+    version = 2
     def __init__(
         self,
         *,

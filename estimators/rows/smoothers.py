@@ -18,7 +18,14 @@ class EkfRts(Ekf, smoother=Smoother):
 
     Source: H. E. Rauch, F. Tung and C. T. Striebel, *Maximum likelihood estimates of linear dynamic systems*, AIAA
     Journal 3(8), 1965.
+
+    Versions
+    --------
+    2
+        Values that the IMU did not measure are replaced (`FlatLineTest`).
     """
+
+    version = 2
 
 
 @register("ekf-two-filter")
@@ -27,7 +34,14 @@ class EkfTwoFilter(Row, solver=KalmanEstimator, model=InertialModel, smoother=Tw
 
     Source: D. C. Fraser and J. E. Potter, *The optimum linear smoother as a combination of two optimum linear filters*,
     IEEE TAC 14(4), 1969; *Post-processing algorithm based on factor graph optimization for AUV integrated navigation*.
+
+    Versions
+    --------
+    2
+        Values that the IMU did not measure are replaced (`FlatLineTest`).
     """
+
+    version = 2
 
 
 @register("ship-ekf-rts")

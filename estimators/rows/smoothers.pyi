@@ -13,6 +13,7 @@ __all__ = ["EkfRts", "EkfTwoFilter", "ShipEkfRts"]
 
 @register("ekf-rts")
 class EkfRts(Ekf, smoother=Smoother):
+    version = 2
     def __init__(
         self,
         *,
@@ -22,6 +23,7 @@ class EkfRts(Ekf, smoother=Smoother):
 
 @register("ekf-two-filter")
 class EkfTwoFilter(Row, solver=KalmanEstimator, model=InertialModel, smoother=TwoFilterSmoother):
+    version = 2
     def __init__(
         self,
         *,

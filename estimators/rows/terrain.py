@@ -25,6 +25,8 @@ class TerrainPmf(Row, solver=TerrainPointMass, model=InertialModel):
     2
         The lattice is refined where it is coarser than the density. Over a nearly flat bottom the density came to stand
         on one node, and the filter ended with an error.
+    3
+        Values that the IMU did not measure are replaced (`FlatLineTest`).
     """
 
-    version = 2
+    version = 3

@@ -9,7 +9,7 @@ __all__ = ["TerrainPmf"]
 
 @register("terrain-pmf")
 class TerrainPmf(Row, solver=TerrainPointMass, model=InertialModel):
-    version = 2
+    version = 3
     def __init__(
         self,
         *,

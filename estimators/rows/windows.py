@@ -29,7 +29,14 @@ class SwFgo(Row, solver=_WINDOW, model=InertialModel):
     SW-FGO of M. Guo, B. Wang, L. Wei et al., *Robust INS/GNSS/DVL integrated navigation for MASS based on
     gradient-adaptive factor graph optimization*, 2026; the simplified graph of *Post-processing algorithm based on
     factor graph optimization for AUV integrated navigation*: a node per measurement, one equivalent IMU factor between.
+
+    Versions
+    --------
+    2
+        Values that the IMU did not measure are replaced (`FlatLineTest`).
     """
+
+    version = 2
 
 
 @register("fgo-unsimplified")
@@ -41,7 +48,14 @@ class FgoUnsimplified(
     The same estimate as ``sw-fgo`` at many times its cost, which is what it is for. A shorter window keeps that
     bearable: 5 epochs are 500 nodes and more. Source: *Post-processing algorithm based on factor graph optimization for
     AUV integrated navigation*.
+
+    Versions
+    --------
+    2
+        Values that the IMU did not measure are replaced (`FlatLineTest`).
     """
+
+    version = 2
 
     slow = True
 
@@ -51,7 +65,14 @@ class FgoFull(Row, solver=FullGraph, model=InertialModel):
     """The full graph: every step estimates the whole trajectory; after the run, the batch solution is its smoother.
 
     Source: F. Dellaert and M. Kaess, *Factor graphs for robot perception*, Foundations and Trends in Robotics 6, 2017.
+
+    Versions
+    --------
+    2
+        Values that the IMU did not measure are replaced (`FlatLineTest`).
     """
+
+    version = 2
 
 
 @register("iae-fgo")
@@ -79,9 +100,11 @@ class IaeFgo(Row, solver=_WINDOW, model=Suitable, adaptation=piece(InnovationBas
     5
         Innovations of a log that persist are taken as a wrong prediction, whatever its witnesses say, if they grew
         little by little: an instrument that begins to be wrong is wrong at once (`simnav.estimators.onset`).
+    6
+        Values that the IMU did not measure are replaced (`FlatLineTest`).
     """
 
-    version = 5
+    version = 6
 
 
 @register("iae-fgo-paper")
@@ -90,7 +113,14 @@ class IaeFgoPaper(Row, solver=_WINDOW, model=Suitable, adaptation=INNOVATIONS_AS
 
     Source: G. Mao, K. Wang, T. Fu, *Robust GNSS/INS integrated navigation algorithm based on adaptive factor graph
     optimization*, 2025, eqs. 16-20.
+
+    Versions
+    --------
+    2
+        Values that the IMU did not measure are replaced (`FlatLineTest`).
     """
+
+    version = 2
 
 
 @register("iae-fgo-fixed")
@@ -117,9 +147,11 @@ class IaeFgoFixed(Row, solver=_WINDOW, model=Suitable, adaptation=piece(FixedWin
         It is inconsistent, too, while fixes that it sets aside contradict it (`FixTest`).
     5
         As of ``iae``.
+    6
+        Values that the IMU did not measure are replaced (`FlatLineTest`).
     """
 
-    version = 5
+    version = 6
 
 
 @register("sw-fgo-paper")
@@ -133,7 +165,14 @@ class SwFgoPaper(
     See `simnav.estimators.models.nine_state` for what is settled of the print, and how. Source: M. Guo, B. Wang, L. Wei
     et al., *Robust INS/GNSS/DVL integrated navigation for MASS based on gradient-adaptive factor graph optimization*,
     2026.
+
+    Versions
+    --------
+    2
+        Values that the IMU did not measure are replaced (`FlatLineTest`).
     """
+
+    version = 2
 
 
 @register("ship-fgo")

@@ -19,6 +19,7 @@ _WINDOW = piece(WindowEstimator, every_sample=False)
 
 @register("sw-fgo", aliases=("fgo", "fgo-simplified"))
 class SwFgo(Row, solver=_WINDOW, model=InertialModel):
+    version = 2
     def __init__(
         self,
         *,
@@ -33,6 +34,7 @@ class SwFgo(Row, solver=_WINDOW, model=InertialModel):
 class FgoUnsimplified(
     Row, solver=piece(WindowEstimator, defaults={"window": 5}, every_sample=True), model=InertialModel
 ):
+    version = 2
     slow = True
     def __init__(
         self,
@@ -46,6 +48,7 @@ class FgoUnsimplified(
 
 @register("fgo-full")
 class FgoFull(Row, solver=FullGraph, model=InertialModel):
+    version = 2
     def __init__(
         self,
         *,
@@ -57,7 +60,7 @@ class FgoFull(Row, solver=FullGraph, model=InertialModel):
 
 @register("iae-fgo")
 class IaeFgo(Row, solver=_WINDOW, model=Suitable, adaptation=piece(InnovationBased, source="innovation")):
-    version = 5
+    version = 6
     def __init__(
         self,
         *,
@@ -81,6 +84,7 @@ class IaeFgo(Row, solver=_WINDOW, model=Suitable, adaptation=piece(InnovationBas
 
 @register("iae-fgo-paper")
 class IaeFgoPaper(Row, solver=_WINDOW, model=Suitable, adaptation=INNOVATIONS_AS_PRINTED):
+    version = 2
     def __init__(
         self,
         *,
@@ -104,7 +108,7 @@ class IaeFgoPaper(Row, solver=_WINDOW, model=Suitable, adaptation=INNOVATIONS_AS
 
 @register("iae-fgo-fixed")
 class IaeFgoFixed(Row, solver=_WINDOW, model=Suitable, adaptation=piece(FixedWindow, source="innovation")):
-    version = 5
+    version = 6
     def __init__(
         self,
         *,
@@ -128,6 +132,7 @@ class SwFgoPaper(
     solver=piece(WindowEstimator, defaults={"tolerance": 1e-6, "spacing": 0.2}, every_sample=False),
     model=NineStateModel,
 ):
+    version = 2
     def __init__(
         self,
         *,

@@ -77,7 +77,11 @@ def filter_steps(
     for step in range(arrivals.ends.size):
         until, a, b = arrivals.ends[step], first[step], first[step + 1]
         of_step = Samples(
-            samples.time[a:b], samples.interval[a:b], samples.angular_rate[a:b], samples.specific_force[a:b]
+            samples.time[a:b],
+            samples.interval[a:b],
+            samples.angular_rate[a:b],
+            samples.specific_force[a:b],
+            samples.unmeasured[a:b],
         )
         dynamics.next_sample[0] = 0
         count = admit(admitted, dynamics.aids.components, arrivals, step, since, readings)

@@ -27,7 +27,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from simnav.compiled import kernel
-from simnav.estimators.models.base import NO_SAMPLES
+from simnav.estimators.models.flat_lines import FlatLineTest
 from simnav.estimators.models.inertial_errors import TRIAD
 from simnav.estimators.models.propagation import (
     CLOCK,
@@ -56,8 +56,11 @@ INTEGRATION = 1e-12
 #: of velocity and position would be the same.
 HELD_PARTS, HELD_PART = 4, 0.1
 _EYE = np.eye(3)
-#: A piece of constant rate and force; held is 1 where there is no data, and the state is to be held.
-PIECE = structure(duration=float, rate=3, force=3, held=float)
+#: Noise densities of an IMU that measures, and of one without data.
+_MEASURED, _HELD = np.zeros(6), np.repeat(np.square([HELD_ATTITUDE, HELD_VELOCITY]), 3)
+#: A piece of constant rate and force; held is 1 where there is no data, and the state is to be held. Unmeasured is the
+#: noise density of each axis of the IMU that did not measure.
+PIECE = structure(duration=float, rate=3, force=3, held=float, unmeasured=6)
 
 
 @kernel
@@ -111,6 +114,8 @@ def imu_pieces(
         piece = pieces[count].view(PIECE)[0]
         count += 1
         piece.duration, piece.held = dt, 0.0
+        for axis in range(6):
+            piece.unmeasured[axis] = samples.unmeasured[i, axis] if i < samples.time.size else 0.0
         if covered.hold:
             piece.held = 1.0
             memory[:] = 0.0
@@ -141,11 +146,6 @@ def imu_pieces(
     return i, count
 
 
-def _own(values: Array) -> Array:
-    """A contiguous copy."""
-    return np.array(values, dtype=np.float64, order="C")
-
-
 class ImuNoise(NamedTuple):
     """(3, 3) covariance densities of the gyroscopes and of the accelerometers."""
 
@@ -166,6 +166,8 @@ class Preintegration:
         The local frame of the graph.
     time : float
         At which it begins [s].
+    flat_lines : FlatLineTest
+        Of the samples of the IMU.
 
     Attributes
     ----------
@@ -179,8 +181,9 @@ class Preintegration:
         Seconds without usable samples so far.
     """
 
-    def __init__(self, densities: Array, variance: Array, frame: TangentFrame, time: float):
+    def __init__(self, densities: Array, variance: Array, frame: TangentFrame, time: float, flat_lines: FlatLineTest):
         self._noise: Any = densities.view(IMU_NOISE)[0]
+        self._flat_lines = flat_lines
         self._frame = frame
         gyroscope, accelerometer = float(self._noise.gyroscope_walk), float(self._noise.accelerometer_walk)
         of_gyroscopes, of_accelerometers = (LEAST_WALK * float(variance[triad][0]) for triad in TRIAD)
@@ -205,13 +208,7 @@ class Preintegration:
     def load(self, imu: ImuSamples | None) -> None:
         """Take the IMU samples of the step that follows."""
         self._first = 0
-        self._samples: Samples
-        if imu is None or len(imu) == 0:
-            self._samples = NO_SAMPLES
-        else:
-            self._samples = Samples(
-                _own(imu.time), _own(imu.interval), _own(imu.angular_rate), _own(imu.specific_force)
-            )
+        self._samples = self._flat_lines.samples(imu)
 
     def begin(self, state: Any, bias: Any) -> None:
         """Start anew at a node."""
@@ -251,10 +248,15 @@ class Preintegration:
         )
         own = pieces[:count].view(PIECE)[:, 0]
         duration, held, force, rate = own["duration"], own["held"], own["force"], own["rate"]
-        integrate = self._measurements.integrateMeasurement
+        unmeasured: Array = own["unmeasured"]
+        replaced, integrate = np.any(unmeasured, axis=1).tolist(), self._measurements.integrateMeasurement
         for k, dt in enumerate(duration.tolist()):
             if held[k]:
                 self._hold(dt)
+            elif replaced[k]:
+                self._set_noise(unmeasured[k])
+                integrate(force[k], rate[k], dt)
+                self._set_noise(_MEASURED)
             else:
                 integrate(force[k], rate[k], dt)
             self._end = None
@@ -265,19 +267,23 @@ class Preintegration:
 
     def _hold(self, dt: float) -> None:
         """No data: attitude and velocity stay as they are, with noise to match."""
-        p, w, state = self._params, self._frame.rotation, self.predict()
+        w, state = self._frame.rotation, self.predict()
         back = state.pose().rotation().matrix().T
         place, speed = state.position(), state.velocity()
         force = 2.0 * np.cross(w, speed) + np.cross(w, np.cross(w, place)) - self._frame.gravity(place)
-        p.setGyroscopeCovariance(self._white.gyroscope + HELD_ATTITUDE**2 * _EYE)
-        p.setAccelerometerCovariance(self._white.accelerometer + HELD_VELOCITY**2 * _EYE)
+        self._set_noise(_HELD)
         force, rate = back @ force + self._hat[TRIAD.accelerometers], back @ w + self._hat[TRIAD.gyroscopes]
         parts = max(HELD_PARTS, ceil(dt / HELD_PART))
         for _ in range(parts):
             self._measurements.integrateMeasurement(force, rate, dt / parts)
-        p.setGyroscopeCovariance(self._white.gyroscope)
-        p.setAccelerometerCovariance(self._white.accelerometer)
+        self._set_noise(_MEASURED)
         self.held += dt
+
+    def _set_noise(self, unmeasured: Array) -> None:
+        """Set the noise densities of the IMU: white, and those of the axes that did not measure, gyroscopes first."""
+        gyroscope, accelerometer = (np.diag(unmeasured[triad]) for triad in TRIAD)
+        self._params.setGyroscopeCovariance(self._white.gyroscope + gyroscope)
+        self._params.setAccelerometerCovariance(self._white.accelerometer + accelerometer)
 
     def predict(self) -> Any:
         """The gtsam.NavState at the end."""

@@ -59,14 +59,11 @@ class Step(NamedTuple):
         The admitted measurements, in order of their times.
     until : float
         End of the step [s].
-    saturated : float
-        The largest rate at which a gyroscope saturates in it [rad/s]; 0 where none does.
     """
 
     imu: ImuSamples | None
     readings: Sequence[Measurement]
     until: float
-    saturated: float = 0.0
 
 
 class Evidence(NamedTuple):
@@ -144,8 +141,7 @@ class HypothesisFilter(ImmEstimator):
         """Take one step's measurements."""
         self.model.load(step.imu)
         self._clear()
-        with self.model.saturated(step.saturated):
-            self._advance(step.readings, step.until, [])
+        self._advance(step.readings, step.until, [])
 
     def note_last(self, report: StepReport) -> None:
         """Note the measurements of the last step in a report."""

@@ -31,11 +31,11 @@ from simnav.estimators.adaptations.noise import NoiseAdaptation
 from simnav.estimators.adaptations.noise_report import NoiseReport
 from simnav.estimators.algebra.joseph import joseph_update, project
 from simnav.estimators.composition import Solver
-from simnav.estimators.models.base import NO_SAMPLES, ErrorModel, Linearised
+from simnav.estimators.models.base import ErrorModel, Linearised
 from simnav.estimators.models.channels import owners, summary
 from simnav.estimators.models.coupling import by_source
 from simnav.estimators.models.filtering import Dynamics, ModelFunctions, Prediction, Readings, ReadingsOfSteps
-from simnav.estimators.models.propagation import Samples
+from simnav.estimators.models.propagation import NO_SAMPLES, Samples
 from simnav.estimators.models.stated_sigmas import with_stated_sigmas
 from simnav.estimators.models.suitable import ModelChoice
 from simnav.steps import Steps

@@ -18,11 +18,11 @@ jump of a log of many readings a second may be in the middle of a step, so its p
 case. All kinds begin when the leading filter has had larger innovations than its datasheets allow since the anchor. If
 the leading hypothesis doubts a group of instruments, one more says that they are well again from the anchor on: so a
 wrong decision is undone, too. While it doubts the IMU, no other instrument is doubted anew, because a wrong IMU
-predicts wrongly what any of them should measure. Nor is one while a gyroscope saturates, which its own readings say
-(`simnav.estimators.solvers.saturation`): all filters then expect a larger error of the gyroscopes. If it doubts other
-instruments and is surprised again, it is asked once whether the IMU was wrong instead, from the last anchor at which
-nothing was doubted. What is less probable than exp(-`LEAST`) times the leading one is dropped, as are the least
-probable of more than `filters`, and of more than `ALIKE` with the same doubts.
+predicts wrongly what any of them should measure. Nor is one while an axis of the IMU does not measure
+(`simnav.estimators.models.flat_lines`). If it doubts other instruments and is surprised again, it is asked once whether
+the IMU was wrong instead, from the last anchor at which nothing was doubted. What is less probable than exp(-`LEAST`)
+times the leading one is dropped, as are the least probable of more than `filters`, and of more than `ALIKE` with the
+same doubts.
 
 **Prior probabilities.** A fault of each kind begins once in `onset` seconds, or more rarely by the factor of the kind
 (`KINDS`), and lasts for `end` seconds, in the mean. At the start the position is wrong with the probability
@@ -64,7 +64,6 @@ from .heading_bank import first_of_each_heading, starts_by_heading
 from .hypotheses import uncertain_start
 from .hypothesis_filter import HypothesisFilter, Step, lone_fix
 from .kalman import KalmanEstimator
-from .saturation import Saturation
 from .state_difference import mean_of
 from .step_report import begun_report, end_report, labels_of
 
@@ -161,17 +160,19 @@ class _Period:
     """The steps since the anchor, what was taken off all weights, and the excess of the leading filter.
 
     The excess of a step is the sum of the normalised innovations squared beyond its expected value and `SURPRISED`
-    sigmas of it.
+    sigmas of it. In a period that is ``unmeasured``, an axis of the IMU does not measure.
     """
 
     def __init__(self, start: float) -> None:
         self.start, self.steps = start, list[Step]()
         self.excess: list[float] = []
+        self.unmeasured = False
         self.taken = self.nis = self.freedom = 0.0
 
     def add(self, step: Step, taken: float, lead: HypothesisFilter) -> None:
         """Add a step."""
         self.steps.append(step)
+        self.unmeasured |= bool(lead.model.samples.unmeasured.any())
         self.taken += taken
         self.nis += lead.nis
         self.freedom += lead.freedom
@@ -266,7 +267,6 @@ class MultipleHypothesis(Solver):
         self._next = start.time + self.period
         self._trusted = self._watch = start.time + TRUST
         self._admission = Admission(instruments, first.names)
-        self._saturation = Saturation(instruments.imu, self._trusted)
         self._labels = labels_of(first.names)
         self._report = begun_report(instruments, first.names, self._admission.record.skipped, None)
         self._row = np.empty(len(self._labels))
@@ -293,7 +293,7 @@ class MultipleHypothesis(Solver):
     def update(self, measurements: Measurements) -> Estimate:
         """Take one step's measurements, each at its own time."""
         admitted = self._admission.admit(measurements, self.best.model.time)
-        step = Step(measurements.imu, admitted, measurements.time, self._saturation.largest(measurements.imu))
+        step = Step(measurements.imu, admitted, measurements.time)
         for h in self._hypotheses:
             h.filter.advance(step)
             h.weight += h.filter.evidence if isfinite(h.filter.evidence) else -inf
@@ -360,7 +360,7 @@ class MultipleHypothesis(Solver):
         if watched:
             self._watch = time + WATCH
         known = anchor.kinds.values()
-        wrong = IMU in anchor.doubts or any(step.saturated for step in self._period.steps)
+        wrong = IMU in anchor.doubts or self._period.unmeasured
         for name, kind in self._kinds.items():
             if wrong and kind.doubt.group not in (IMU, ""):
                 continue  # what a wrong IMU predicts condemns no other instrument

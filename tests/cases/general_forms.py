@@ -42,7 +42,10 @@ class GeneralInertial(GeneralModel):
         return np.concatenate([imu.position, imu.velocity, imu.dcm.ravel(), imu.bias]), covariance
 
     def load(self, imu):
-        self._samples, self._first = Samples(imu.time, imu.interval, imu.angular_rate, imu.specific_force), 0
+        self._samples, self._first = (
+            Samples(imu.time, imu.interval, imu.angular_rate, imu.specific_force, np.zeros((len(imu.time), 6))),
+            0,
+        )
 
     def _moved(self, x, elapsed):
         state = x[:3].copy(), x[3:6].copy(), x[6:15].reshape(3, 3).copy(), x[15:].copy()

@@ -13,15 +13,15 @@ from scipy.stats import multivariate_normal
 from simnav.estimator import make
 from simnav.estimators.algebra.mixture import mixture_update
 from simnav.estimators.models.doubted_instruments import BiasDoubt, DoubtedInstruments
+from simnav.estimators.models.flat_lines import FlatLineTest
+from simnav.estimators.models.propagation import NO_SAMPLES, Samples
 from simnav.estimators.solvers.hypothesis_filter import lone_fix
 from simnav.estimators.solvers.multiple_hypothesis import KINDS
-from simnav.estimators.solvers.saturation import Saturation
 from simnav.scenario import Scenario
 from simnav.scoring import score
 from simnav.scoring.navigation_error import errors
 from simnav.source import record
 from simnav.trial import run_trial
-from simnav.types import ImuDatasheet, ImuSamples, TriadDatasheet
 from tests.audit import recommended
 
 SHORT = tomllib.loads((Path(__file__).parents[2] / "cases" / "short.toml").read_text(encoding="utf-8"))
@@ -229,6 +229,13 @@ def test_the_audit_says_which_promises_are_kept():
     assert said["mh-ekf: time of an update, times ekf"] == ("1.0", True)
 
 
+def _as_given(self, imu):
+    """The samples of a step, without the flat-line test."""
+    if imu is None:
+        return NO_SAMPLES
+    return Samples(imu.time, imu.interval, imu.angular_rate, imu.specific_force, np.zeros((len(imu), 6)))
+
+
 def test_saturated_gyroscopes_condemn_no_instrument(monkeypatch):
     sea = {"significant_height_m": 8.0, "peak_period_s": 11.0, "direction_deg": 70.0}
     fault = {"kind": "imu_clipping", "start_s": 40.0, "end_s": 90.0, "angular_rate_limit_deg_s": 0.8}
@@ -239,30 +246,10 @@ def test_saturated_gyroscopes_condemn_no_instrument(monkeypatch):
 
     trial = ran(recording)
     assert doubted(trial) < 0.1
-    monkeypatch.setattr(Saturation, "largest", lambda *_: 0.0)
-    blind = ran(recording)  # it does not know of readings that repeat
+    monkeypatch.setattr(FlatLineTest, "samples", _as_given)
+    blind = ran(recording)
     assert doubted(blind) > 0.9
     assert rms(trial, recording) < 0.5 * rms(blind, recording)
-
-
-def test_a_saturated_reading_is_told_from_a_quiet_and_from_a_coarse_one():
-    sheet = ImuDatasheet(50.0, TriadDatasheet(random_walk=1e-4, range=2.0), TriadDatasheet())
-
-    def samples(time, rate):
-        n = len(rate)
-        rates = np.array([[x, 0.0, 0.0] for x in rate])
-        return ImuSamples(time + 0.02 * np.arange(n), np.full(n, 0.02), rates, np.zeros((n, 3)))
-
-    found = Saturation(sheet, until=30.0)
-    assert found.largest(samples(31.0, [0.1, 0.2])) == 0.0
-    assert found.largest(samples(31.1, [0.2, 0.2])) == 0.2  # also across steps
-    assert found.largest(samples(31.2, [0.1, 0.1, 0.3])) == 0.0
-    assert found.largest(samples(31.3, [1e-4, 1e-4, 1e-4])) == 0.0
-    coarse = Saturation(sheet, until=30.0)
-    coarse.largest(samples(0.0, [0.2, 0.2, 0.2]))
-    assert coarse.largest(samples(31.0, [0.3, 0.3, 0.3])) == 0.0
-    assert coarse.largest(samples(32.0, [2.0])) == 2.0
-    assert Saturation(None, until=30.0).largest(None) == 0.0
 
 
 def test_a_rare_fix_with_the_imu_alone_beside_it_is_believed_like_the_imu():
