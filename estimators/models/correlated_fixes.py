@@ -84,7 +84,7 @@ class CorrelatedFixes(Suitable):
         Correlation time of the slow error, if the datasheet gives none [s].
     """
 
-    def __init__(self, slow: float = 1.0, slow_time: float = 120.0):
+    def __init__(self, slow: float = 0.5, slow_time: float = 120.0):
         if not 0.0 <= slow < np.inf:
             raise ValueError(f"slow = {slow:g}: it must be 0 or more, and finite")
         if not 0.0 < slow_time < np.inf:

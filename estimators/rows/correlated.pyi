@@ -10,11 +10,11 @@ __all__ = ["GaussMarkovEkf"]
 
 @register("gm-ekf", aliases=("gauss-markov-ekf",))
 class GaussMarkovEkf(Row, solver=KalmanEstimator, model=CorrelatedFixes, iteration=poor_heading):
-    version = 2
+    version = 3
     def __init__(
         self,
         *,
-        slow: float = 1.0,
+        slow: float = 0.5,
         slow_time: float = 120.0,
         iterate_above_deg: float | None = None,
     ) -> None: ...

@@ -48,7 +48,7 @@ def test_standard_has_the_same_seeds_for_all_rows_of_a_track():
     loose = {n for n in names() if getattr(find(n), "loose", False)}
     special = {"satellites": loose, "acoustic": loose, "cooperative": {"ekf-ci"}, "terrain": loose | {"terrain-pmf"}}
     with_chosen = {
-        "papers": 10, "long": 10, "coloured": 8, "robustness": 8, "satellites": 30, "acoustic": 8, "cooperative": 30,
+        "papers": 10, "long": 10, "coloured": 8, "robustness": 8, "satellites": 30, "acoustic": 30, "cooperative": 30,
         "terrain": 30,
     }  # fmt: skip
     slow = {"terrain-pmf"}  # the only row that matches soundings with the chart by itself
