@@ -43,14 +43,7 @@ RETURN_TIME, MEAN_TIME = 1.0, 60.0
 #: how long the axis has not measured [s], the share of samples that repeat the one before, the last measured value, and
 #: the mean.
 FLAT_LINE_MEMORY = structure(
-    samples=int,
-    last=AXES,
-    repetitions=AXES,
-    unmeasured_time=AXES,
-    share=AXES,
-    measured=AXES,
-    average=AXES,
-    variance=AXES,
+    samples=int, last=AXES, repetitions=AXES, unmeasured_time=AXES, share=AXES, measured=AXES, average=AXES
 )
 
 
@@ -137,7 +130,7 @@ class FlatLineTest:
         """The samples of a step; what the IMU did not measure is replaced."""
         if imu is None or len(imu) == 0:
             return NO_SAMPLES
-        interval, rate, force = ready(imu.interval), imu.angular_rate.copy(), imu.specific_force.copy()
+        interval, rate, force = ready(imu.interval), ready(imu.angular_rate).copy(), ready(imu.specific_force).copy()
         unmeasured = np.empty((len(imu), AXES))
         replace_flat_lines.unchecked(self.memory, self._tested, self._ranges, interval, rate, force, unmeasured)
         return Samples(ready(imu.time), interval, rate, force, unmeasured)
