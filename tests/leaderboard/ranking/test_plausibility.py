@@ -105,6 +105,7 @@ def test_the_board_says_what_is_known_of_seeds_and_references() -> None:
 
 def test_the_board_says_which_results_are_of_an_older_version(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(registered("ekf"), "version", 3)
+    monkeypatch.setattr(registered("ukf"), "version", 1)
     found = [replace(r, estimator_version=2) for r in runs("ekf", 1.0)] + runs("mine", 0.9) + runs("ukf", 1.1)
     track = rank(found).tracks[0]
     assert {r.estimator: r.superseded for r in track.rows if r.superseded} == {"ekf": "version 2; simnav has version 3"}

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from simnav.leaderboard.ranking.superseded import version_of
 from simnav.leaderboard.results import store
 from simnav.leaderboard.results.packing import write_packed
 from simnav.leaderboard.results.provenance import BENCHMARK, Provenance
@@ -46,6 +47,7 @@ def result(estimator: str, seed: int, series: bool = True) -> Result:
     made = Result(
         "clean-voyages-v1", seed, estimator, {}, False, "ok", "", {"horizontal_rmse": 1.5},
         {name: values.astype(np.float32) for name, values in found.items()}, provenance=Provenance(BENCHMARK),
+        estimator_version=version_of(estimator) or 1,
     )  # fmt: skip
     (addressed,) = declared([made])
     return addressed
