@@ -80,14 +80,15 @@ def replace_flat_lines(
     for k in range(interval.size):
         own.samples += 1
         nothing = force[k, 0] == 0.0 and force[k, 1] == 0.0 and force[k, 2] == 0.0
-        newest = 1.0 / min(own.samples, SHARE_SAMPLES)
+        newest, enough = 1.0 / min(own.samples, SHARE_SAMPLES), own.samples > FIRST_SAMPLES
+        weight = max(newest, min(1.0, interval[k] / MEAN_TIME))
         for axis in range(AXES):
             values, column = (rate, axis) if axis < 3 else (force, axis - 3)
             value = values[k, column]
             unmeasured[k, axis] = 0.0
             if not (tested[axis] and abs(value) < (LARGEST_RATE if axis < 3 else LARGEST_FORCE)):  # or it is NaN
                 continue
-            known = own.samples > FIRST_SAMPLES and share[axis] <= LARGEST_SHARE
+            known = enough and share[axis] <= LARGEST_SHARE
             repeats = own.samples > 1 and value == last[axis]
             last[axis] = value
             repetitions[axis] = repetitions[axis] + 1.0 if repeats else 0.0
@@ -103,7 +104,7 @@ def replace_flat_lines(
                 values[k, column] = average[axis] + away * exp(-missing[axis] / RETURN_TIME)
             else:
                 measured[axis] = value
-                average[axis] += max(newest, min(1.0, interval[k] / MEAN_TIME)) * (value - average[axis])
+                average[axis] += weight * (value - average[axis])
 
 
 class FlatLineTest:
