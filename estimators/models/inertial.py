@@ -171,7 +171,7 @@ class InertialModel(FlatStateModel):
     @property
     def flat_line_memory(self) -> Array:
         """What the flat-line test of the IMU remembers."""
-        return self._flat_lines.memory
+        return self.flat_lines.memory
 
     @property
     def time(self) -> float:
@@ -200,7 +200,7 @@ class InertialModel(FlatStateModel):
         self.instruments = instruments = with_lever_arms(instruments)
         self.transition, self.process_noise = np.empty((_NAV, _NAV)), np.empty((_NAV, _NAV))
         self.next_sample, self._since = np.zeros(1, np.int64), start.time
-        self._flat_lines = FlatLineTest(imu)
+        self.flat_lines = FlatLineTest(imu)
         self.load(None)
         self.blocks = StateBlocks(_MOTION)
         self._imu(imu)
@@ -350,7 +350,7 @@ class InertialModel(FlatStateModel):
     def load(self, imu: ImuSamples | None) -> None:
         """Take the IMU samples of the step that follows."""
         self.next_sample[0] = 0
-        self.samples = self._flat_lines.samples(imu)
+        self.samples = self.flat_lines.samples(imu)
 
     def propagate(self, covariance: Array, until: float) -> None:
         """Advance the state and its covariance through the samples loaded."""

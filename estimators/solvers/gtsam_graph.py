@@ -24,7 +24,6 @@ import numpy as np
 from simnav.compiled import kernel
 from simnav.estimators.models.base import Linearised
 from simnav.estimators.models.filtering import NOWHERE, Aid
-from simnav.estimators.models.flat_lines import FlatLineTest
 from simnav.estimators.models.inertial import InertialModel
 from simnav.estimators.models.inertial_errors import ERROR, PART, TRIAD
 from simnav.estimators.models.measurements import (
@@ -173,9 +172,8 @@ class InertialGraph:
         turn = frame.turn(start.position)
         state = gtsam.NavState(gtsam.Rot3(turn @ self.model.dcm), frame.local(start.position), turn @ start.velocity)
         bias = gtsam.imuBias.ConstantBias()
-        assert instruments.imu is not None
-        variance, flat_lines = np.diag(covariance)[ERROR.gyroscope_bias :], FlatLineTest(instruments.imu)
-        self.motion = Preintegration(self.model._noise, variance, frame, start.time, flat_lines)
+        variance = np.diag(covariance)[ERROR.gyroscope_bias :]
+        self.motion = Preintegration(self.model._noise, variance, frame, start.time, self.model.flat_lines)
         self.motion.begin(state, bias)
         self.node, self._rate = 0, np.zeros(3)
         self._aid = {name: (aid.code, np.array(aid.lever_arm)) for name, aid in self.model.aid_parameters.items()}

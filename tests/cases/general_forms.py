@@ -17,7 +17,6 @@ from simnav.estimators.models.propagation import (
     BLOCK_NUMBERS,
     CLOCK,
     Motion,
-    Samples,
     accumulate_error,
     advance_inertial,
     correct_inertial,
@@ -27,6 +26,7 @@ from simnav.geometry.earth import displace, earth_rate, relative_position
 from simnav.geometry.rotation import rotation_vector_from_dcm, wrap_angle
 from simnav.kinds import NavigationPoint
 from simnav.types import Estimate, Instruments
+from tests.cases.samples_as_given import as_given
 
 __all__ = ["GeneralInertial", "GeneralShip"]
 
@@ -42,10 +42,7 @@ class GeneralInertial(GeneralModel):
         return np.concatenate([imu.position, imu.velocity, imu.dcm.ravel(), imu.bias]), covariance
 
     def load(self, imu):
-        self._samples, self._first = (
-            Samples(imu.time, imu.interval, imu.angular_rate, imu.specific_force, np.zeros((len(imu.time), 6))),
-            0,
-        )
+        self._samples, self._first = as_given(imu), 0
 
     def _moved(self, x, elapsed):
         state = x[:3].copy(), x[3:6].copy(), x[6:15].reshape(3, 3).copy(), x[15:].copy()

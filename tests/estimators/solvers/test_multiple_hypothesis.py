@@ -14,7 +14,6 @@ from simnav.estimator import make
 from simnav.estimators.algebra.mixture import mixture_update
 from simnav.estimators.models.doubted_instruments import BiasDoubt, DoubtedInstruments
 from simnav.estimators.models.flat_lines import FlatLineTest
-from simnav.estimators.models.propagation import NO_SAMPLES, Samples
 from simnav.estimators.solvers.hypothesis_filter import lone_fix
 from simnav.estimators.solvers.multiple_hypothesis import KINDS
 from simnav.scenario import Scenario
@@ -23,6 +22,7 @@ from simnav.scoring.navigation_error import errors
 from simnav.source import record
 from simnav.trial import run_trial
 from tests.audit import recommended
+from tests.cases.samples_as_given import as_given
 
 SHORT = tomllib.loads((Path(__file__).parents[2] / "cases" / "short.toml").read_text(encoding="utf-8"))
 
@@ -229,13 +229,6 @@ def test_the_audit_says_which_promises_are_kept():
     assert said["mh-ekf: time of an update, times ekf"] == ("1.0", True)
 
 
-def _as_given(self, imu):
-    """The samples of a step, without the flat-line test."""
-    if imu is None:
-        return NO_SAMPLES
-    return Samples(imu.time, imu.interval, imu.angular_rate, imu.specific_force, np.zeros((len(imu), 6)))
-
-
 def test_saturated_gyroscopes_condemn_no_instrument(monkeypatch):
     sea = {"significant_height_m": 8.0, "peak_period_s": 11.0, "direction_deg": 70.0}
     fault = {"kind": "imu_clipping", "start_s": 40.0, "end_s": 90.0, "angular_rate_limit_deg_s": 0.8}
@@ -246,7 +239,7 @@ def test_saturated_gyroscopes_condemn_no_instrument(monkeypatch):
 
     trial = ran(recording)
     assert doubted(trial) < 0.1
-    monkeypatch.setattr(FlatLineTest, "samples", _as_given)
+    monkeypatch.setattr(FlatLineTest, "samples", staticmethod(as_given))
     blind = ran(recording)
     assert doubted(blind) > 0.9
     assert rms(trial, recording) < 0.5 * rms(blind, recording)
