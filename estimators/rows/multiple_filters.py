@@ -141,6 +141,8 @@ class MultipleHypothesisEkf(Row, solver=MultipleHypothesis, model=DoubtedInstrum
     4
         Values that the IMU did not measure are replaced (`FlatLineTest`), so gyroscopes that saturate are no case of
         their own.
+    5
+        That the biases of the IMU drift is a hypothesis, begun every 20 s in any case, like those on fixes.
     """
 
-    version = 4
+    version = 5

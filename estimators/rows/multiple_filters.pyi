@@ -77,7 +77,7 @@ class MidValue(
 
 @register("mh-ekf")
 class MultipleHypothesisEkf(Row, solver=MultipleHypothesis, model=DoubtedInstruments):
-    version = 4
+    version = 5
     def __init__(
         self,
         *,

@@ -14,15 +14,15 @@ the anchor, with the measurements since then once more, so that it was not led a
 Its onset is at the first step since the anchor at which the leading filter was surprised, otherwise at the anchor. A
 jump of a log of many readings a second may be in the middle of a step, so its process jumps in the next step, too.
 
-**What is begun when.** Slow errors of fixes surprise nobody, so hypotheses on fixes begin every `WATCH` seconds in any
-case. All kinds begin when the leading filter has had larger innovations than its datasheets allow since the anchor. If
-the leading hypothesis doubts a group of instruments, one more says that they are well again from the anchor on: so a
-wrong decision is undone, too. While it doubts the IMU, no other instrument is doubted anew, because a wrong IMU
-predicts wrongly what any of them should measure. Nor is one while an axis of the IMU does not measure
-(`simnav.estimators.models.flat_lines`). If it doubts other instruments and is surprised again, it is asked once whether
-the IMU was wrong instead, from the last anchor at which nothing was doubted. What is less probable than exp(-`LEAST`)
-times the leading one is dropped, as are the least probable of more than `filters`, and of more than `ALIKE` with the
-same doubts.
+**What is begun when.** Slow errors of fixes, and of the biases of an IMU that warms up, surprise nobody. So hypotheses
+on fixes, and one that the biases of the IMU drift, begin every `WATCH` seconds in any case. All kinds begin when the
+leading filter has had larger innovations than its datasheets allow since the anchor. If the leading hypothesis doubts a
+group of instruments, one more says that they are well again from the anchor on: so a wrong decision is undone, too.
+While it doubts the IMU, no other instrument is doubted anew, because a wrong IMU predicts wrongly what any of them
+should measure. Nor is one while an axis of the IMU does not measure (`simnav.estimators.models.flat_lines`). If it
+doubts other instruments and is surprised again, it is asked once whether the IMU was wrong instead, from the last
+anchor at which nothing was doubted. What is less probable than exp(-`LEAST`) times the leading one is dropped, as are
+the least probable of more than `filters`, and of more than `ALIKE` with the same doubts.
 
 **Prior probabilities.** A fault of each kind begins once in `onset` seconds, or more rarely by the factor of the kind
 (`KINDS`), and lasts for `end` seconds, in the mean. At the start the position is wrong with the probability
@@ -94,6 +94,9 @@ KINDS: Mapping[str, Kind] = {
     "jumping fixes": Kind(BiasDoubt("fix", sigma=15.0, time=40.0, jump=15.0), watched=True),
     "log": Kind(BiasDoubt("log", sigma=0.5, time=1000.0, jump=1.0)),
     "compass": Kind(BiasDoubt("compass", sigma=radians(5.0), time=60.0, jump=radians(5.0)), rare=2.0),
+    "imu drift": Kind(
+        ImuDoubt(rate_jump=radians(0.03), force_jump=0.03, rate=radians(0.01), force=0.01, walk=0.02), watched=True
+    ),
     "imu bias": Kind(ImuDoubt(rate_jump=radians(0.3), force_jump=0.5), rare=5.0),
     "imu": Kind(ImuDoubt(rate_jump=radians(0.3), force_jump=0.1, rate=radians(0.3), force=0.1), rare=10.0),
     "imu far off": Kind(ImuDoubt(rate_jump=radians(3.0), force_jump=1.0, rate=radians(3.0), force=1.0), rare=10.0),
