@@ -272,6 +272,8 @@ def twin(request: TwinRequest) -> Twin:
     target = absolute(request.output or f"{scenario.name}-twin.toml")
     if target.suffix != ".toml":
         raise RequestError(f"output = {request.output}: the file should end in .toml")
+    if not target.parent.is_dir():
+        raise RequestError(f"output = {request.output}: there is no folder {target.parent}")
     with mistakes(ValueError, OSError):
         drawn = scenario.drawn(seed)
         recording = record(drawn.model_copy(update={"faults": ()}), seed)

@@ -8,7 +8,7 @@ from simnav.leaderboard.results.errors import RequestError
 
 from .commands import IdentifyCommand
 from .console import Output
-from .options import absolute, require_figure
+from .options import absolute, require_figure, require_folder
 
 __all__ = ["show"]
 
@@ -18,6 +18,8 @@ def show(out: Output, request: IdentifyCommand) -> None:
     require_figure("--plot", request.plot)
     if request.output is not None and request.output.suffix != ".toml":
         raise RequestError(f"--output {request.output}: the file should end in .toml")
+    require_folder("--output", request.output)
+    require_folder("--plot", request.plot)
     found = identify.of(request)
     out.document(found.to_dict())
     out.print(*found.shown(), *(f"- {remark}" for remark in found.remarks), "", found.toml)

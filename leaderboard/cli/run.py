@@ -13,7 +13,7 @@ from simnav.scoring.ending import ending
 
 from .commands import RunCommand
 from .console import FAILED, USER, Output
-from .options import absolute, require_figure
+from .options import absolute, require_figure, require_folder
 
 __all__ = ["show"]
 
@@ -30,8 +30,7 @@ def show(out: Output, request: RunCommand) -> None:
     if request.animate is not None and request.animate.suffix.lower() != ".gif":
         raise RequestError(f"--animate {request.animate}: the file should end in .gif")
     for option, path in (*figures, ("--animate", request.animate)):
-        if path is not None and not absolute(path).parent.is_dir():
-            raise RequestError(f"{option} {path}: there is no folder {path.parent}")
+        require_folder(option, path)
     chosen = scenario_of(request.scenario)
     with out.progress(f"{chosen.id}, seed {request.seed}") as progress:
         report = run.of(replace(request, scenario=chosen, progress=progress))

@@ -41,6 +41,12 @@ def remarks(scenario: Scenario, fitted: Fitted, found: Sequence[Estimated]) -> l
     for key, parts in constants.items():
         which = f" ({', '.join(parts)})" if all(parts) else ""
         said.append(f"{key}{which}: the motion of this log does not tell it, so the scenario's figure stays")
+    said += [
+        f"{e.label}: its interval, {e.low:.3g} to {e.high:.3g}, does not contain the scenario's {e.now:.3g}, but the "
+        "motion does not tell it well enough to correct it; 'simnav log align' compares it with the reference"
+        for e in found
+        if not e.told and e.constant and e.key.endswith("lever_arm_m") and not e.low <= e.now <= e.high
+    ]
     said += [f"{a} and {b} cannot be told apart (correlation {r:+.2f})" for a, b, r in _alike(fitted)]
     for name, sheet in fitted.maximum.assumed.instruments.items():
         if sheet.bias_instability.any():

@@ -26,10 +26,11 @@ from simnav.kinds import BODY_VELOCITY, WATER_SPEED
 from simnav.leaderboard.realism.features import on_grid
 from simnav.leaderboard.realism.fit import fitted_apart
 from simnav.recording import Recording
-from simnav.scenario import Scenario
+from simnav.scenario import Scenario, load
 from simnav.scenario.residuals import ErrorSeries, residuals
 from simnav.scenario.writing import toml_text
 from simnav.sensors import AidSpec
+from simnav.source import open_source
 from simnav.spec import SpecError
 from simnav.trial import run_trial
 from simnav.types import Array
@@ -42,6 +43,8 @@ __all__ = ["Twin", "twin_of"]
 
 #: Fewer poses are no track, and from so many recordings on sizes are drawn between theirs.
 _LEAST, _SEVERAL = 8, 3
+#: How far the simulated vessel may be from the track [m]: the first with which the motion can be simulated is taken.
+_DEPARTURES = (0.0, 0.01, 0.03, 0.1, 0.3, 1.0)
 #: Readings are lost where at least this share is missing.
 _LOST = 0.02
 #: What a vessel on the track may do [m/s], [m/s^2], [deg/s]; the motion was real.
@@ -73,15 +76,31 @@ class Twin:
     files: tuple[Path, ...] = ()
 
     def save(self, path: Path) -> Twin:
-        """Write the scenario, and the track beside it; the twin with its files."""
+        """Write the scenario, and the track beside it; the twin with its files.
+
+        Without an IMU, or with a slow one, the truth may have too few samples a second for a vessel in waves. Then the
+        vessel departs from the track, by some centimetres.
+
+        Raises
+        ------
+        SpecError
+            If the scenario cannot be simulated.
+        """
         track = path.with_suffix(".csv")
         rows = [
             ",".join(("time_s", "latitude_deg", "longitude_deg", "height_m", "roll_deg", "pitch_deg", "heading_deg"))
         ]
         rows += [f"{t:.6f},{a:.10f},{b:.10f},{h:.5f},{r:.6f},{p:.6f},{y:.6f}" for t, a, b, h, r, p, y in self.track]
         track.write_text("\n".join(rows) + "\n", encoding="utf-8")
-        vessel = {**self.table["vessel"], "file": track.name}
-        path.write_text(toml_text({**self.table, "vessel": vessel}), encoding="utf-8")
+        for departure in _DEPARTURES:
+            vessel = {**self.table["vessel"], "file": track.name, **({"departure_m": departure} if departure else {})}
+            path.write_text(toml_text({**self.table, "vessel": vessel}), encoding="utf-8")
+            try:
+                open_source(load(path), 0)
+                break
+            except SpecError:
+                if departure == _DEPARTURES[-1]:
+                    raise
         return replace(self, files=(path, track))
 
 

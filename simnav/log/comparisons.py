@@ -138,9 +138,7 @@ class Streams:
         return np.full((len(time), 3), np.nan) if track is None else track.known(time + self.late)
 
     def _once(self, what: str, time: Array, found: Callable[[], Array], span: float = 0.0) -> Array:
-        if not len(time):
-            return found()
-        key = (what, span, self.late, len(time), float(time[0]), float(time[-1]))
+        key = (what, span, self.late, time.tobytes())
         if key not in self.known:
             self.known[key] = found()
             self.known[key].flags.writeable = False

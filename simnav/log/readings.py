@@ -94,11 +94,11 @@ class ProbableReading:
     log_ratio : float
         Logarithm of its likelihood over that of the reading as it is.
     probability : float
-        Of this reading, among all readings of the stream that were tried.
+        Of this reading and those that are alike, among all readings of the stream that were tried.
     present : float
         The probability of the reading as it is.
-    alike : int
-        How many other readings are as likely, because the motion does not tell them apart.
+    alike : tuple of str
+        The other readings that are as likely, because the motion does not tell them apart: what they are, in words.
     """
 
     stream: str
@@ -107,7 +107,7 @@ class ProbableReading:
     log_ratio: float
     probability: float
     present: float
-    alike: int = 0
+    alike: tuple[str, ...] = ()
 
     @property
     def shown(self) -> str:
@@ -118,11 +118,12 @@ class ProbableReading:
         """As text, with the line to write."""
         lines = "; ".join(f"{key} = {value} of [{table}]" for table, key, value in self.changes)
         right = f"write {lines}" if lines else f"take [log.instruments.{self.stream}] out, or name another column"
-        alike = f" ({self.alike} others fit as well, the motion does not tell them apart)" if self.alike else ""
-        return (
-            f"{self.what}: the other streams say so with probability {self.shown}{alike}; "
-            f"as it is read now it has {self.present:.1g}; {right}"
-        )
+        told = f"{self.what}: the other streams say so"
+        if self.alike:
+            first, more = self.alike[0], len(self.alike) - 1
+            told = f"{self.what}, or {first}" + (f", or one of {more} others" if more else "")
+            told += ": the motion does not tell them apart, and the other streams say so"
+        return f"{told} with probability {self.shown}; as it is read now it has {self.present:.1g}; {right}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -290,15 +291,17 @@ def _told(stream: str, tried: list[_Tried]) -> tuple[Reading, ProbableReading] |
     best = min(alike, key=lambda t: (t.reading.number, -t.ratio))
     reading = best.reading
     # The delay next to the best one is another figure of the same reading.
-    others = [t for t in alike if t.reading.number == reading.number and not (reading.delay and t.reading.delay)]
+    one_delay = [t is best or t.reading.delay * reading.delay > 0.0 for t in smaller]
+    others = sorted((t for t, same in zip(smaller, one_delay, strict=True) if t in alike and not same),
+                    key=lambda t: (t.reading.number, -t.ratio))  # fmt: skip
     delays = len({t.reading.delay for t in tried}) - 1  # all together are one reading
     prior = np.array([(1.0 / delays if t.reading.delay else 1.0) * _TWO ** (t.reading.mistakes - 1) for t in smaller])
     weight = prior * np.exp(np.array([t.ratio for t in smaller]) - top) / len(tried)
-    same = np.array([t is best or t.reading.delay * reading.delay > 0.0 for t in smaller])
+    same = np.array(one_delay) | np.array([t in others for t in smaller])
     own, total = float(weight[same].sum()), float(weight.sum() + np.exp(-top))
     changes = tuple((table, key, json.dumps(value)) for table, key, value in reading.changes)
     return reading, ProbableReading(stream, changes, reading.what, best.ratio, own / total,
-                                    float(np.exp(-top)) / total, max(0, len(others) - 1))  # fmt: skip
+                                    float(np.exp(-top)) / total, tuple(t.reading.what for t in others))  # fmt: skip
 
 
 def _readings(log: RecordedSpec, s: Streams) -> Iterator[Reading]:

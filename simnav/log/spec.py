@@ -365,6 +365,16 @@ class RecordedSpec(_Grown):
     begin: Literal["first", "moving"] = "first"
     rows_by_seed: bool = False
 
+    @model_validator(mode="before")
+    @classmethod
+    def _needs_a_reference(cls, table: Any) -> Any:
+        if isinstance(table, Mapping) and "reference" not in table:
+            raise ValueError(
+                "[log.reference.position] is missing; a log without a reference has a part of its fixes there: their "
+                "file, columns and units, and hold_out = 10, as 'simnav log inspect' writes them"
+            )
+        return table
+
     @model_validator(mode="after")
     def _check(self) -> Self:
         reference = self.reference

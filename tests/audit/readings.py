@@ -3,7 +3,8 @@
 Simulated logs whose instruments have other errors than their datasheets say (`tests.identification.coverage`), and
 voyages of the catalogue, are written as files and drafted by names and sizes, as 'simnav log inspect' does. The DVL of
 the first is late by a fraction of a second, which is between the delays that are compared (0 and 0.5 s): to say 0.5 s
-is no error there if it is late by `LATE` or more. Hours of a ship have no file of the truth.
+is no error there if it is late by `LATE` or more. Ships without an IMU have faults, too; hours of one have no file of
+the truth.
 """
 
 from __future__ import annotations
@@ -33,6 +34,8 @@ LOGS, PARTS = 20, 10
 LATE = 0.2
 #: Voyages of the catalogue, and so much of each [s].
 NAMES, LENGTH = ("coastal-voyage", "auv-survey", "gnss-outage", "harbour-multipath", "ship-straight"), 240.0
+#: Voyages of ships without an IMU, whole and with their faults.
+WHOLE = ("fishing-vessel", "ship-dead-reckoning", "ferry-in-the-wind", "fluxgate-deviation", "coaster-compass")
 
 
 def readings_of(seed: int) -> list[str]:
@@ -67,6 +70,12 @@ def _hours_without_truth() -> list[str]:
             for text in _told(record(scenario, k), False)]  # fmt: skip
 
 
+def _whole_voyages() -> list[str]:
+    """Twenty of `WHOLE`, in turn."""
+    return [f"{name}, seed {k}: {text}" for k in range(9100, 9100 + LOGS)
+            for name in [WHOLE[k % len(WHOLE)]] for text in _told(record(load(name), k), True)]  # fmt: skip
+
+
 def _part(number: int) -> list[str]:
     return [text for k in range(LOGS) for text in readings_of(LOGS * number + k)]
 
@@ -76,6 +85,7 @@ def parts() -> Mapping[str, Callable[[], Any]]:
     found: dict[str, Callable[[], Any]] = {
         f"logs {LOGS * k} to {LOGS * (k + 1) - 1}": partial(_part, k) for k in range(PARTS)
     }
+    found["ships without an IMU"] = _whole_voyages
     return found | {"hours of a ship without a truth": _hours_without_truth}
 
 

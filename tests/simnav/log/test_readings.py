@@ -17,12 +17,14 @@ from simnav.leaderboard.logs import align, inspect_log
 from simnav.leaderboard.results.formats import write
 from simnav.log.alignment import align as align_log
 from simnav.log.check import check_log
+from simnav.log.hypotheses import Reading
 from simnav.log.inspection import inspect_log as inspect_files
 from simnav.log.likelihood import Residual, effective_samples, fit, log_ratios
-from simnav.log.readings import probable_readings
+from simnav.log.readings import _read, _Tried, probable_readings
+from simnav.log.readings import _told as _of_stream
 from simnav.scenario import load, parse
 from simnav.source import record
-from tests.audit.readings import readings_of
+from tests.audit.readings import _told, readings_of
 from tests.cases.manoeuvring_log import SCENARIO, make_log
 
 DATA = Path(os.environ.get("SIMNAV_DATA") or Path(__file__).parents[4] / "shared" / "data")
@@ -203,6 +205,32 @@ def test_a_speed_log_in_knots_is_no_current_of_seven_metres_a_second(ship):
     (ship / "other.csv").unlink()
     (found,) = drafted(inspect_files([ship])[0], "ship", "ship.toml").readings
     assert found.changes == (("log.instruments.speed_log", "units", '"kn"'),)
+
+
+def test_streams_at_other_times_between_the_same_ends_are_not_taken_for_each_other(log):
+    """A receiver with an outage has as many readings compared as a compass, over the same time."""
+    scenario = parse(SCENARIO)
+    streams = _read(scenario, scenario.log, "", ())
+    even = np.linspace(2.0, 60.0, 200)
+    uneven = 2.0 + 58.0 * np.linspace(0.0, 1.0, 200) ** 2
+    asked = streams.attitudes(even), streams.attitudes(uneven)
+    fresh = replace(streams)
+    assert np.array_equal(fresh.attitudes(uneven), asked[1])
+    assert not np.array_equal(asked[0], asked[1])
+
+
+def test_a_right_log_of_a_fishing_vessel(tmp_path):
+    """Without an IMU; readings of roll and pitch tie there."""
+    assert _told(record(load("fishing-vessel"), 9100), True) == []
+
+
+def test_readings_that_the_motion_does_not_tell_apart_are_named_together():
+    tried = [_Tried(Reading("dvl", ("dvl",), lambda s: s, k, f"reading {k}", (("t", "k", k),)), ratio, -3.0, 0.0)
+             for k, ratio in ((1, 40.0), (2, 40.2), (3, 20.0))]  # fmt: skip
+    _, told = _of_stream("dvl", tried)
+    assert told.alike == ("reading 2",)
+    assert told.probability > 0.99
+    assert "reading 1, or reading 2: the motion does not tell them apart" in told.sentence()
 
 
 def test_on_a_straight_course_a_delay_is_not_told_from_a_lever_arm(ship):
