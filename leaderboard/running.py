@@ -264,7 +264,7 @@ def _further(
             return _run(request, [scenario], [rows[name] for name in names], seeds_of(request.seed, runs), folder,
                         seal=seal, minutes=minutes, force=(), later=True)  # fmt: skip
 
-        found += run_further(folder, chosen, rows, further, end)
+        found += run_further(folder, chosen, rows, further, end, most=part.more)
     return found
 
 

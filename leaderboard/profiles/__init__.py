@@ -26,7 +26,7 @@ from pathlib import Path
 from typing import Any
 
 from simnav.estimator import describe, names
-from simnav.leaderboard.ranking.statistics import FIRST
+from simnav.leaderboard.ranking.statistics import FIRST, STAGES
 from simnav.leaderboard.results.errors import MOST_RUNS, RequestError
 from simnav.scenario.catalogue import headers
 from simnav.spec import closest
@@ -34,6 +34,8 @@ from simnav.spec import closest
 __all__ = ["KEYS", "Part", "Profile", "profiles", "read_profile"]
 
 _FOLDER = Path(__file__).parent
+#: Numbers of seeds that ``more`` may be.
+LATER = tuple(stage.seeds for stage in STAGES[1:])
 
 #: The keys of a part, and what they mean.
 KEYS: Mapping[str, str] = {
@@ -42,7 +44,7 @@ KEYS: Mapping[str, str] = {
     "estimators": "names of estimators, or the name of a group; default: all that are not slow",
     "without": "names of estimators that are left out",
     "runs": "required: seeds of each scenario, from 0 on",
-    "more": "true: rows that may be the best of a kind of trouble or of the track have more seeds; `runs` is then 30",
+    "more": "100 or 300: up to so many seeds of rows that may be the best of a trouble or the track; `runs` is 30",
     "shortest_s": "with `tracks`: only scenarios that take longer than this",
     "longest_s": "with `tracks`: only scenarios that take no longer than this",
 }
@@ -58,14 +60,14 @@ class Part:
         Names.
     runs : int
         Seeds a scenario.
-    more : bool
-        Whether rows that may be the best have more seeds (`simnav.leaderboard.ranking.next_runs`).
+    more : int
+        Up to how many seeds the rows that may be the best have (`simnav.leaderboard.ranking.next_runs`); 0: as all.
     """
 
     scenarios: tuple[str, ...]
     estimators: tuple[str, ...]
     runs: int
-    more: bool = False
+    more: int = 0
 
 
 @dataclass(frozen=True)
@@ -135,9 +137,9 @@ def _part(where: str, table: dict[str, Any], groups: dict[str, list[str]]) -> Pa
     runs = table.get("runs")
     if not isinstance(runs, int) or isinstance(runs, bool) or not 1 <= runs <= MOST_RUNS:
         raise RequestError(f"{where}: runs = {runs!r:.40} should be a number of seeds, from 1 to {MOST_RUNS}")
-    more = table.get("more", False)
-    if not isinstance(more, bool) or (more and runs != FIRST):
-        raise RequestError(f"{where}: more = {more!r:.40} should be true or false, and true only with runs = {FIRST}")
+    more = table.get("more", 0)
+    if more not in (0, *LATER) or isinstance(more, bool) or (more and runs != FIRST):
+        raise RequestError(f"{where}: more = {more!r:.40} should be one of {LATER}, and only with runs = {FIRST}")
     if ("scenarios" in table) == ("tracks" in table):
         raise RequestError(f"{where}: it should name scenarios or tracks")
     if "scenarios" in table:

@@ -21,6 +21,8 @@ def run_further(
     estimators: Collection[str],
     run: Callable[[Scenario, Collection[str], int, float | None], Summary],
     end: float | None = None,
+    *,
+    most: int,
 ) -> list[Summary]:
     """Run what the results of a folder ask for, stage after stage.
 
@@ -36,6 +38,8 @@ def run_further(
         Runs some rows, by their labels, on a scenario, with so many seeds, for so many minutes at most.
     end : float, optional
         Time of `time.monotonic` after which no run is started.
+    most : int
+        Seeds of the last stage that is to be run.
 
     Returns
     -------
@@ -46,7 +50,7 @@ def run_further(
     done: list[Summary] = []
     while True:
         results = (r for r in store.load(folder, series=False) if r.scenario in known and r.estimator in estimators)
-        wanted = next_runs(results, {s.id: s.track for s in scenarios})
+        wanted = next_runs(results, {s.id: s.track for s in scenarios}, most=most)
         for each in wanted:
             minutes = None if end is None else max(0.0, (end - time.monotonic()) / 60.0)
             done.append(run(known[each.scenario], each.estimators, each.seeds, minutes))

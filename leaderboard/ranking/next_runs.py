@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 from .ranking import undecided
 from .reference import ORACLES
+from .statistics import STAGES
 from .track_runs import TrackRuns, runs_of_tracks
 from .tracks import SMOOTHED
 from .troubles import trouble_of, troubles
@@ -43,7 +44,9 @@ class NextRuns:
     seeds: int
 
 
-def next_runs(results: Iterable[Result], tracks: Mapping[str, str] | None = None) -> list[NextRuns]:
+def next_runs(
+    results: Iterable[Result], tracks: Mapping[str, str] | None = None, *, most: int = STAGES[-1].seeds
+) -> list[NextRuns]:
     """What is to be run next, by scenario; empty where all boards are decided or have all seeds.
 
     Parameters
@@ -52,6 +55,8 @@ def next_runs(results: Iterable[Result], tracks: Mapping[str, str] | None = None
         Results on the scenarios that are looked at in stages.
     tracks : mapping of str to str, optional
         As for `simnav.leaderboard.ranking.ranking.rank`.
+    most : int
+        Seeds of the last stage that is to be run.
     """
     asked: dict[tuple[str, int], set[str]] = {}
     for runs in runs_of_tracks(results, None, tracks, staged=True):
@@ -59,7 +64,7 @@ def next_runs(results: Iterable[Result], tracks: Mapping[str, str] | None = None
             continue
         for board in (runs, *_groups(runs)):
             names, seeds = undecided(board)
-            for table in board.tables if names else ():
+            for table in board.tables if names and seeds <= most else ():
                 beside = {table.plain, ORACLES.get(runs.track.score, "oracle")} & table.cells.keys()
                 asked.setdefault((table.name, seeds), set()).update(names, beside)
     return [NextRuns(scenario, tuple(sorted(names)), seeds) for (scenario, seeds), names in sorted(asked.items())]

@@ -41,6 +41,7 @@ _LATER = ("seal", "scipy", "filterpy", "processor")
 _CODE = (
     "pyproject.toml", "simnav", "estimators", "scenarios", "leaderboard",
     ":(exclude)leaderboard/standard/results", ":(exclude)leaderboard/standard/history.csv",
+    ":(exclude)leaderboard/standard/drawn", ":(exclude)leaderboard/profiles",
 )  # fmt: skip
 
 

@@ -163,7 +163,7 @@ def run(
                                     minutes=minutes, progress=progress, by_version=True, later=True)  # fmt: skip
 
             if part.more:
-                found += run_further(working, chosen, rows, further, end)
+                found += run_further(working, chosen, rows, further, end, most=part.more)
     return combined(found)
 
 
@@ -197,7 +197,8 @@ def _missing_later(
         if not part.more:
             continue
         chosen, labels = {load(name).id for name in part.scenarios}, set(part.estimators)
-        for each in next_runs(r for r in results if r.scenario in chosen and r.estimator in labels):
+        staged = (r for r in results if r.scenario in chosen and r.estimator in labels)
+        for each in next_runs(staged, most=part.more):
             for label in each.estimators:
                 found[f"{label} on {each.scenario}"] = sum(
                     (each.scenario, label, seed) not in there for seed in range(each.seeds)
