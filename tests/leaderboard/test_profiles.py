@@ -70,6 +70,8 @@ def test_a_profile_of_ones_own(tmp_path: Path):
             '[[part]]\nscenarios = ["a"]\nruns = 1000000000000',
             "runs = 1000000000000 should be a number of seeds, from 1",
         ),
+        ('[[part]]\nscenarios = ["a"]\nruns = 30\nmore = 50', r"more = 50 should be one of \(100, 300\)"),
+        ('[[part]]\nscenarios = ["a"]\nruns = 30\nmore = true', "more = True should be one of"),
         ('[[part]]\ntracks = ["a"]\nruns = 1\nlongest_s = "x"', "longest_s = 'x' should be a number of seconds"),
         ('[[part]]\ntracks = ["a"]\nruns = 1\nshortest_s = nan', "shortest_s = nan should be a number of seconds"),
         ("[[part]]\nruns = 1", "name scenarios or tracks"),

@@ -289,6 +289,8 @@ def test_an_estimator_that_does_not_suit_is_a_mistake_if_it_is_alone(here):
         (["leaderboard", "nowhere"], "nowhere"),
         (["campaign", "-s", "pond.toml", "-e", "gnss-only", "-o", "."], "other files"),
         (["campaign", "-s", "pond.toml,pond.toml,open-see"], "open-sea"),
+        (["log", "identify", "pond.toml", "--output", "nowhere/x.toml"], "there is no folder"),
+        (["log", "twin", "pond.toml", "--output", "nowhere/x.toml"], "there is no folder"),
         (["new-estimator", "1"], "my-filter"),
         (["new-estimator", "ekf"], "already"),
         (["new-estimator", "fresh", "--output", "fresh.txt"], ".py"),

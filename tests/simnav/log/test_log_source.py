@@ -13,6 +13,7 @@ from simnav.log import LogError, LogSource, LogWarning
 from simnav.recording import Block, Recording
 from simnav.scoring.beyond_reference import rms_beyond
 from simnav.source import record
+from simnav.spec import SpecError
 from simnav.strapdown import integrate
 from tests.cases.tiny_log import CLOCK, RATE, write_csv
 
@@ -223,6 +224,13 @@ def test_a_hole_in_the_reference_is_not_interpolated(tiny):
     lost = np.isnan(truth.position).any(axis=1)
     np.testing.assert_array_equal(truth.time[lost], [10.0, 11.0, 12.0])
     assert np.isfinite(truth.position[~lost]).all()
+
+
+def test_a_log_without_a_reference_says_that_fixes_may_be_held_out(tiny):
+    head, tail = tiny.text.split("[log.reference.position]")
+    tiny.text = head + "[instruments.imu]" + tail.split("[instruments.imu]")[1]
+    with pytest.raises(SpecError, match=r"\[log.reference.position\] is missing; .* hold_out = 10"):
+        tiny.scenario()
 
 
 def test_a_reference_of_positions_only(tiny):

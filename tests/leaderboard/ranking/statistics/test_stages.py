@@ -69,6 +69,7 @@ def test_the_plan_names_the_rows_that_may_be_the_best_the_plain_row_and_the_orac
     more = results({n: 100 if n in wanted.estimators else 30 for n in offsets}, offsets)
     (later,) = next_runs(more)
     assert later.seeds == 300
+    assert next_runs(more, most=100) == []
     track = rank(more).track("aided-ins")
     assert {r.estimator: r.runs for r in track.rows if r.ranked} == {
         n: 100 if n in wanted.estimators else 30 for n in ROWS
