@@ -39,7 +39,7 @@ ROWS = tuple(
     os.environ.get(
         "SIMNAV_AUDIT_BESIDE_ROWS",
         "adkf,cauchy-fgo,ckf,dcs-fgo,fading-ekf,federated,ga-fgo,gated-ekf,gm-ekf,gm-fgo,gnc-fgo,heading-bank,huber-fgo,"
-        "huber-kf,iae,iae-fgo,iae-fgo-fixed,iae-fixed,iekf,igg3,imm,inekf,max-mixture-fgo,mckf,mid-value,rae,"
+        "huber-kf,iae,iae-fgo,iae-fgo-fixed,iae-fixed,iekf,igg3,imm,inekf,max-mixture-fgo,mckf,mh-ekf,mid-value,rae,"
         "sage-husa,solution-separation,student-t,sw-fgo,switchable-fgo,tukey-fgo,ukf,vb-akf",
     ).split(",")
 )
