@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "absolute",
+    "require_folder",
     "results_of",
     "scenario_of",
     "scenarios_of",
@@ -125,6 +126,12 @@ def results_of(
         raise RequestError(f"there are no results in {path}; 'simnav campaign' makes some")
     benchmark_of(r.provenance for r in results)
     return results
+
+
+def require_folder(given: str, path: str | os.PathLike[str]) -> None:
+    """RequestError where the folder of a file that is to be written is missing; ``given`` is how it was asked for."""
+    if not absolute(path).parent.is_dir():
+        raise RequestError(f"{given}: there is no folder {Path(path).parent}")
 
 
 def absolute(path: str | os.PathLike[str]) -> Path:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from simnav.leaderboard.campaign.request import EstimatorRequest, requests, together
 from simnav.leaderboard.results.errors import RequestError, mistakes
 
-from .arguments import absolute, scenario_of
+from .arguments import absolute, require_folder, scenario_of
 from .calls import call, whole_number
 from .requests import BenchRequest, CostsRequest, ScenarioLike
 
@@ -72,8 +72,8 @@ def costs(request: CostsRequest) -> MultipleReport:
     if estimators is None:
         estimators = [name for name in names() if comes_with_simnav(find(name))]
     output = request.output
-    if output is not None and not absolute(output).parent.is_dir():
-        raise RequestError(f"output = {os.fspath(output)!r}: there is no folder {absolute(output).parent}")
+    if output is not None:
+        require_folder(f"output = {os.fspath(output)!r}", absolute(output))
     counts = whole_number("epochs", request.epochs), whole_number("rounds", request.rounds, 1)
     measured = here()  # before, for the code may be edited meanwhile
     mine = requests(estimators, request.parameters)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from simnav.leaderboard.results.errors import RequestError, mistakes
 
-from .arguments import absolute, scenario_of, scenarios_of
+from .arguments import absolute, require_folder, scenario_of, scenarios_of
 from .calls import call, finite_number, whole_number
 from .log_requests import (
     AlignRequest,
@@ -272,8 +272,7 @@ def twin(request: TwinRequest) -> Twin:
     target = absolute(request.output or f"{scenario.name}-twin.toml")
     if target.suffix != ".toml":
         raise RequestError(f"output = {request.output}: the file should end in .toml")
-    if not target.parent.is_dir():
-        raise RequestError(f"output = {request.output}: there is no folder {target.parent}")
+    require_folder(f"output = {request.output}", target)
     with mistakes(ValueError, OSError):
         drawn = scenario.drawn(seed)
         recording = record(drawn.model_copy(update={"faults": ()}), seed)

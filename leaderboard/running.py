@@ -18,7 +18,7 @@ from simnav.leaderboard.campaign.suitability import require_suitable, suited, wi
 from simnav.leaderboard.results.errors import RequestError, StoreError, mistakes
 from simnav.leaderboard.results.scratch import scratch
 
-from .arguments import absolute, results_of, scenario_of, scenarios_of, seeds_of, split_names
+from .arguments import absolute, require_folder, results_of, scenario_of, scenarios_of, seeds_of, split_names
 from .baselines import baselines_or
 from .calls import call, whole_number
 from .estimator_output import first_lines
@@ -342,8 +342,8 @@ def robustness(request: RobustnessRequest) -> Robustness:
     if asked is None:
         own = (describe(name) for name in names() if comes_with_simnav(find(name)))
         asked = [d.name for d in own if not d.slow and not d.reference]
-    if output is not None and not absolute(output).parent.is_dir():
-        raise RequestError(f"output = {os.fspath(output)!r}: there is no folder {absolute(output).parent}")
+    if output is not None:
+        require_folder(f"output = {os.fspath(output)!r}", absolute(output))
     factors, seeds = checked_factors(request.factors), seeds_of(request.seed, request.runs)
     mine = requests(asked, request.parameters)
     everyone = together([*mine, *requests(list(plain_rows(SCORE)))])

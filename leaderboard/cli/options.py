@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     from .console import ProgressBar
 
-__all__ = ["absolute", "campaign_progress", "require_figure", "require_folder", "write_columns"]
+__all__ = ["absolute", "campaign_progress", "require_figure", "write_columns"]
 
 
 def absolute(path: str | os.PathLike[str]) -> Path:
@@ -26,12 +26,6 @@ def require_figure(option: str, path: Path | None) -> None:
     """RequestError where a figure cannot be written to a file of this name."""
     if path is not None and path.suffix.lower() not in (".png", ".svg", ".pdf"):
         raise RequestError(f"{option} {path}: the file should end in .png, .svg or .pdf")
-
-
-def require_folder(option: str, path: Path | None) -> None:
-    """RequestError where the folder of a file that is to be written is missing."""
-    if path is not None and not absolute(path).parent.is_dir():
-        raise RequestError(f"{option} {path}: there is no folder {path.parent}")
 
 
 def campaign_progress(bar: ProgressBar, running: str = "running") -> Callable[[Progress], None]:

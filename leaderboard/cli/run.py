@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from simnav.leaderboard.arguments import scenario_of
+from simnav.leaderboard.arguments import require_folder, scenario_of
 from simnav.leaderboard.figures.stanford import stanford_diagrams
 from simnav.leaderboard.figures.style import save_as
 from simnav.leaderboard.results.errors import RequestError
@@ -13,7 +13,7 @@ from simnav.scoring.ending import ending
 
 from .commands import RunCommand
 from .console import FAILED, USER, Output
-from .options import absolute, require_figure, require_folder
+from .options import absolute, require_figure
 
 __all__ = ["show"]
 
@@ -30,7 +30,8 @@ def show(out: Output, request: RunCommand) -> None:
     if request.animate is not None and request.animate.suffix.lower() != ".gif":
         raise RequestError(f"--animate {request.animate}: the file should end in .gif")
     for option, path in (*figures, ("--animate", request.animate)):
-        require_folder(option, path)
+        if path is not None:
+            require_folder(f"{option} {path}", path)
     chosen = scenario_of(request.scenario)
     with out.progress(f"{chosen.id}, seed {request.seed}") as progress:
         report = run.of(replace(request, scenario=chosen, progress=progress))

@@ -15,6 +15,7 @@ from simnav.estimators.training.anfis_training import (
     scenarios,
     train,
 )
+from simnav.leaderboard.arguments import require_folder
 from simnav.leaderboard.campaign.fingerprint import simulator_version
 from simnav.leaderboard.figures import training as training_figures
 from simnav.leaderboard.ranking import tables
@@ -42,8 +43,7 @@ def show(out: Output, request: TrainAnfisCommand) -> None:
     path = absolute(output or Path(f"anfis_{features}.json"))
     if path.suffix != ".json":
         raise RequestError(f"--output {path}: the file should end in .json")
-    if not path.parent.is_dir():
-        raise RequestError(f"--output {path}: there is no folder {path.parent}")
+    require_folder(f"--output {path}", path)
     first = {"training": FIRST_TRAINING_SEED, "validation": FIRST_VALIDATION_SEED}
     count = {"training": seeds, "validation": max(seeds // 2, _LEAST_VALIDATION)}
     data = {}

@@ -41,7 +41,8 @@ MOST_IN_JSON = 20_000
 
 _CHUNK = 8192  # runs that are converted at a time
 _DIGITS = 4  # of figures of the ranking
-_BITS, _COST_BITS, _BYTES = 11, 8, 65536  # of figures of more runs than `MOST_IN_JSON`, of times, and of memory
+#: Of more runs than `MOST_IN_JSON`: binary digits of figures (three decimal ones) and of times; unit of memory [byte].
+_BITS, _BITS_OF_TIMES, _MEMORY = 11, 8, 65536
 _FACTS = ("scenario", "seed", "draws", "estimator", "parameters", "learned", "reference", "status", "reason", "note")
 _COSTS = ("seconds", "peak_memory")
 _TIMES = ("seconds", "update_median", "update_mean", "update_p95")
@@ -168,13 +169,13 @@ def write_parquet(document: Document, path: Path) -> list[Path]:
     real = [f.name for f in every.schema if f.type == pa.float64()]  # their bytes side by side take a third less
     for name in real if document.is_long else ():
         column, k = every[name].combine_chunks(), every.column_names.index(name)
-        bits = _COST_BITS if name in _TIMES else _BITS
+        bits = _BITS_OF_TIMES if name in _TIMES else _BITS
         figures = with_bits(column.to_numpy(zero_copy_only=False), bits)
         shorter = pa.array(figures, mask=column.is_null().to_numpy(zero_copy_only=False))
         every = every.set_column(k, every.schema.field(k), shorter)
     if document.is_long:
         memory, k = every["peak_memory"], every.column_names.index("peak_memory")
-        every = every.set_column(k, every.schema.field(k), pc.multiply(pc.divide(memory, _BYTES), _BYTES))
+        every = every.set_column(k, every.schema.field(k), pc.multiply(pc.divide(memory, _MEMORY), _MEMORY))
     rest = [name for name in every.column_names if name not in real]
     with complete_file(path) as part:
         pq.write_table(every, part, compression="zstd", compression_level=15, use_dictionary=rest,

@@ -287,21 +287,20 @@ def _told(stream: str, tried: list[_Tried]) -> tuple[Reading, ProbableReading] |
     smaller = [t for t in tried if t.left < np.log(_PART) or t.unit > _FAR]  # a current of 7 m/s is a wrong unit
     if not smaller or (top := max(t.ratio for t in smaller)) < _FAR:
         return None
-    alike = [t for t in smaller if t.ratio > top - _SAME]
-    best = min(alike, key=lambda t: (t.reading.number, -t.ratio))
-    reading = best.reading
+    ratio = np.array([t.ratio for t in smaller])
+    alike = ratio > top - _SAME
+    first, *rest = sorted((smaller[k] for k in np.flatnonzero(alike)), key=lambda t: (t.reading.number, -t.ratio))
+    reading = first.reading
     # The delay next to the best one is another figure of the same reading.
-    one_delay = [t is best or t.reading.delay * reading.delay > 0.0 for t in smaller]
-    others = sorted((t for t, same in zip(smaller, one_delay, strict=True) if t in alike and not same),
-                    key=lambda t: (t.reading.number, -t.ratio))  # fmt: skip
+    others = tuple(t.reading.what for t in rest if not t.reading.delay * reading.delay > 0.0)
+    same = np.array([t is first or t.reading.delay * reading.delay > 0.0 for t in smaller])
     delays = len({t.reading.delay for t in tried}) - 1  # all together are one reading
     prior = np.array([(1.0 / delays if t.reading.delay else 1.0) * _TWO ** (t.reading.mistakes - 1) for t in smaller])
-    weight = prior * np.exp(np.array([t.ratio for t in smaller]) - top) / len(tried)
-    same = np.array(one_delay) | np.array([t in others for t in smaller])
-    own, total = float(weight[same].sum()), float(weight.sum() + np.exp(-top))
+    weight = prior * np.exp(ratio - top) / len(tried)
+    own, total = float(weight[same | alike].sum()), float(weight.sum() + np.exp(-top))
     changes = tuple((table, key, json.dumps(value)) for table, key, value in reading.changes)
-    return reading, ProbableReading(stream, changes, reading.what, best.ratio, own / total,
-                                    float(np.exp(-top)) / total, tuple(t.reading.what for t in others))  # fmt: skip
+    return reading, ProbableReading(stream, changes, reading.what, first.ratio, own / total,
+                                    float(np.exp(-top)) / total, others)  # fmt: skip
 
 
 def _readings(log: RecordedSpec, s: Streams) -> Iterator[Reading]:

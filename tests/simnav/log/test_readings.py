@@ -219,7 +219,7 @@ def test_streams_at_other_times_between_the_same_ends_are_not_taken_for_each_oth
     assert not np.array_equal(asked[0], asked[1])
 
 
-def test_a_right_log_of_a_fishing_vessel(tmp_path):
+def test_a_right_log_of_a_fishing_vessel():
     """Without an IMU; readings of roll and pitch tie there."""
     assert _told(record(load("fishing-vessel"), 9100), True) == []
 
