@@ -60,7 +60,7 @@ class BiasDoubt:
     time: float
     jump: float = 0.0
 
-    def begin(self, model: DoubtingModel, covariance: Array) -> None:
+    def begin(self, model: DoubtingModel, covariance: Array, *, heading_seen: bool = True) -> None:
         """Doubt the instruments of the group; the (n, n) covariance is updated."""
         own = model.places[self.group]
         decay, density = model.rates()
@@ -71,6 +71,8 @@ class BiasDoubt:
 @dataclass(frozen=True)
 class ImuDoubt:
     """The error that the IMU is suspected of: biases that jump, and noise.
+
+    Where nothing sees the heading, the vertical gyroscope is not doubted, nor the noise of the gyroscopes.
 
     Attributes
     ----------
@@ -89,11 +91,12 @@ class ImuDoubt:
     walk: float = 0.2
     group: str = IMU
 
-    def begin(self, model: DoubtingModel, covariance: Array) -> None:
+    def begin(self, model: DoubtingModel, covariance: Array, *, heading_seen: bool = True) -> None:
         """Doubt the IMU; the (n, n) covariance is updated."""
         own = model.imu_noise.view(IMU_NOISE)[0]
+        rate, gyroscopes = (self.rate, _GYROSCOPE) if heading_seen else (0.0, _GYROSCOPE[:2])
         for triad, jump, density, at in (
-            ("gyroscope", self.rate_jump, self.rate, _GYROSCOPE),
+            ("gyroscope", self.rate_jump, rate, gyroscopes),
             ("accelerometer", self.force_jump, self.force, _ACCELEROMETER),
         ):
             own[triad] = max(own[triad], density**2)
@@ -108,17 +111,18 @@ class AttitudeDoubt:
     Attributes
     ----------
     level, heading : float
-        Standard deviations that are added [rad].
+        Standard deviations that are added [rad]; that of the heading only where something sees it.
     """
 
     level: float
     heading: float
     group: str = ""
 
-    def begin(self, model: DoubtingModel, covariance: Array) -> None:
+    def begin(self, model: DoubtingModel, covariance: Array, *, heading_seen: bool = True) -> None:
         """Doubt the attitude; the (n, n) covariance is updated."""
         at = np.arange(model.moving.attitude, model.moving.attitude_end)
-        covariance[at, at] += np.square((self.level, self.level, self.heading))[: len(at)]
+        heading = self.heading if heading_seen else 0.0
+        covariance[at, at] += np.square((self.level, self.level, heading))[: len(at)]
 
 
 @dataclass(frozen=True)

@@ -77,7 +77,7 @@ class MidValue(
 
 @register("mh-ekf")
 class MultipleHypothesisEkf(Row, solver=MultipleHypothesis, model=DoubtedInstruments):
-    version = 5
+    version = 6
     def __init__(
         self,
         *,

@@ -24,6 +24,9 @@ doubts other instruments and is surprised again, it is asked once whether the IM
 anchor at which nothing was doubted. What is less probable than exp(-`LEAST`) times the leading one is dropped, as are
 the least probable of more than `filters`, and of more than `ALIKE` with the same doubts.
 
+**Without a heading.** While fixes and compasses are silent, nothing sees the heading. Then no hypothesis sets it free,
+for a log would turn it to explain any other error. Nor is the IMU doubted beside the log: nothing would be left.
+
 **Prior probabilities.** A fault of each kind begins once in `onset` seconds, or more rarely by the factor of the kind
 (`KINDS`), and lasts for `end` seconds, in the mean. At the start the position is wrong with the probability
 `WRONG_POSITION`, and the attitude, too, with `WRONG_START`. A start whose heading is not known to `NARROW` is a bank of
@@ -98,6 +101,7 @@ KINDS: Mapping[str, Kind] = {
         ImuDoubt(rate_jump=radians(0.03), force_jump=0.03, rate=radians(0.01), force=0.01, walk=0.02), watched=True
     ),
     "imu bias": Kind(ImuDoubt(rate_jump=radians(0.3), force_jump=0.5), rare=5.0),
+    "imu noise": Kind(ImuDoubt(rate_jump=0.0, force_jump=0.0, rate=radians(0.1), force=0.03, walk=0.0), rare=5.0),
     "imu": Kind(ImuDoubt(rate_jump=radians(0.3), force_jump=0.1, rate=radians(0.3), force=0.1), rare=10.0),
     "imu far off": Kind(ImuDoubt(rate_jump=radians(3.0), force_jump=1.0, rate=radians(3.0), force=1.0), rare=10.0),
     "attitude": Kind(AttitudeDoubt(level=0.04, heading=0.2), rare=30.0),
@@ -124,6 +128,8 @@ ALIKE = 2
 GROSS = 0.99999
 #: Time after which nobody looks back to a sound anchor [s].
 LONGEST = 60.0
+#: A fix or a compass is silent after so many of its intervals without a reading, and at least one period.
+SILENT_INTERVALS = 2.0
 #: Tolerance of times [s].
 _SAME_TIME = 1e-6
 
@@ -274,6 +280,9 @@ class MultipleHypothesis(Solver):
         self._report = begun_report(instruments, first.names, self._admission.record.skipped, None)
         self._row = np.empty(len(self._labels))
         self._gross, self._owners = chi_square_limits(GROSS), owners(instruments)
+        seeing = [name for group in ("fix", "compass") for name in self._groups.get(group, ())]
+        self._heard = dict.fromkeys(seeing, start.time)
+        self._silent = {name: max(self.period, SILENT_INTERVALS / instruments[name].rate) for name in seeing}
         self._blank = {f"since.{name}": nan for names in self._groups.values() for name in names}
 
     def _made(self, start: InitialState) -> HypothesisFilter:
@@ -296,6 +305,7 @@ class MultipleHypothesis(Solver):
     def update(self, measurements: Measurements) -> Estimate:
         """Take one step's measurements, each at its own time."""
         admitted = self._admission.admit(measurements, self.best.model.time)
+        self._heard.update((m.instrument, m.time) for m in admitted if m.instrument in self._heard)
         step = Step(measurements.imu, admitted, measurements.time)
         for h in self._hypotheses:
             h.filter.advance(step)
@@ -364,9 +374,12 @@ class MultipleHypothesis(Solver):
             self._watch = time + WATCH
         known = anchor.kinds.values()
         wrong = IMU in anchor.doubts or self._period.unmeasured
+        self._heading_seen = any(time - at <= self._silent[name] + _SAME_TIME for name, at in self._heard.items())
         for name, kind in self._kinds.items():
             if wrong and kind.doubt.group not in (IMU, ""):
                 continue  # what a wrong IMU predicts condemns no other instrument
+            if kind.doubt.group == IMU and "log" in anchor.doubts and not self._heading_seen:
+                continue  # nothing would be left
             if surprised or (watched and kind.watched and name not in known):
                 length = WATCH if kind.watched and not surprised else self.period
                 self._begin(length / (kind.rare * self.onset), name)
@@ -425,7 +438,7 @@ class MultipleHypothesis(Solver):
             if k in onsets and well:
                 own.model.believe(own.covariance, well)
             elif k in onsets:
-                doubt.begin(own.model, own.covariance)
+                doubt.begin(own.model, own.covariance, heading_seen=self._heading_seen)
             own.advance(step)
             weight += own.evidence
         born = _Hypothesis(doubts, own, weight)

@@ -43,8 +43,6 @@ __all__ = ["Twin", "twin_of"]
 
 #: Fewer poses are no track, and from so many recordings on sizes are drawn between theirs.
 _LEAST, _SEVERAL = 8, 3
-#: How far the simulated vessel may be from the track [m]: the first with which the motion can be simulated is taken.
-_DEPARTURES = (0.0, 0.01, 0.03, 0.1, 0.3, 1.0)
 #: Readings are lost where at least this share is missing.
 _LOST = 0.02
 #: What a vessel on the track may do [m/s], [m/s^2], [deg/s]; the motion was real.
@@ -78,9 +76,6 @@ class Twin:
     def save(self, path: Path) -> Twin:
         """Write the scenario, and the track beside it; the twin with its files.
 
-        Without an IMU, or with a slow one, the truth may have too few samples a second for a vessel in waves. Then the
-        vessel departs from the track, by some centimetres.
-
         Raises
         ------
         SpecError
@@ -92,15 +87,9 @@ class Twin:
         ]
         rows += [f"{t:.6f},{a:.10f},{b:.10f},{h:.5f},{r:.6f},{p:.6f},{y:.6f}" for t, a, b, h, r, p, y in self.track]
         track.write_text("\n".join(rows) + "\n", encoding="utf-8")
-        for departure in _DEPARTURES:
-            vessel = {**self.table["vessel"], "file": track.name, **({"departure_m": departure} if departure else {})}
-            path.write_text(toml_text({**self.table, "vessel": vessel}), encoding="utf-8")
-            try:
-                open_source(load(path), 0)
-                break
-            except SpecError:
-                if departure == _DEPARTURES[-1]:
-                    raise
+        table = {**self.table, "vessel": {**self.table["vessel"], "file": track.name}}
+        path.write_text(toml_text(table), encoding="utf-8")
+        open_source(load(path), 0)
         return replace(self, files=(path, track))
 
 

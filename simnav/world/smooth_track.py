@@ -4,8 +4,8 @@ Latitude, longitude and height are cubic splines in time (not-a-knot), so that v
 The velocity is their derivative with the radii of the ellipsoid (Groves 2013, eqs. 2.111), and the position of the
 truth is its integral by the rule of the mechanization (`simnav.world.trajectory.SampledTrajectory`), a trapezoid over
 each sample interval. The errors of the trapezoids add up to dt^2 / 12 times the change of the acceleration (the
-Euler-Maclaurin formula), so that the truth goes through the poses to a fraction of a millimetre. A run whose rate is
-too low for this is refused.
+Euler-Maclaurin formula), so that the truth goes through the poses to a fraction of a millimetre at the rates of most
+IMUs. A run whose rate is so low that it would miss them by a centimetre is refused.
 
 Roll, pitch and heading are cubic splines of the given angles. Without a given heading the bow points along the course
 made good. Where the vessel is too slow to have a course, the heading goes over smoothly from the course before to the
@@ -34,8 +34,8 @@ from simnav.world.trajectory import SampledTrajectory, Voyage
 
 __all__ = ["Limits", "Poses", "SmoothTrack", "metres_per_unit", "smooth_track"]
 
-#: How far the truth may be from a given pose [m]; it decides which IMU rates are refused.
-_EXACT = 5e-4
+#: How far the truth may be from a given pose [m]; it decides which rates are refused.
+_EXACT = 0.01
 #: Shortest time constant with which the vessel follows an error of its estimate [s], and the least speed for it [m/s].
 _FOLLOWING, _CREEP = 15.0, 0.2
 #: Number of courses between two poses from which the heading is made.
@@ -285,7 +285,7 @@ class SmoothTrack(SampledTrajectory):
         most = float(np.linalg.norm(change, axis=1).max())
         if most / (12.0 * rate * rate) > _EXACT:
             raise SpecError(
-                f"{self._poses.source}: at {rate:g} samples of the IMU a second the truth would miss the poses by "
+                f"{self._poses.source}: at {rate:g} samples a second the truth would miss the poses by "
                 f"{1e3 * most / (12.0 * rate * rate):.3g} mm, because the acceleration changes by {most:.3g} m/s^2; at "
                 f"least {np.ceil(np.sqrt(most / (12.0 * _EXACT))):g} Hz are wanted"
             )

@@ -14,6 +14,7 @@ from simnav.estimator import make
 from simnav.estimators.algebra.mixture import mixture_update
 from simnav.estimators.models.doubted_instruments import BiasDoubt, DoubtedInstruments
 from simnav.estimators.models.flat_lines import FlatLineTest
+from simnav.estimators.solvers import multiple_hypothesis
 from simnav.estimators.solvers.hypothesis_filter import lone_fix
 from simnav.estimators.solvers.multiple_hypothesis import KINDS
 from simnav.scenario import Scenario
@@ -44,7 +45,7 @@ def recorded(fault=None, seed=3, instruments=None, **tables):
         else:
             table["instruments"][name] = table["instruments"].get(name, {}) | changes
     if fault is not None:
-        table["fault"] = [fault]
+        table["fault"] = fault if isinstance(fault, list) else [fault]
     return record(Scenario.from_toml(table, source="short"), seed)
 
 
@@ -251,6 +252,19 @@ def test_a_rare_fix_with_the_imu_alone_beside_it_is_believed_like_the_imu():
     trial = ran(alone)
     assert trial.diagnostics["doubt.gnss"].max() == trial.diagnostics["doubt.imu"].max() == 0.0
     assert rms(trial, alone) < 1.02 * rms(ran(alone, "ekf"), alone)
+
+
+def test_a_dvl_that_is_left_alone_does_not_turn_the_heading(monkeypatch):
+    cut = {"kind": "outage", "instruments": ["gnss"], "start_s": 40.0}
+    shaken = {"kind": "imu_disturbance", "angular_rate_deg_s": [4.0, -4.0, 0.0], "start_s": 51.0, "end_s": 52.0}
+    recording = recorded([cut, shaken], seed=4, instruments={"gyrocompass": None}, duration_s=120.0)
+
+    def heading_error(trial):
+        return abs(errors(trial, recording)[-1, 8])
+
+    assert heading_error(ran(recording)) < np.radians(1.0)
+    monkeypatch.setattr(multiple_hypothesis, "SILENT_INTERVALS", np.inf)  # as if the fixes still saw the heading
+    assert heading_error(ran(recording)) > np.radians(5.0)
 
 
 @pytest.mark.parametrize(
