@@ -19,8 +19,9 @@ __all__ = ["coloured", "fitted_aids", "heading", "in_run", "places", "sizes", "w
 
 #: Prior standard deviation of the logarithm of a size, and of a correlation time.
 _SIZE, _TIME = 3.0, 2.0
-#: Prior standard deviations: lever arm [m], delay [s]; of the heading at the start at least [rad].
-_ARM, _DELAY, _HEADING = 2.0, 0.5, radians(3.0)
+#: Prior standard deviations: lever arm (up to a mast of a ship) [m], delay [s]; of the heading at the start at least
+#: [rad].
+_ARM, _DELAY, _HEADING = 10.0, 0.5, radians(3.0)
 #: Step of the derivatives by a delay, without an IMU, and the least with one: a sample of it [s].
 _DELAY_STEP, _LEAST_STEP = 0.05, 0.005
 #: The smallest size to begin with [SI units]: of readings, of gyroscopes and of accelerometers.

@@ -27,8 +27,8 @@ __all__ = ["AXES", "CONSTANTS", "PLACES", "Estimated", "enlarged", "estimates", 
 #: Half a 95 % interval, in standard deviations.
 _HALF = 1.96
 #: A size is told if the standard deviation of its logarithm is below this, a constant if its own is below this part of
-#: what was assumed before.
-_TOLD_SIZE, _TOLD_PART = 1.0, 0.5
+#: what was assumed before, and a lever arm if its own is below this [m] or it is corrected.
+_TOLD_SIZE, _TOLD_PART, _TOLD_ARM = 1.0, 0.5, 1.0
 #: A lever arm or delay is corrected from so many standard deviations on.
 _CORRECTED = 3.0
 #: A number of which so much of the prior is left is not in the model at all.
@@ -157,7 +157,10 @@ def estimates(scenario: Scenario, fitted: Fitted) -> list[Estimated]:
         else:
             now = _now(spec, p.figure if p.instrument != HEADING else "attitude", p.components or (
                 (2,) if p.instrument == HEADING else ())) / unit  # fmt: skip
-        told = s < (_TOLD_SIZE if p.size else _TOLD_PART * p.spread)
+        if p.figure == "lever_arm":
+            told = s < _TOLD_ARM or abs(p.value(x) - _stated(scenario, p)) > _CORRECTED * s
+        else:
+            told = s < (_TOLD_SIZE if p.size else _TOLD_PART * p.spread)
         part = "error of the heading" if p.instrument == HEADING else p.part
         found.append(Estimated(f"{path}.{key}", part, value, low, high, now, told, not p.size))
     for c in _constants(fitted):
@@ -224,7 +227,7 @@ def replaced(scenario: Scenario, fitted: Fitted) -> dict[str, dict[str, Any]]:
             if channel is not None and channel.source == "file" and _corrects(fitted, p, value, s):
                 table.put(p.instrument, "delay", channel.offset - value)
         elif p.figure == "lever_arm":
-            if s < _TOLD_PART * p.spread and _corrects(fitted, p, value - _stated(scenario, p), s):
+            if _corrects(fitted, p, value - _stated(scenario, p), s):
                 table.put(p.instrument, p.figure, {p.components[0]: value})
         elif s < _TOLD_SIZE or p.instrument in changed or _outside(scenario, p, x, s):
             used = p.value(x + min(s * s, s))  # the mean square of a log-normal size; see the module

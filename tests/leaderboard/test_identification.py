@@ -12,6 +12,7 @@ import simnav
 from simnav.estimator import make
 from simnav.geometry.earth import relative_position
 from simnav.leaderboard.identification.assumption import Assumption, Parameter, with_all
+from simnav.leaderboard.identification.choices import places
 from simnav.leaderboard.identification.innovations import Likelihood
 from simnav.leaderboard.identification.prediction import Predictions, widened
 from simnav.leaderboard.identification.report import Identification, identify
@@ -127,6 +128,21 @@ def test_scoring_finds_the_maximum(recording: Recording) -> None:
     assert max(around) - around[2] < 0.02
     assert best.covariance[0, 0] == pytest.approx(1.0 / (2.0 * 121.0), rel=0.3)  # of a sigma from 121 readings
     assert best.log_likelihood > log_likelihood(likelihood.innovations(with_all(given, [sigma], np.zeros(1))))
+
+
+def test_the_height_of_a_mast_is_found(told: Scenario) -> None:
+    table = told.to_toml()
+    table["sea"] = {"significant_height_m": 3.0, "peak_period_s": 8.0, "direction_deg": 60.0}
+    table["instruments"]["gnss"]["sigma_m"] = [0.5, 0.5, 1.0]
+    told = Scenario.from_toml(table, source="told")
+    table["instruments"]["gnss"]["lever_arm_m"] = [0.0, 0.0, -15.0]
+    true = record(Scenario.from_toml(table, source="true"), 3)
+    given = Assumption(told.instruments_sheet())
+    [height] = [p for p in places(told, given) if p.label == "gnss.lever_arm (down)"]
+    best = maximise(Likelihood(replace(true, instruments=given.instruments, actual=None)), given, [height])
+    sigma = float(np.sqrt(best.covariance[0, 0]))
+    assert sigma < 1.5
+    assert abs(height.value(best.x[0]) + 15.0) < 2.5 * sigma
 
 
 def test_what_was_put_in_is_found(found: Identification) -> None:
