@@ -61,6 +61,7 @@ def recommend(request: RecommendRequest) -> Recommendation:
 
 def _kinds(given: ScenarioLike | Sequence[str]) -> tuple[str, ...]:
     """The kinds of instruments that were named, or those of a scenario; sorted."""
+    from simnav.scenario.catalogue import headers
 
     words = [given] if isinstance(given, (str, os.PathLike)) or not isinstance(given, Sequence) else list(given)
     if len(words) == 1 and isinstance(words[0], str) and "," in words[0]:
@@ -69,12 +70,15 @@ def _kinds(given: ScenarioLike | Sequence[str]) -> tuple[str, ...]:
     if not names:
         raise RequestError("no instrument was named; like imu, gnss, dvl and gyrocompass, or a scenario")
     valid = _valid()
+    names = [n.lower() if isinstance(n, str) and n.lower() in valid else n for n in names]
     if len(names) == 1 and names[0] not in valid:
         instruments = scenario_of(names[0]).instruments
         return tuple(sorted({getattr(spec, "kind", name) for name, spec in instruments.items()}))
     found = []
     for name in names:
         if name not in valid:
+            if isinstance(name, str) and name in {h.name for h in headers()}:
+                raise RequestError(f"{name!r} is a scenario, which has its instruments: name it alone")
             known = [n for n in valid if "_" not in n]  # each once
             raise RequestError(f"{name!r} is no kind of instrument{closest(str(name), known)}")
         found.append(valid[name])
@@ -94,7 +98,7 @@ def _troubles(given: Sequence[str] | str) -> tuple[str, ...]:
     from simnav.leaderboard.ranking.troubles import troubles
 
     words = given.split(",") if isinstance(given, str) else [w for part in given for w in part.split(",")]
-    names = [word.strip() for word in words]
+    names = [word.strip().lower() for word in words]
     for name in names:
         if name not in troubles():
             raise RequestError(f"{name!r} is no kind of trouble{closest(name, list(troubles()))}")

@@ -31,9 +31,13 @@ from .marginalisation import Reference
 from .measurements import OWN, State, observe_inertial
 from .new_factors import INERTIAL_FACTORS, Growing, InertialStates
 from .preintegrated import add_shift, move_shift, relative_shift, turn_covariance
-from .propagation import correct_inertial
+from .propagation import IMU_NOISE, correct_inertial
 
 __all__ = ["InertialChain", "InertialWindow", "Moves"]
+
+#: Density of the white noise of accelerometers in a motion factor, at least [m/s^2/sqrt(Hz)]: 0.1 ug, a tenth of that
+#: of the best ones. Without noise the rounding of a motion is worth many sigmas, and a robust weight sets it aside.
+LEAST_NOISE = 1e-6
 
 
 class MovedStates(Record):
@@ -287,6 +291,8 @@ class InertialChain(Chain):
         """One node, at the start; its covariance. UnsuitableScenario without an IMU."""
         covariance = super().begin(start, instruments)
         front = self.front
+        imu = front._noise.view(IMU_NOISE)[0]
+        imu["accelerometer"] = max(imu["accelerometer"], LEAST_NOISE**2)
         self._instruments = front.table(self.names)
         self._instruments.code[[name in front.own for name in self.names]] = OWN
         self.functions = INERTIAL_FACTORS if front.functions() is INERTIAL_FUNCTIONS else None

@@ -40,9 +40,9 @@ _BETWEEN = 2.2
 _FEW = 9
 #: Where in a spacing series are read, to average them.
 _PHASES = np.array([-0.375, -0.125, 0.125, 0.375])
-#: Prior standard deviations of parameters of small effect.
+#: Prior standard deviations of parameters of small effect; that of a lever arm is of large ships.
 _MOUNTING, _GYROSCOPE, _ACCELEROMETER = np.radians(4.0), 0.003, 0.3
-_ARM, _ANTENNA, _SCALE, _DVL_BIAS = 2.0, 5.0, 0.03, 0.05
+_ARM, _SCALE, _DVL_BIAS = 20.0, 0.03, 0.05
 #: Usual sizes of differences: turn in a second [rad], force [m/s^2], velocity [m/s], heading, position [m].
 _TURN, _FORCE, _SPEED, _HEADING, _PLACE = np.radians(0.3), 0.3, 0.15, np.radians(4.0), 2.0
 
@@ -153,6 +153,11 @@ class Streams:
     def level_known(self) -> bool:
         """Whether the attitude has roll and pitch, and not only constants in their place."""
         return self.attitude is not None and bool(np.ptp(self.attitude.value[:, :2], axis=0).all())
+
+    @cached_property
+    def height_known(self) -> bool:
+        """Whether the positions have a height, and not only a constant in its place."""
+        return bool(np.ptp(self.position.value[:, 2]))
 
     @cached_property
     def grid(self) -> Array:
@@ -320,7 +325,7 @@ def comparisons(s: Streams) -> dict[tuple[str, ...], Callable[[Streams], Residua
             compare, others = _heading, (pose,)
         elif equation == WATER_SPEED and orientation:
             compare, others = _water_speed, (*motion, *orientation)
-        elif equation == DEPTH:
+        elif equation == DEPTH and s.height_known:
             compare, others = _depth, (place,)
         elif name in s.field and s.level_known:
             compare, others = _magnetic_field, (pose,)
@@ -492,7 +497,7 @@ def _velocity(s: Streams, name: str) -> Residual | None:
     time, value = _picked(s.instruments[name][1], s.begin)
     velocity = s.velocities(time)
     turned = _rotated(s, time)
-    arm = () if turned is None else ((np.nan_to_num(turned[0]) @ skew(turned[1]), _ANTENNA),)
+    arm = () if turned is None else ((np.nan_to_num(turned[0]) @ skew(turned[1]), _ARM),)
     return _residual(value - velocity, 2.0 * _SPEED, (_constant(len(time), 3), _DVL_BIAS), *arm)
 
 
@@ -506,9 +511,9 @@ def _fix(s: Streams, name: str) -> Residual | None:
     difference = relative_position(measured, np.where(np.isfinite(place), place, np.nan))[:, :d]
     turned = _rotated(s, time)
     if turned is None:
-        return _residual(difference, _PLACE, (_constant(len(time), d), _ANTENNA))
+        return _residual(difference, _PLACE, (_constant(len(time), d), _ARM))
     dcm = np.nan_to_num(turned[0])[:, :d]
-    return _residual(difference - dcm @ arm, _PLACE, (_constant(len(time), d), _ANTENNA), (dcm, _ANTENNA))
+    return _residual(difference - dcm @ arm, _PLACE, (_constant(len(time), d), _ARM), (dcm, _ARM))
 
 
 def _heading(s: Streams, name: str) -> Residual | None:

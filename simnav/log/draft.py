@@ -226,7 +226,7 @@ def _file_keys(used: Sequence[Guess]) -> _Keys:
         place = _place(guess)
         if place not in keys:
             text = guess.stream.path.stem if place[1] is None else place[1]
-            stem = re.sub(r"\W+", "_", text.lower()).strip("_") or "file"
+            stem = re.sub(r"[^a-z0-9]+", "_", text.lower()).strip("_") or "file"  # a bare key of TOML is ASCII
             key = stem if stem not in taken else f"{stem}_{len(keys)}"
             taken.add(key)
             keys[place] = guess.stream, key

@@ -39,16 +39,17 @@ if TYPE_CHECKING:
 
 __all__ = ["ProbableReading", "probable_readings"]
 
-#: Another reading is far more likely from this log likelihood ratio on, if it also leaves at most this part of the
-#: product of the mean squares of all components with a log likelihood ratio above the third figure: of many samples a
-#: slight difference is significant, too, but may be one of the models.
+#: Another reading is far more likely from this log likelihood ratio on, if it also leaves at most this part of the mean
+#: square of a component, and of the product of those of all components with a log likelihood ratio above the third
+#: figure: of many samples a slight difference is significant, too, but may be one of the models.
 _FAR, _PART, _TELLING = 12.0, 0.5, 3.0
 #: A mean square below this part of the square of its usual size says nothing.
 _FLOOR = 0.1
 #: What speaks so much against a reading is not made good by other comparisons, which are left out.
 _AGAINST = -40.0
-#: Delays that are tried [s]; `simnav.log.alignment` finds shorter ones. UTC is 18 s behind GPS, and 37 s behind TAI.
-_DELAYS = np.array([*np.arange(0.5, 5.01, 0.5), 18.0, 37.0])
+#: Delays that are tried [s], up to this part of a log: of a shorter one too little would be left to compare.
+#: `simnav.log.alignment` finds shorter delays. UTC is 18 s behind GPS, and 37 s behind TAI.
+_DELAYS, _PART_OF_LOG = np.array([*np.arange(0.5, 5.01, 0.5), 18.0, 37.0]), 0.1
 #: Readings whose log likelihoods differ by less are told apart by the number of changes.
 _SAME = 1.0
 #: So many of the likeliest readings of a stream are also tried with each delay, and those with usual axes.
@@ -137,7 +138,7 @@ class _Tried:
     ratio : float
         Logarithm of its likelihood over that of the present one.
     left : float
-        Logarithm of the part of the squares that it leaves.
+        Logarithm of the part of the squares that it leaves: of their product, or of one component if that is more.
     unit : float
         How much less improbable the parameters are with its unit; 0 for a reading in the same unit.
     """
@@ -223,7 +224,10 @@ def _best(log: RecordedSpec, streams: Streams) -> tuple[Reading, ProbableReading
         parts: fit(residual) for parts, compare in compared.items() if (residual := compare(streams)) is not None
     }
     readings: dict[str, list[_Tried]] = {}
+    longest = _PART_OF_LOG * float(np.ptp(streams.position.time))
     for reading in _readings(log, streams):
+        if abs(reading.delay) > longest:
+            continue
         if (one := _tried(reading, streams, compared, present)) is not None:
             readings.setdefault(reading.stream, []).append(one)
     likeliest: tuple[Reading, ProbableReading] | None = None
@@ -233,7 +237,7 @@ def _best(log: RecordedSpec, streams: Streams) -> tuple[Reading, ProbableReading
         others = [t for k, t in enumerate(others) if k < _WITH_DELAYS or t.reading.usual]
         for other, delay in itertools.product(others, delays):
             one = _tried(other.reading.late(delay), streams, compared, present)
-            if one is not None and one.left <= other.left:
+            if one is not None and one.ratio > other.ratio + _FAR and one.left < other.left + np.log(_PART):
                 tried.append(one)
         told = _told(stream, tried)
         if told is not None and (likeliest is None or told[1].log_ratio > likeliest[1].log_ratio + _SAME):
@@ -247,7 +251,7 @@ def _tried(
     compared: Mapping[tuple[str, ...], Callable[[Streams], Residual | None]],
     present: Mapping[tuple[str, ...], Fit],
 ) -> _Tried | None:
-    """A reading beside the present one; None where nothing is compared with its stream.
+    """A reading beside the present one; None where nothing is compared with its stream, or no longer.
 
     A smaller unit makes the noise of the stream smaller, which is no merit: residuals are then compared in the present
     unit. A larger unit makes it larger, which is no fault: it is taken as large as in the present unit.
@@ -258,11 +262,13 @@ def _tried(
     other = reading.alter(streams)
     square = reading.times**2
     noise = _noise(other.series(reading.stream).value) / square if square > 1.0 else 0.0
-    ratio, left, relief = 0.0, 0.0, 0.0
+    ratio, left, least, relief = 0.0, 0.0, 0.0, 0.0
     for parts in involved:
-        residual = compared[parts](other) if ratio > _AGAINST else None
-        if residual is None:
+        if ratio <= _AGAINST:
             continue
+        residual = compared[parts](other)
+        if residual is None:  # what speaks against it would be lost
+            return None
         fitted = fit(residual)
         own = np.minimum(noise, np.minimum(present[parts].mean_square, fitted.mean_square / square))
         mean_square = fitted.mean_square / square if square < 1.0 else fitted.mean_square - own * (square - 1.0)
@@ -271,8 +277,10 @@ def _tried(
         relief += present[parts].penalty - fitted.penalty
         ratio += float(each.sum()) - fitted.penalty + present[parts].penalty
         before, after = (f.mean_square + _FLOOR * f.size**2 for f in (present[parts], fitted))
-        left += float(np.sum(np.log(after / before)[np.abs(each) > _TELLING]))
-    return _Tried(reading, ratio, left, relief if reading.times != 1.0 else 0.0)
+        parts_left = np.log(after / before)[np.abs(each) > _TELLING]
+        left += float(np.sum(parts_left))
+        least = min(least, *parts_left.tolist(), 0.0)
+    return _Tried(reading, ratio, max(left, least), relief if reading.times != 1.0 else 0.0)
 
 
 def _noise(value: Array) -> float:
@@ -285,18 +293,20 @@ def _noise(value: Array) -> float:
 def _told(stream: str, tried: list[_Tried]) -> tuple[Reading, ProbableReading] | None:
     """The likeliest reading of one stream, with its probability, if it is far more likely than the present one."""
     smaller = [t for t in tried if t.left < np.log(_PART) or t.unit > _FAR]  # a current of 7 m/s is a wrong unit
-    if not smaller or (top := max(t.ratio for t in smaller)) < _FAR:
+    smaller = [t for t in smaller if t.ratio >= _FAR]
+    if not smaller:
         return None
-    ratio = np.array([t.ratio for t in smaller])
-    alike = ratio > top - _SAME
+    delays = len({t.reading.delay for t in tried}) - 1  # all together are one reading
+    prior = np.array([(1.0 / delays if t.reading.delay else 1.0) * _TWO ** (t.reading.mistakes - 1) for t in smaller])
+    posterior = np.array([t.ratio for t in smaller]) + np.log(prior / len(tried))
+    top = posterior.max()
+    alike = posterior > top - _SAME
     first, *rest = sorted((smaller[k] for k in np.flatnonzero(alike)), key=lambda t: (t.reading.number, -t.ratio))
     reading = first.reading
     # The delay next to the best one is another figure of the same reading.
     others = tuple(t.reading.what for t in rest if not t.reading.delay * reading.delay > 0.0)
     same = np.array([t is first or t.reading.delay * reading.delay > 0.0 for t in smaller])
-    delays = len({t.reading.delay for t in tried}) - 1  # all together are one reading
-    prior = np.array([(1.0 / delays if t.reading.delay else 1.0) * _TWO ** (t.reading.mistakes - 1) for t in smaller])
-    weight = prior * np.exp(ratio - top) / len(tried)
+    weight = np.exp(posterior - top)
     own, total = float(weight[same | alike].sum()), float(weight.sum() + np.exp(-top))
     changes = tuple((table, key, json.dumps(value)) for table, key, value in reading.changes)
     return reading, ProbableReading(stream, changes, reading.what, first.ratio, own / total,

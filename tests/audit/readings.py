@@ -4,7 +4,7 @@ Simulated logs whose instruments have other errors than their datasheets say (`t
 voyages of the catalogue, are written as files and drafted by names and sizes, as 'simnav log inspect' does. The DVL of
 the first is late by a fraction of a second, which is between the delays that are compared (0 and 0.5 s): to say 0.5 s
 is no error there if it is late by `LATE` or more. Ships without an IMU have faults, too; hours of one have no file of
-the truth.
+the truth, nor have logs of a minute or two.
 """
 
 from __future__ import annotations
@@ -34,8 +34,11 @@ LOGS, PARTS = 20, 10
 LATE = 0.2
 #: Voyages of the catalogue, and so much of each [s].
 NAMES, LENGTH = ("coastal-voyage", "auv-survey", "gnss-outage", "harbour-multipath", "ship-straight"), 240.0
-#: Voyages of ships without an IMU, whole and with their faults.
-WHOLE = ("fishing-vessel", "ship-dead-reckoning", "ferry-in-the-wind", "fluxgate-deviation", "coaster-compass")
+#: Voyages that are read whole and with their faults: of ships without an IMU, with lever arms of 20 m, in short waves.
+WHOLE = ("fishing-vessel", "ship-dead-reckoning", "ferry-in-the-wind", "fluxgate-deviation", "coaster-compass",
+         "survey-without-bottom-lock", "uuv-lake")  # fmt: skip
+#: Voyages of which the first minute or two is read, and its lengths [s].
+SHORT, LENGTHS = ("open-sea", "gnss-outage", "harbour-multipath", "rov-inspection", "mems-only"), (60.0, 90.0, 120.0)
 
 
 def readings_of(seed: int) -> list[str]:
@@ -71,9 +74,19 @@ def _hours_without_truth() -> list[str]:
 
 
 def _whole_voyages() -> list[str]:
-    """Twenty of `WHOLE`, in turn."""
+    """Voyages of `WHOLE`, in turn."""
     return [f"{name}, seed {k}: {text}" for k in range(9100, 9100 + LOGS)
             for name in [WHOLE[k % len(WHOLE)]] for text in _told(record(load(name), k), True)]  # fmt: skip
+
+
+def _minutes_without_truth() -> list[str]:
+    """The beginnings of twenty voyages."""
+    found = []
+    for k in range(9250, 9250 + LOGS):
+        scenario = load(SHORT[k % len(SHORT)])
+        recording = record(scenario.model_copy(update={"duration": LENGTHS[k % len(LENGTHS)]}), k)
+        found += [f"{scenario.name}, seed {k}: {text}" for text in _told(recording, False)]
+    return found
 
 
 def _part(number: int) -> list[str]:
@@ -85,7 +98,8 @@ def parts() -> Mapping[str, Callable[[], Any]]:
     found: dict[str, Callable[[], Any]] = {
         f"logs {LOGS * k} to {LOGS * (k + 1) - 1}": partial(_part, k) for k in range(PARTS)
     }
-    found["ships without an IMU"] = _whole_voyages
+    found["whole voyages"] = _whole_voyages
+    found["minutes without a truth"] = _minutes_without_truth
     return found | {"hours of a ship without a truth": _hours_without_truth}
 
 

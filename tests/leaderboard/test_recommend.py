@@ -126,6 +126,7 @@ def test_without_evidence_nothing_is_read(folder: Path) -> None:
     ("arguments", "says"),
     [
         ({"instruments": ["imu", "gnsss"]}, "'gnsss' is no kind of instrument; did you mean 'gnss'?"),
+        ({"instruments": ["open-sea", "imu"]}, "'open-sea' is a scenario, which has its instruments: name it alone"),
         ({"instruments": []}, "no instrument was named"),
         (
             {"instruments": "imu,gnss", "troubles": ["outages"]},

@@ -45,7 +45,8 @@ class ImuDisturbance(FaultSpec):
     def _something(self) -> Self:
         if self.instruments != ("imu",):
             raise ValueError("an imu_disturbance is on 'imu' and nothing else")
-        if not np.any([self.specific_force, self.angular_rate, self.specific_force_noise, self.angular_rate_noise]):
+        sizes = {"specific_force", "angular_rate", "specific_force_noise", "angular_rate_noise"}
+        if not sizes & self.model_fields_set:
             raise ValueError(
                 "an imu_disturbance needs specific_force_m_s2, angular_rate_deg_s, or one of their noises"
                 " (specific_force_noise_m_s2, angular_rate_noise_deg_s)"

@@ -60,7 +60,7 @@ class ImuBiasStep(ImuFaultSpec):
 
     @model_validator(mode="after")
     def _something(self) -> Self:
-        if not np.any([self.angular_rate, self.specific_force]):
+        if not {"angular_rate", "specific_force"} & self.model_fields_set:
             raise ValueError("an imu_bias_step needs angular_rate_deg_h or specific_force_ug")
         return self
 

@@ -38,7 +38,7 @@ class ImuWarmUp(ImuFaultSpec):
 
     @model_validator(mode="after")
     def _something(self) -> Self:
-        if not np.any([self.angular_rate, self.specific_force]):
+        if not {"angular_rate", "specific_force"} & self.model_fields_set:
             raise ValueError("an imu_warm_up needs angular_rate_deg_h or specific_force_ug")
         return self
 

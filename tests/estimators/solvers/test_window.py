@@ -18,6 +18,7 @@ from simnav.estimators.solvers.window import WindowEstimator
 from simnav.estimators.weightings.base import Factors, Weighting
 from simnav.recording import Recording
 from simnav.scenario import load
+from simnav.scenario.reading import parse
 from simnav.source import record
 from simnav.trial import Trial, run_trial
 from simnav.types import Estimate, Measurements
@@ -61,6 +62,60 @@ def test_one_epoch_is_an_iterated_filter(clean: Recording):
     one = position(run(make("sw-fgo", window=1), clean), clean)
     filtered = position(run(make("iekf"), clean), clean)
     np.testing.assert_allclose(one, filtered, atol=2e-3)
+
+
+QUIET = """
+name = "quiet"
+version = 1
+title = "accelerometers without white noise, as datasheets of the best ones leave it out"
+duration_s = 80.0
+
+[start]
+latitude_deg = 45.0
+longitude_deg = 10.0
+speed_m_s = 5.0
+
+[initial_error]
+position_m = [2.0, 2.0, 3.0]
+velocity_m_s = [0.05, 0.05, 0.05]
+attitude_deg = [0.2, 0.2, 1.5]
+
+[vessel]
+kind = "ship"
+
+[[manoeuvre]]
+kind = "zigzag"
+angle_deg = 25.0
+duration_s = 80.0
+
+[instruments.imu]
+rate_hz = 50.0
+grade = "navigation"
+
+[instruments.gnss]
+kind = "gnss_position"
+rate_hz = 1.0
+sigma_m = [1.5, 1.5, 3.0]
+
+[instruments.dvl]
+rate_hz = 1.0
+sigma_m_s = 0.02
+"""
+
+
+@pytest.fixture(scope="module")
+def quiet() -> Recording:
+    return record(parse(QUIET, source="quiet"), 9301)
+
+
+@pytest.mark.parametrize("name", [n for n in FAST if not n.endswith("-paper")])
+def test_accelerometers_without_noise_are_believed(name: str, quiet: Recording):
+    """The rounding of their motion is no error that a robust weight should see."""
+    assert quiet.instruments.imu is not None
+    assert quiet.instruments.imu.accelerometer.random_walk == 0.0
+    error, plain = (horizontal(run_trial(make(n), quiet), quiet) for n in (name, "ekf"))
+    assert len(error) == len(plain) == 80
+    assert np.sqrt(np.mean(error**2)) < 1.3 * np.sqrt(np.mean(plain**2))
 
 
 def test_what_left_the_window_is_not_forgotten(clean: Recording):

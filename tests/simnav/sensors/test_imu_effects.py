@@ -267,6 +267,20 @@ def test_mistakes_in_faults_are_one_sentence(fault, message):
         faulty(fault)
 
 
+@pytest.mark.parametrize(
+    "fault",
+    [
+        'kind = "imu_bias_step"\nangular_rate_deg_h = { uniform = [-300, 300] }',
+        'kind = "imu_warm_up"\ntime_s = 4.0\nspecific_force_ug = { uniform = [-300, 300] }',
+        'kind = "imu_disturbance"\nangular_rate_deg_s = { uniform = [-3, 3] }',
+        'kind = "imu_bias_step"\nangular_rate_deg_h = 0.0',
+    ],
+)
+def test_a_fault_may_be_of_either_sign_and_of_no_size(fault):
+    """The middle of the range, at which a scenario is checked, is no fault at all, like the clean end of a dial."""
+    assert len(record(faulty(fault), 1).data.imu) > 0
+
+
 def test_a_fault_of_the_imu_needs_one():
     text = SCENARIO.partition("[instruments.imu]")[0] + "[instruments.gnss_position]\nrate_hz = 1.0\nsigma_m = 1.0\n"
     with pytest.raises(SpecError, match="'imu_dropout': the scenario has no IMU"):
