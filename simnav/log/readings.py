@@ -39,10 +39,10 @@ if TYPE_CHECKING:
 
 __all__ = ["ProbableReading", "probable_readings"]
 
-#: Another reading is far more likely from this log likelihood ratio on, if it also leaves at most this part of the mean
-#: square of a component, and of the product of those of all components with a log likelihood ratio above the third
-#: figure: of many samples a slight difference is significant, too, but may be one of the models.
-_FAR, _PART, _TELLING = 12.0, 0.5, 3.0
+#: Another reading is far more likely from this log likelihood ratio on, if it also leaves at most the first part of the
+#: product of the mean squares of all components with a log likelihood ratio above the last figure, and the second part
+#: of one of them: of many samples a slight difference is significant, too, but may be one of the models.
+_FAR, _PART, _PART_OF_ONE, _TELLING = 12.0, 0.5, 0.56, 3.0
 #: A mean square below this part of the square of its usual size says nothing.
 _FLOOR = 0.1
 #: What speaks so much against a reading is not made good by other comparisons, which are left out.
@@ -137,8 +137,8 @@ class _Tried:
         The reading.
     ratio : float
         Logarithm of its likelihood over that of the present one.
-    left : float
-        Logarithm of the part of the squares that it leaves: of their product, or of one component if that is more.
+    left, least : float
+        Logarithm of the part that it leaves of the product of the mean squares, and of that of one component.
     unit : float
         How much less improbable the parameters are with its unit; 0 for a reading in the same unit.
     """
@@ -146,6 +146,7 @@ class _Tried:
     reading: Reading
     ratio: float
     left: float
+    least: float
     unit: float
 
 
@@ -280,7 +281,7 @@ def _tried(
         parts_left = np.log(after / before)[np.abs(each) > _TELLING]
         left += float(np.sum(parts_left))
         least = min(least, *parts_left.tolist(), 0.0)
-    return _Tried(reading, ratio, max(left, least), relief if reading.times != 1.0 else 0.0)
+    return _Tried(reading, ratio, left, least, relief if reading.times != 1.0 else 0.0)
 
 
 def _noise(value: Array) -> float:
@@ -292,8 +293,11 @@ def _noise(value: Array) -> float:
 
 def _told(stream: str, tried: list[_Tried]) -> tuple[Reading, ProbableReading] | None:
     """The likeliest reading of one stream, with its probability, if it is far more likely than the present one."""
-    smaller = [t for t in tried if t.left < np.log(_PART) or t.unit > _FAR]  # a current of 7 m/s is a wrong unit
-    smaller = [t for t in smaller if t.ratio >= _FAR]
+    smaller = [
+        t for t in tried
+        if t.ratio >= _FAR and ((t.left < np.log(_PART) and t.least < np.log(_PART_OF_ONE))
+                                or t.unit > _FAR)  # a current of 7 m/s is a wrong unit
+    ]  # fmt: skip
     if not smaller:
         return None
     delays = len({t.reading.delay for t in tried}) - 1  # all together are one reading
