@@ -137,6 +137,8 @@ class _Tried:
         The reading.
     ratio : float
         Logarithm of its likelihood over that of the present one.
+    worst : float
+        The least of its parts, of one component; 0 for a reading in another unit, in which the noise is another.
     left, least : float
         Logarithm of the part that it leaves of the product of the mean squares, and of that of one component.
     unit : float
@@ -145,6 +147,7 @@ class _Tried:
 
     reading: Reading
     ratio: float
+    worst: float
     left: float
     least: float
     unit: float
@@ -263,7 +266,7 @@ def _tried(
     other = reading.alter(streams)
     square = reading.times**2
     noise = _noise(other.series(reading.stream).value) / square if square > 1.0 else 0.0
-    ratio, left, least, relief = 0.0, 0.0, 0.0, 0.0
+    ratio, worst, left, least, relief = 0.0, 0.0, 0.0, 0.0, 0.0
     for parts in involved:
         if ratio <= _AGAINST:
             continue
@@ -275,13 +278,15 @@ def _tried(
         mean_square = fitted.mean_square / square if square < 1.0 else fitted.mean_square - own * (square - 1.0)
         fitted = replace(fitted, mean_square=mean_square)
         each = log_ratios(fitted, present[parts])
+        worst = min(worst, float(each.min()))
         relief += present[parts].penalty - fitted.penalty
         ratio += float(each.sum()) - fitted.penalty + present[parts].penalty
         before, after = (f.mean_square + _FLOOR * f.size**2 for f in (present[parts], fitted))
         parts_left = np.log(after / before)[np.abs(each) > _TELLING]
         left += float(np.sum(parts_left))
         least = min(least, *parts_left.tolist(), 0.0)
-    return _Tried(reading, ratio, left, least, relief if reading.times != 1.0 else 0.0)
+    own_unit = reading.times == 1.0
+    return _Tried(reading, ratio, worst if own_unit else 0.0, left, least, 0.0 if own_unit else relief)
 
 
 def _noise(value: Array) -> float:
@@ -291,13 +296,16 @@ def _noise(value: Array) -> float:
     return float(np.median(np.abs(second), axis=0).max() ** 2 * 1.4826**2 / 6.0) if len(second) else 0.0
 
 
+def _explains(tried: _Tried) -> bool:
+    """Whether a reading leaves little of what the present one does not explain, and makes no component far worse."""
+    if tried.unit > _FAR:  # a current of 7 m/s is a wrong unit
+        return True
+    return bool(tried.left < np.log(_PART) and tried.least < np.log(_PART_OF_ONE) and tried.worst > -_FAR)
+
+
 def _told(stream: str, tried: list[_Tried]) -> tuple[Reading, ProbableReading] | None:
     """The likeliest reading of one stream, with its probability, if it is far more likely than the present one."""
-    smaller = [
-        t for t in tried
-        if t.ratio >= _FAR and ((t.left < np.log(_PART) and t.least < np.log(_PART_OF_ONE))
-                                or t.unit > _FAR)  # a current of 7 m/s is a wrong unit
-    ]  # fmt: skip
+    smaller = [t for t in tried if t.ratio >= _FAR and _explains(t)]
     if not smaller:
         return None
     delays = len({t.reading.delay for t in tried}) - 1  # all together are one reading

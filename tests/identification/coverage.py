@@ -149,8 +149,10 @@ def simulated(seed: int) -> tuple[Scenario, Recording, dict[tuple[str, str], flo
 def _compared(found: Identification, true: dict[tuple[str, str], float]) -> Iterator[tuple[str, float, bool, float]]:
     """Label, whether the log tells it, whether the interval holds the truth, and the error in half intervals."""
     for e in found.estimates:
-        value = true[e.key, e.part]
-        if e.constant:
+        value = true.get((e.key, e.part), 0.0)  # an error that the instrument has not
+        if value == 0.0 and not e.constant:
+            error = np.nan
+        elif e.constant:
             error = 2.0 * (value - e.value) / (e.high - e.low)
         else:
             error = 2.0 * np.log(value / e.value) / np.log(e.high / e.low)
@@ -176,7 +178,7 @@ def main(arguments: list[str] | None = None) -> None:
     print(f"\n{'figure':58s} fits told inside  mean error in half intervals")
     for label, fits in rows.items():
         known, inside, error = np.array(fits).T
-        print(f"{label:58s} {len(fits):4d} {known.sum():4.0f} {inside.mean():6.2f}  {error.mean():+.2f}")
+        print(f"{label:58s} {len(fits):4d} {known.sum():4.0f} {inside.mean():6.2f}  {np.nanmean(error):+.2f}")
     known, inside, _ = np.concatenate([np.array(fits) for fits in rows.values()]).T
     print(f"all: {inside.mean():.3f} of {len(inside)}; told by the log: {inside[known == 1.0].mean():.3f} of "
           f"{known.sum():.0f}; figures that were not found: {missing}")  # fmt: skip
