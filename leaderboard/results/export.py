@@ -42,7 +42,7 @@ MOST_IN_JSON = 20_000
 _CHUNK = 8192  # runs that are converted at a time
 _DIGITS = 4  # of figures of the ranking
 #: Of more runs than `MOST_IN_JSON`: binary digits of figures (three decimal ones) and of times; unit of memory [byte].
-_BITS, _BITS_OF_TIMES, _MEMORY = 11, 8, 65536
+_BITS, _BITS_OF_TIMES, _MEMORY = 10, 7, 65536
 _FACTS = ("scenario", "seed", "draws", "estimator", "parameters", "learned", "reference", "status", "reason", "note")
 _COSTS = ("seconds", "peak_memory")
 _TIMES = ("seconds", "update_median", "update_mean", "update_p95")
@@ -178,7 +178,7 @@ def write_parquet(document: Document, path: Path) -> list[Path]:
         every = every.set_column(k, every.schema.field(k), pc.multiply(pc.divide(memory, _MEMORY), _MEMORY))
     rest = [name for name in every.column_names if name not in real]
     with complete_file(path) as part:
-        pq.write_table(every, part, compression="zstd", compression_level=15, use_dictionary=rest,
+        pq.write_table(every, part, compression="brotli", compression_level=11, use_dictionary=rest,
                        use_byte_stream_split=real)  # fmt: skip
     return [path]
 
