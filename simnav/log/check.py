@@ -173,8 +173,7 @@ def _read(recording: str, part: str, read: Callable[[], Any], parts: dict[str, A
         yield LogFinding(recording, part, "ok", f"{made.duration:g} s; {made.note}".rstrip("; "))
     elif isinstance(made, Series):
         yield LogFinding(recording, part, "ok", f"{made.source}: {described(made.time)}")
-        same = float(np.mean(np.all(np.diff(made.value, axis=0) == 0.0, axis=1))) if len(made.time) > 1 else 0.0
-        if same > _MANY:
+        if (same := _repeated(made.value)) > _MANY:
             yield LogFinding(
                 recording, part, "note",
                 f"{made.source}: {100.0 * same:.0f} % of the values are those of the row before; if the logger repeats "
@@ -182,6 +181,17 @@ def _read(recording: str, part: str, read: Callable[[], Any], parts: dict[str, A
             )  # fmt: skip
     else:
         yield LogFinding(recording, part, "ok", f"{made.source}: {described(made.edge[1:])}")
+        if (same := _repeated(made.mean)) > _MANY:
+            yield LogFinding(
+                recording, part, "note",
+                f"{made.source}: {100.0 * same:.0f} % of the samples are those of the row before: the IMU did not "
+                "measure there, or its logger repeats old values",
+            )  # fmt: skip
+
+
+def _repeated(value: Array) -> float:
+    """Share of the rows that repeat the row before."""
+    return float(np.mean(np.all(np.diff(value, axis=0) == 0.0, axis=1))) if len(value) > 1 else 0.0
 
 
 def described(time: Array) -> str:

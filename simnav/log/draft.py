@@ -88,6 +88,8 @@ def draft(streams: Sequence[Stream], name: str = "my-log", file: str | None = No
         both = [(r, f) for r in found for f in found if r.stream is f.stream
                 and (r.quantity, f.quantity) == ("angular_rate", "specific_force")]  # fmt: skip
         rate, force = both[0] if both else (rate, force)
+    if rate is not None and len(rate.stream.time) < 2:
+        rate = None  # a single sample is no IMU
     if reference is None:
         best.pop("velocity", None)  # of the same receiver as the reference
     used = [position, *(g for q, g in best.items() if q in _INSTRUMENTS), *([attitude] if attitude is not None else [])]

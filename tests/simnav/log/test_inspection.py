@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from simnav.leaderboard.logs import export
+from simnav.leaderboard.results.formats import write
 from simnav.log import LogError, LogSource
 from simnav.log.check import check_log, described
 from simnav.log.column_guesses import guesses
@@ -13,6 +14,7 @@ from simnav.log.delimited import read_csv
 from simnav.log.draft import draft
 from simnav.log.inspection import inspect_log, streams_of
 from simnav.scenario import load
+from simnav.source import record
 from tests.cases.log_files import CASES
 
 
@@ -251,3 +253,21 @@ def test_the_draft_of_an_export_runs_without_an_edit(tmp_path, name):
     assert exported <= set(made.log.instruments)
     assert check_log(made).passed
     assert LogSource(made, 0).duration > 30.0
+
+
+@pytest.mark.parametrize("rows", [1, 2000])
+def test_an_imu_that_says_nothing_is_none_or_is_named(tmp_path, rows):
+    """One sample is no IMU; samples that are all the same were not measured."""
+    folder = tmp_path / "run"
+    voyage = load("open-sea").model_copy(update={"duration": 20.0})
+    write("recording", "csv", record(voyage, 1), folder)
+    head, *samples = (folder / "imu.csv").read_text().splitlines()
+    first = samples[0].partition(",")[2]
+    same = [f"{line.partition(',')[0]},{first}" for line in samples[:rows]]
+    (folder / "imu.csv").write_text("\n".join([head, *same]) + "\n")
+    path = tmp_path / "still.toml"
+    path.write_text(draft(inspect_log([folder])[0], "still"))
+    assert ("[instruments.imu]" in path.read_text()) == (rows > 1)
+    if rows > 1:
+        notes = [f.sentence for f in check_log(load(path)).findings if f.part == "imu" and f.level == "note"]
+        assert any("100 % of the samples are those of the row before: the IMU did not measure" in n for n in notes)
