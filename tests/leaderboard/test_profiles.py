@@ -46,9 +46,10 @@ def test_standard_has_the_same_seeds_for_all_rows_of_a_track():
     chosen = {row for (scenario, row) in most if known[scenario].track in ("papers", "long")}
     assert 20 <= len(chosen) <= 25
     loose = {n for n in names() if getattr(find(n), "loose", False)}
-    special = {"satellites": loose, "acoustic": loose, "cooperative": {"ekf-ci"}, "terrain": loose | {"terrain-pmf"}}
+    special = {"satellites": loose, "acoustic": loose, "cooperative": {"ekf-ci"}, "terrain": loose | {"terrain-pmf"},
+               "robustness": {"mh-ekf"}}  # fmt: skip
     with_chosen = {
-        "papers": 10, "long": 10, "coloured": 8, "robustness": 8, "satellites": 30, "acoustic": 30, "cooperative": 30,
+        "papers": 10, "long": 10, "coloured": 8, "robustness": 30, "satellites": 30, "acoustic": 30, "cooperative": 30,
         "terrain": 30,
     }  # fmt: skip
     slow = {"terrain-pmf"}  # the only row that matches soundings with the chart by itself
