@@ -144,7 +144,8 @@ class MultipleHypothesisEkf(Row, solver=MultipleHypothesis, model=DoubtedInstrum
     5
         That the biases of the IMU drift is a hypothesis, begun every 20 s in any case, like those on fixes.
     6
-        A heading that neither a fix nor a compass sees is not doubted, nor is the IMU beside the log that is left.
+        A heading that neither a fix nor a compass sees is not doubted, nor is the IMU beside the log that is left. That
+        the IMU has more noise is a hypothesis.
     """
 
     version = 6
