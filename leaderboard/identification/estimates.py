@@ -27,7 +27,7 @@ __all__ = ["AXES", "CONSTANTS", "PLACES", "Estimated", "enlarged", "estimates", 
 #: Half a 95 % interval, in standard deviations.
 _HALF = 1.96
 #: A size is told if the standard deviation of its logarithm is below this, a constant if its own is below this part of
-#: what was assumed before, and a lever arm if its own is below this [m] or it is corrected.
+#: what was assumed before, and a lever arm if its own is below this [m] or it differs by more than chance.
 _TOLD_SIZE, _TOLD_PART, _TOLD_ARM = 1.0, 0.5, 1.0
 #: A lever arm or delay is corrected from so many standard deviations on.
 _CORRECTED = 3.0
@@ -158,7 +158,7 @@ def estimates(scenario: Scenario, fitted: Fitted) -> list[Estimated]:
             now = _now(spec, p.figure if p.instrument != HEADING else "attitude", p.components or (
                 (2,) if p.instrument == HEADING else ())) / unit  # fmt: skip
         if p.figure == "lever_arm":
-            told = s < _TOLD_ARM or abs(p.value(x) - _stated(scenario, p)) > _CORRECTED * s
+            told = s < _TOLD_ARM or _beyond_chance(p.value(x) - _stated(scenario, p), s)
         else:
             told = s < (_TOLD_SIZE if p.size else _TOLD_PART * p.spread)
         part = "error of the heading" if p.instrument == HEADING else p.part
@@ -270,7 +270,11 @@ def enlarged(scenario: Scenario, instruments: Instruments, names: Iterable[str])
 
 def _corrects(fitted: Fitted, p: Parameter, difference: float, s: float) -> bool:
     """Whether a lever arm or delay differs by more than chance, of an instrument whose model suffices."""
-    return p.instrument not in fitted.coloured and abs(difference) > _CORRECTED * s
+    return p.instrument not in fitted.coloured and _beyond_chance(difference, s)
+
+
+def _beyond_chance(difference: float, s: float) -> bool:
+    return abs(difference) > _CORRECTED * s
 
 
 def _stated(scenario: Scenario, p: Parameter) -> float:

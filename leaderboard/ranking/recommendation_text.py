@@ -73,7 +73,7 @@ def _sure(answer: Answer, row: Candidate, plain: Candidate) -> list[str]:
     number = "1 scenario" if scenarios == 1 else f"{scenarios} scenarios"
     runs = f"{spread(g.units for g in answer.groups)} {answer.groups[0].unit}s{' each' * (scenarios != 1)}"
     most = max(row.runs // len(g.scenarios) for g in answer.groups for row in g.rows)
-    if most > max(g.units for g in answer.groups):
+    if answer.groups[0].unit == "seed" and most > max(g.units for g in answer.groups):
         runs += f", and up to {most} of rows that may be the best"
     said = [f"For {_joined(answer.instruments)} the evidence is {number} with {runs}."]
     rows = f"{answer.compared} rows" if answer.limit is None else f"the rows within {answer.limit:g} ms"

@@ -286,7 +286,10 @@ def _tried(
         left += float(np.sum(parts_left))
         least = min(least, *parts_left.tolist(), 0.0)
     own_unit = reading.times == 1.0
-    return _Tried(reading, ratio, worst if own_unit else 0.0, left, least, 0.0 if own_unit else relief)
+    return _Tried(
+        reading, ratio=ratio, worst=worst if own_unit else 0.0, left=left, least=least,
+        unit=0.0 if own_unit else relief,
+    )  # fmt: skip
 
 
 def _noise(value: Array) -> float:

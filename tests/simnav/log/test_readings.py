@@ -242,7 +242,8 @@ def test_two_mistakes_are_named_only_if_both_are_likely():
     """A delay that fits slightly better beside another reading is none."""
     one = Reading("dvl", ("dvl",), lambda s: s, 1, "other axes", (("t", "k", 1),))
     late = [replace(one, what=f"other axes, late by {d}", delay=float(d), mistakes=2, number=2) for d in range(1, 21)]
-    tried = [_Tried(one, 40.0, 0.0, -3.0, -1.0, 0.0), *(_Tried(r, 42.0, 0.0, -3.1, -1.0, 0.0) for r in late)]
+    tried = [_Tried(one, ratio=40.0, worst=0.0, left=-3.0, least=-1.0, unit=0.0)]
+    tried += [_Tried(r, ratio=42.0, worst=0.0, left=-3.1, least=-1.0, unit=0.0) for r in late]
     reading, told = _of_stream("dvl", tried)
     assert reading is one
     assert told.probability > 0.5
@@ -251,7 +252,7 @@ def test_two_mistakes_are_named_only_if_both_are_likely():
 def test_readings_that_the_motion_does_not_tell_apart_are_named_together():
     def read(number, ratio):
         reading = Reading("dvl", ("dvl",), lambda s: s, number, f"reading {number}", (("t", "k", number),))
-        return _Tried(reading, ratio, 0.0, -3.0, -1.0, 0.0)
+        return _Tried(reading, ratio=ratio, worst=0.0, left=-3.0, least=-1.0, unit=0.0)
 
     tried = [read(number, ratio) for number, ratio in ((1, 40.0), (2, 40.2), (3, 20.0))]
     _, told = _of_stream("dvl", tried)
