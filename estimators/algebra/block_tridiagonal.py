@@ -282,7 +282,9 @@ def _return(adjoint: Array, U: Array, G: Array, y: Array, m: int, z: Array) -> N
 
 
 @kernel
-def solve_chain(window: Window, rows: Rows, prior: Matrix, damping: float, first: int) -> tuple[float, float]:
+def solve_chain(
+    window: Window, rows: Rows, prior: Matrix, mean: Vector, damping: float, first: int
+) -> tuple[float, float]:
     """Compute one step of K nodes of n states with K - 1 motion factors and M aiding factors (equations in the module).
 
     Parameters
@@ -292,8 +294,8 @@ def solve_chain(window: Window, rows: Rows, prior: Matrix, damping: float, first
         the aiding factors ``cross``, ``white``, ``innovation`` and ``used``.
     rows : Rows
         Where they are.
-    prior : (n, n) array
-        Covariance of the first node before its measurements.
+    prior, mean : (n, n), (n,) arrays
+        Covariance of the first node before its measurements, and its mean as a step of the node.
     damping : float
         The damping lambda, 0 for a Gauss-Newton step.
     first : int
@@ -336,7 +338,7 @@ def solve_chain(window: Window, rows: Rows, prior: Matrix, damping: float, first
     for k in range(first, count):
         P, d = predicted[k], predicted_shift[k]
         if k == 0:
-            _copy_node(prior, window.prior.shift, P, d)
+            _copy_node(prior, mean, P, d)
         else:
             weight = motion_weight[k - 1]
             _predict(filtered[k - 1], transition[k - 1], noise[k - 1], weight, rows.coupled, elements, room, P)

@@ -23,7 +23,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from functools import cached_property, singledispatch
 from types import SimpleNamespace
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,7 +51,7 @@ from .channel_readings import ChannelReadings
 from .columns import Columns, Made
 from .filtering import Dynamics
 from .intermediate_states import IntermediateStates
-from .marginalisation import Reference, keep_covariance, marginalise, subtract_step
+from .marginalisation import Reference, keep_prior, marginalise, subtract_step
 from .named_state import NamedState, at_row
 
 __all__ = ["Chain", "chain_of"]
@@ -100,6 +100,9 @@ class Chain(ABC):
     functions: Any = None
     #: What the functions work on, with what `growing` returns.
     dynamics: Dynamics
+    #: What is normal in the prior of the first node: ``"differences"`` of the state, or the right-invariant error on
+    #: the ``"group"`` (`simnav.estimators.models.group_prior`). Without rotations both are the same.
+    prior_of: Literal["differences", "group"] = "differences"
     #: Components of the model's error from this index on are independent and only decay.
     coupled: ClassVar[int] = 10**9
 
@@ -144,8 +147,8 @@ class Chain(ABC):
 
     @cached_property
     def reference(self) -> Reference:
-        """How shifts and covariances are referred to another state; a model with rotations overrides it."""
-        return Reference(turn=keep_covariance, relative_shift=subtract_step)
+        """How the prior is linearised at another state; a model with rotations overrides it."""
+        return Reference(at_node=keep_prior, at_mean=keep_prior, relative_shift=subtract_step)
 
     def _append_node(self) -> None:
         front = self.front
@@ -491,12 +494,6 @@ class Chain(ABC):
         error of the linear solution. If rotations are large, a straight step violates the stiff motion factors at
         second order (the Maratos effect: J. Nocedal, S. J. Wright, *Numerical Optimization*, 2006, section 15.5).
         """
-
-    def turned(self, covariance: Array, shift: Array) -> Array:
-        """A covariance at one state, transformed to another state at an (n,) shift."""
-        turned = np.empty_like(covariance)
-        self.reference.in_python.turn(covariance, shift, turned)
-        return turned
 
     def relative_shift(self, shift: Array, step: Array) -> Array:
         """An (n,) shift, relative to the state after a step."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cache
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +22,9 @@ from simnav.types import Array, InitialState, Instruments
 
 from .chain import Chain, chain_of
 from .columns import Columns
+from .difference_prior import differences_at_mean, differences_at_node
 from .filtering import AidTable, aid_of
+from .group_prior import at_mean, at_node
 from .inertial import InertialModel
 from .inertial_errors import ERROR
 from .inertial_functions import INERTIAL_FUNCTIONS
@@ -30,7 +32,7 @@ from .intermediate_states import IntermediateStates, add_noise, through_one
 from .marginalisation import Reference
 from .measurements import OWN, State, observe_inertial
 from .new_factors import INERTIAL_FACTORS, Growing, InertialStates
-from .preintegrated import add_shift, move_shift, relative_shift, turn_covariance
+from .preintegrated import add_shift, move_shift, relative_shift
 from .propagation import IMU_NOISE, correct_inertial
 
 __all__ = ["InertialChain", "InertialWindow", "Moves"]
@@ -67,7 +69,7 @@ class Moves(Record):
     Attributes
     ----------
     reference : Reference
-        How shifts and covariances are referred to another state.
+        How the prior is linearised at another state.
     linearise : callable
         Linearises and whitens the factors that have to do with a node or later ones.
     retract : callable
@@ -264,9 +266,10 @@ def _take_step(w: InertialWindow, rows: Rows) -> float:
 
 
 @cache
-def _moves() -> Moves:
+def _moves(prior: Literal["differences", "group"]) -> Moves:
     """The functions of this module, which are looked up once."""
-    reference = Reference(turn=turn_covariance, relative_shift=relative_shift)
+    to_node, to_mean = (at_node, at_mean) if prior == "group" else (differences_at_node, differences_at_mean)
+    reference = Reference(at_node=to_node, at_mean=to_mean, relative_shift=relative_shift)
     return Moves(reference=reference, linearise=_linearise, retract=_retract, take_step=_take_step)
 
 
@@ -302,8 +305,8 @@ class InertialChain(Chain):
 
     @property
     def reference(self) -> Reference:
-        """As `Chain.reference`: rotations compose, and turn a covariance."""
-        return _moves().reference
+        """As `Chain.reference`: rotations compose."""
+        return _moves(self.prior_of).reference
 
     @property
     def graph(self) -> InertialWindow:
@@ -333,7 +336,7 @@ class InertialChain(Chain):
     @property
     def moves(self) -> Any:
         """As `Chain.moves`: kernels, unless a reading has an equation of its own."""
-        return super().moves if self.front.own else _moves()
+        return super().moves if self.front.own else _moves(self.prior_of)
 
     def linearise_from(self, node: int = 0) -> None:
         """As `Chain.linearise_from` (equations in the module)."""

@@ -1,8 +1,9 @@
 """What a window does when nodes leave: what they say about the first node that stays becomes its prior.
 
 The elimination of a window (`simnav.estimators.algebra.block_tridiagonal`) has what all older nodes say about each
-node: a covariance, and a mean relative to the node. After the last step of the node both are referred to the node as it
-is now. How a shift and a covariance are referred to another state depends on the model: rotations compose.
+node: a covariance, and a mean relative to the node as it was linearised. The prior keeps the mean state and the
+covariance there. In each iteration it is linearised again, at the node as it is then. How, depends on the model:
+rotations compose.
 """
 
 from __future__ import annotations
@@ -20,21 +21,25 @@ from simnav.records import Record
 
 from .intermediate_states import IntermediateStates
 
-__all__ = ["Leaving", "Reference", "keep_covariance", "marginalise", "subtract_step"]
+__all__ = ["Leaving", "Reference", "keep_prior", "marginalise", "subtract_step"]
 
 
 class Reference(Record):
-    """How a model refers a shift and a covariance to another state.
+    """How a model linearises a prior at another state.
 
     Attributes
     ----------
-    turn : callable
-        Overwrites its third argument with a covariance at one state, transformed to the state at a shift.
+    at_node : callable
+        From the covariance at the mean state and the shift of that state from a node, overwrites its last arguments
+        with the covariance at the node and the mean as a step of it.
+    at_mean : callable
+        The inverse of ``at_node``, with the same order of covariances and vectors.
     relative_shift : callable
         Overwrites its third argument with a shift as seen from the state after a step.
     """
 
-    turn: Callable[[Matrix, Vector, Matrix], None]
+    at_node: Callable[[Matrix, Vector, Matrix, Vector], None]
+    at_mean: Callable[[Matrix, Vector, Matrix, Vector], None]
     relative_shift: Callable[[Vector, Vector, Vector], None]
 
 
@@ -46,9 +51,10 @@ class Leaving(NamedTuple):
 
 
 @kernel(passed=True)
-def keep_covariance(covariance: Matrix, shift: Vector, out: Matrix) -> None:
-    """The covariance of a model without rotations, which is the same at any state."""
+def keep_prior(covariance: Matrix, shift: Vector, out: Matrix, out_shift: Vector) -> None:
+    """The prior of a model without rotations, which is the same at any state."""
     for i in range(shift.size):
+        out_shift[i] = shift[i]
         for j in range(shift.size):
             out[i, j] = covariance[i, j]
 
@@ -78,11 +84,12 @@ def marginalise(leaving: int, window: Window, between: IntermediateStates, rows:
         How the model refers shifts and covariances to another state.
     """
     stays, node, of_state = rows.first_node + leaving, window.aids.node, between.node
-    prior, step, mean = window.prior, window.nodes.step[stays], np.empty(window.prior.shift.size)
+    prior, step = window.prior, window.nodes.step[stays]
+    mean, shift = np.empty(prior.shift.size), np.empty(prior.shift.size)
     for j in range(mean.size):
         mean[j] = window.nodes.predicted_shift[stays, j] + step[j]
-    reference.turn(window.nodes.predicted[stays], mean, prior.covariance)
-    reference.relative_shift(mean, step, prior.shift)
+    reference.at_mean(window.nodes.predicted[stays], mean, prior.covariance, shift)
+    reference.relative_shift(shift, step, prior.shift)
     whitening(prior.covariance, prior.whitener)
     aids, states, first = 0, 0, rows.base + leaving
     while aids < rows.aids and node[rows.first_aid + aids] < first:

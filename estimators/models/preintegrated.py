@@ -26,7 +26,7 @@ from simnav.types import Array
 
 from .inertial_errors import ERROR
 
-__all__ = ["add_shift", "move_shift", "relative_shift", "turn_covariance"]
+__all__ = ["add_shift", "move_shift", "relative_shift"]
 
 #: Rotations below this are composed by a series [rad].
 SERIES_ANGLE = 0.014
@@ -166,27 +166,3 @@ def add_shift(step: Array, shift: Array, out: Array) -> None:
     for j in range(shift.size):
         out[j] = shift[j] + step[j]
     _set_attitude(out, _compose(a0, a1, a2, b0, b1, b2))
-
-
-@helper
-def _turn_columns(M: Array, p0: float, p1: float, p2: float, a: float, b: float) -> None:
-    """Turn the attitude's part of each column of a matrix."""
-    p = ERROR.attitude
-    for i in range(M.shape[1]):
-        M[p, i], M[p + 1, i], M[p + 2, i] = rotated(p0, p1, p2, a, b, M[p, i], M[p + 1, i], M[p + 2, i])
-
-
-@kernel(passed=True)
-def turn_covariance(P: Matrix, shift: Vector, out: Matrix) -> None:
-    """``J P J'`` with the left Jacobian J of the rotation of a shift (`simnav.geometry.rotation.left_jacobian`)."""
-    p0, p1, p2 = _attitude(shift)
-    angle2 = p0 * p0 + p1 * p1 + p2 * p2
-    # `rotated` with the coefficients of the left Jacobian
-    sine, a = rotation_coefficients(angle2)
-    b = 1.0 / 6.0 - angle2 * (1.0 / 120.0 - angle2 / 5040.0) if angle2 < 1e-3 else (1.0 - sine) / angle2
-    n = P.shape[0]
-    for i in range(n):
-        for j in range(n):
-            out[i, j] = P[i, j]
-    _turn_columns(out, p0, p1, p2, a, b)
-    _turn_columns(out.T, p0, p1, p2, a, b)

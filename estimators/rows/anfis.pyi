@@ -31,6 +31,7 @@ class AnfisFgo(ShipFgo, adaptation=Anfis):
         tolerance: float = 0.001,
         iterations: int = 10,
         spacing: float = 0.5,
+        prior: typing.Literal["differences", "group"] = "differences",
     ) -> None: ...
 
 @register("anfis-fgo-motion")
@@ -53,6 +54,7 @@ class AnfisFgoMotion(ShipFgo, adaptation=piece(Anfis, features="motion")):
         tolerance: float = 0.001,
         iterations: int = 10,
         spacing: float = 0.5,
+        prior: typing.Literal["differences", "group"] = "differences",
     ) -> None: ...
 
 @register("anfis-ekf")

@@ -1,4 +1,5 @@
 # Of learned.py, for type checkers and editors. Do not edit: "python -m simnav.estimators.stubs" writes it.
+import typing
 
 from simnav.estimator import register
 from simnav.estimators.adaptations.learned_noise import LearnedNoise
@@ -48,6 +49,7 @@ class NetFgo(
         tolerance: float = 0.05,
         iterations: int = 10,
         spacing: float = 0.5,
+        prior: typing.Literal["differences", "group"] = "differences",
     ) -> None: ...
 
 @register("beams-ekf")
@@ -95,6 +97,7 @@ class NetFgo20000(NetFgo, weighting=piece(LearnedWeights, budget=20_000)):
         tolerance: float = 0.05,
         iterations: int = 10,
         spacing: float = 0.5,
+        prior: typing.Literal["differences", "group"] = "differences",
     ) -> None: ...
 
 @register("beams-ekf-20000")

@@ -61,4 +61,5 @@ class GncFgoLoose(
         tolerance: float = 0.05,
         iterations: int = 15,
         spacing: float = 0.5,
+        prior: typing.Literal["differences", "group"] = "differences",
     ) -> None: ...

@@ -26,6 +26,7 @@ class _Window(Row, solver=piece(WindowEstimator, defaults={"tolerance": 0.05}, e
         tolerance: float = 0.05,
         iterations: int = 10,
         spacing: float = 0.5,
+        prior: typing.Literal["differences", "group"] = "differences",
     ) -> None: ...
 
 class _Robust(_Window, isolation=FaultIsolation):
@@ -40,6 +41,7 @@ class _Robust(_Window, isolation=FaultIsolation):
         tolerance: float = 0.05,
         iterations: int = 10,
         spacing: float = 0.5,
+        prior: typing.Literal["differences", "group"] = "differences",
     ) -> None: ...
 
 @register("huber-fgo")
@@ -57,6 +59,7 @@ class HuberFgo(_Robust, weighting=piece(TunedMEstimator, weight=huber)):
         tolerance: float = 0.05,
         iterations: int = 10,
         spacing: float = 0.5,
+        prior: typing.Literal["differences", "group"] = "differences",
     ) -> None: ...
 
 @register("tukey-fgo")
@@ -74,6 +77,7 @@ class TukeyFgo(_Robust, weighting=piece(TunedMEstimator, weight=tukey)):
         tolerance: float = 0.05,
         iterations: int = 10,
         spacing: float = 0.5,
+        prior: typing.Literal["differences", "group"] = "differences",
     ) -> None: ...
 
 @register("cauchy-fgo")
@@ -91,6 +95,7 @@ class CauchyFgo(_Robust, weighting=piece(TunedMEstimator, weight=cauchy)):
         tolerance: float = 0.05,
         iterations: int = 10,
         spacing: float = 0.5,
+        prior: typing.Literal["differences", "group"] = "differences",
     ) -> None: ...
 
 @register("gm-fgo")
@@ -108,6 +113,7 @@ class GmFgo(_Robust, weighting=piece(TunedMEstimator, weight=geman_mcclure)):
         tolerance: float = 0.05,
         iterations: int = 10,
         spacing: float = 0.5,
+        prior: typing.Literal["differences", "group"] = "differences",
     ) -> None: ...
 
 @register("dcs-fgo")
@@ -126,6 +132,7 @@ class DcsFgo(_Robust, weighting=DynamicCovarianceScaling):
         tolerance: float = 0.05,
         iterations: int = 10,
         spacing: float = 0.5,
+        prior: typing.Literal["differences", "group"] = "differences",
     ) -> None: ...
 
 @register("switchable-fgo")
@@ -143,6 +150,7 @@ class SwitchableFgo(_Robust, weighting=SwitchableConstraints):
         tolerance: float = 0.05,
         iterations: int = 10,
         spacing: float = 0.5,
+        prior: typing.Literal["differences", "group"] = "differences",
     ) -> None: ...
 
 @register("gnc-fgo")
@@ -166,6 +174,7 @@ class GncFgo(
         tolerance: float = 0.05,
         iterations: int = 15,
         spacing: float = 0.5,
+        prior: typing.Literal["differences", "group"] = "differences",
     ) -> None: ...
 
 @register("max-mixture-fgo")
@@ -183,6 +192,7 @@ class MaxMixtureFgo(_Robust, weighting=MaxMixture):
         tolerance: float = 0.05,
         iterations: int = 10,
         spacing: float = 0.5,
+        prior: typing.Literal["differences", "group"] = "differences",
     ) -> None: ...
 
 @register("ga-fgo")
@@ -200,6 +210,7 @@ class GaFgo(_Window, weighting=piece(GradientAdaptive, fewest=5)):
         tolerance: float = 0.05,
         iterations: int = 10,
         spacing: float = 0.5,
+        prior: typing.Literal["differences", "group"] = "differences",
     ) -> None: ...
 
 @register("ga-fgo-paper")
@@ -223,4 +234,5 @@ class GaFgoPaper(SwFgoPaper, weighting=piece(GradientAdaptive, defaults={"preset
         tolerance: float = 1e-06,
         iterations: int = 10,
         spacing: float = 0.2,
+        prior: typing.Literal["differences", "group"] = "differences",
     ) -> None: ...

@@ -16,10 +16,11 @@ from .adaptive import INNOVATIONS_AS_PRINTED
 __all__ = ["FgoFull", "FgoUnsimplified", "IaeFgo", "IaeFgoFixed", "IaeFgoPaper", "ShipFgo", "ShipFgoFull", "SwFgo"]
 __all__ += ["SwFgoPaper"]
 _WINDOW = piece(WindowEstimator, every_sample=False)
+_GROUP_WINDOW = piece(WindowEstimator, defaults={"prior": "group"}, every_sample=False)
 
 @register("sw-fgo", aliases=("fgo", "fgo-simplified"))
-class SwFgo(Row, solver=_WINDOW, model=InertialModel):
-    version = 2
+class SwFgo(Row, solver=_GROUP_WINDOW, model=InertialModel):
+    version = 3
     def __init__(
         self,
         *,
@@ -28,13 +29,14 @@ class SwFgo(Row, solver=_WINDOW, model=InertialModel):
         tolerance: float = 0.001,
         iterations: int = 10,
         spacing: float = 0.5,
+        prior: typing.Literal["differences", "group"] = "group",
     ) -> None: ...
 
 @register("fgo-unsimplified")
 class FgoUnsimplified(
-    Row, solver=piece(WindowEstimator, defaults={"window": 5}, every_sample=True), model=InertialModel
+    Row, solver=piece(WindowEstimator, defaults={"window": 5, "prior": "group"}, every_sample=True), model=InertialModel
 ):
-    version = 2
+    version = 3
     slow = True
     def __init__(
         self,
@@ -44,6 +46,7 @@ class FgoUnsimplified(
         tolerance: float = 0.001,
         iterations: int = 10,
         spacing: float = 0.5,
+        prior: typing.Literal["differences", "group"] = "group",
     ) -> None: ...
 
 @register("fgo-full")
@@ -59,8 +62,8 @@ class FgoFull(Row, solver=FullGraph, model=InertialModel):
     ) -> None: ...
 
 @register("iae-fgo")
-class IaeFgo(Row, solver=_WINDOW, model=Suitable, adaptation=piece(InnovationBased, source="innovation")):
-    version = 6
+class IaeFgo(Row, solver=_GROUP_WINDOW, model=Suitable, adaptation=piece(InnovationBased, source="innovation")):
+    version = 7
     def __init__(
         self,
         *,
@@ -80,6 +83,7 @@ class IaeFgo(Row, solver=_WINDOW, model=Suitable, adaptation=piece(InnovationBas
         tolerance: float = 0.001,
         iterations: int = 10,
         spacing: float = 0.5,
+        prior: typing.Literal["differences", "group"] = "group",
     ) -> None: ...
 
 @register("iae-fgo-paper")
@@ -104,11 +108,12 @@ class IaeFgoPaper(Row, solver=_WINDOW, model=Suitable, adaptation=INNOVATIONS_AS
         tolerance: float = 0.001,
         iterations: int = 10,
         spacing: float = 0.5,
+        prior: typing.Literal["differences", "group"] = "differences",
     ) -> None: ...
 
 @register("iae-fgo-fixed")
-class IaeFgoFixed(Row, solver=_WINDOW, model=Suitable, adaptation=piece(FixedWindow, source="innovation")):
-    version = 6
+class IaeFgoFixed(Row, solver=_GROUP_WINDOW, model=Suitable, adaptation=piece(FixedWindow, source="innovation")):
+    version = 7
     def __init__(
         self,
         *,
@@ -124,6 +129,7 @@ class IaeFgoFixed(Row, solver=_WINDOW, model=Suitable, adaptation=piece(FixedWin
         tolerance: float = 0.001,
         iterations: int = 10,
         spacing: float = 0.5,
+        prior: typing.Literal["differences", "group"] = "group",
     ) -> None: ...
 
 @register("sw-fgo-paper")
@@ -146,6 +152,7 @@ class SwFgoPaper(
         tolerance: float = 1e-06,
         iterations: int = 10,
         spacing: float = 0.2,
+        prior: typing.Literal["differences", "group"] = "differences",
     ) -> None: ...
 
 @register("ship-fgo")
@@ -163,6 +170,7 @@ class ShipFgo(Row, solver=_WINDOW, model=ShipModel):
         tolerance: float = 0.001,
         iterations: int = 10,
         spacing: float = 0.5,
+        prior: typing.Literal["differences", "group"] = "differences",
     ) -> None: ...
 
 @register("ship-fgo-full")

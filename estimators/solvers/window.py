@@ -6,8 +6,9 @@ sum of squares: linearise, weight, solve (`simnav.estimators.algebra.block_tridi
 would be small. A step that increases the cost is rejected, and repeated with damping (Levenberg-Marquardt). Then the
 oldest epochs leave the window. Their information on the new first node, at the last linearisation, is its prior (a
 Schur complement: G. Sibley, L. Matthies, G. Sukhatme, "Sliding window filter with application to planetary landing", J.
-Field Robotics 27(5), 2010). So only the later linearisation and weighting of these factors is lost, and a window of one
-epoch is an iterated EKF.
+Field Robotics 27(5), 2010). So only the later linearisation and weighting of these factors is lost. In which errors the
+prior is normal matters where later measurements turn the first node far from it
+(`simnav.estimators.models.group_prior`).
 
 The first step of an epoch uses the elimination of the older nodes from the last epoch, as in incremental smoothing
 (M. Kaess et al., "iSAM2: Incremental smoothing and mapping using the Bayes tree", Int. J. Robotics Research 31(2),
@@ -46,7 +47,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import hypot, inf
 from types import SimpleNamespace
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 
@@ -109,6 +110,9 @@ class WindowEstimator(LooksBack, Solver):
     spacing : float
         Measurements at times closer to the newest node than this [s] have no node of their own (`Chain`), unless
         they are the last of their step. 0, and with ``every_sample``: every time of a measurement is a node.
+    prior : "differences" or "group"
+        What is normal in the prior that nodes leave behind: the differences of the state, or the right-invariant error
+        on the group SE_2(3) (`simnav.estimators.models.group_prior`). Only an inertial model makes a difference.
     every_sample : bool
         True: a node for every IMU sample, instead of one preintegrated factor between measurements. This is the graph
         of the AUV smoothing paper (2022) without its equivalent IMU factor.
@@ -147,6 +151,7 @@ class WindowEstimator(LooksBack, Solver):
         tolerance: float = 1e-3,
         iterations: int = 10,
         spacing: float = 0.5,
+        prior: Literal["differences", "group"] = "differences",
         every_sample: bool = False,
     ):
         if window is not None and window < 1:
@@ -157,6 +162,8 @@ class WindowEstimator(LooksBack, Solver):
             raise ValueError(f"iterations is {iterations}; at least 1 is needed")
         if not 0.0 <= spacing < np.inf:
             raise ValueError(f"spacing is {spacing}; it is a time in seconds, 0 or more")
+        if prior not in ("differences", "group"):
+            raise ValueError(f'prior is {prior!r}; it must be "differences" or "group"')
         if isolation is not None and weighting is None:
             raise ValueError(f"{type(isolation).__name__} changes weights, and there is no weighting")
         if adaptation is not None and adaptation.inflates:
@@ -170,7 +177,7 @@ class WindowEstimator(LooksBack, Solver):
         self.adaptation = adaptation
         self.weighting, self.isolation = weighting, isolation
         self.window, self.tolerance, self.iterations, self.spacing = window, tolerance, iterations, spacing
-        self.every_sample = every_sample
+        self.prior, self.every_sample = prior, every_sample
 
     def longest_lag(self, instruments: Instruments) -> float:
         """The time that the window holds [s]: an epoch is a step, or the interval of the fastest instrument in use."""
@@ -185,6 +192,7 @@ class WindowEstimator(LooksBack, Solver):
         """Begin a run; UnsuitableScenario if the model lacks an instrument."""
         instruments = by_source(instruments, self._model_choice, self.label)
         self.chain = chain_of(with_stated_sigmas(self._model_choice.choose(instruments, self.label), instruments))
+        self.chain.prior_of = self.prior
         self.chain.front.reports_all |= self.reports_all
         self.covariance = self.chain.begin(start, instruments)
         observed = [name for name, sheet in instruments.items() if self.chain.observes(sheet)]
@@ -521,8 +529,10 @@ class WindowEstimator(LooksBack, Solver):
     def _solve(self) -> None:
         """Eliminate all nodes, without damping."""
         chain = self.chain
-        prior = chain.turned(chain.prior.covariance, -chain.prior.shift)
-        solve_chain.unchecked(chain.window, chain.rows, prior, 0.0, 0)
+        prior = chain.prior
+        linear, mean = np.empty_like(prior.covariance), np.empty_like(prior.shift)
+        chain.reference.in_python.at_node(prior.covariance, prior.shift, linear, mean)
+        solve_chain.unchecked(chain.window, chain.rows, linear, mean, 0.0, 0)
 
     def _all_factors(self) -> Factors:
         """Views of the factors, which hold until their number changes."""

@@ -122,10 +122,10 @@ def _solve(moves: Moves, window: Window, rows: Rows, damping: float, first: int)
     """One step of all nodes; its largest component in sigmas, of all nodes and of those before ``first``."""
     prior = window.prior
     if first > 0:
-        return solve_chain(window, rows, prior.covariance, damping, first)
-    turned = np.empty_like(prior.covariance)
-    moves.reference.turn(prior.covariance, -prior.shift, turned)
-    return solve_chain(window, rows, turned, damping, first)
+        return solve_chain(window, rows, prior.covariance, prior.shift, damping, first)  # neither is used
+    linear, mean = np.empty_like(prior.covariance), np.empty_like(prior.shift)
+    moves.reference.at_node(prior.covariance, prior.shift, linear, mean)
+    return solve_chain(window, rows, linear, mean, damping, first)
 
 
 @kernel

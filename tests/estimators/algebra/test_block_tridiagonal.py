@@ -92,7 +92,7 @@ class Problem:
             older = int(np.searchsorted(self.node, first))
             for name in ("cross", "white", "innovation", "used"):
                 getattr(window.aids, name)[:older] = getattr(left.aids, name)[:older]
-        size = solve_chain(window, rows_of(COUNT, len(self.node)), self.prior, damping, first)
+        size = solve_chain(window, rows_of(COUNT, len(self.node)), self.prior, self.shift, damping, first)
         self.left, nodes = window, window.nodes
         return size, (nodes.predicted, nodes.predicted_shift, nodes.filtered, nodes.filtered_shift, nodes.step)
 
@@ -179,7 +179,7 @@ def test_the_weight_of_a_motion_does_not_loosen_the_errors_of_instruments():
     p, coupled = Problem(3), 3
     p.Q[:, coupled:, :coupled] = p.Q[:, :coupled, coupled:] = 0.0
     window, rows = p.window, rows_of(COUNT, len(p.node), coupled=coupled)
-    solve_chain(window, rows, p.prior, 0.0, 0)
+    solve_chain(window, rows, p.prior, p.shift, 0.0, 0)
     whitener = np.linalg.inv(np.linalg.cholesky(p.Q))
     whiten(0, window.motions.residual, whitener, window.motions.whitened, window.motions.norm)
     window.aids.norm[:], window.prior.whitener[:] = 0.0, 0.0
@@ -226,7 +226,7 @@ def test_rows_before_and_after_do_not_count():
     size, _ = p.solve()
     alone, fresh = p.left, p.window
     window = window_of(padded(fresh.nodes), padded(fresh.motions), padded(fresh.aids), fresh.prior)
-    assert solve_chain(window, rows_of(COUNT, len(p.node), 2), p.prior, 0.0, 0) == size
+    assert solve_chain(window, rows_of(COUNT, len(p.node), 2), p.prior, p.shift, 0.0, 0) == size
     for part in ("nodes", "aids"):
         ours, theirs = getattr(window, part), getattr(alone, part)
         for name in type(ours).numba_fields:
@@ -248,7 +248,7 @@ def test_after_a_step_there_is_none_to_take():
     assert cost == half_squares(w, rows)
     assert np.abs(w.nodes.step).max() > 0.1
     for first in (0, 3, COUNT):  # whatever is eliminated anew
-        solve_chain(w, rows, p.prior, 0.0, first)
+        solve_chain(w, rows, p.prior, p.shift, 0.0, first)
         np.testing.assert_allclose(w.nodes.step, 0.0, atol=1e-9)
     for factors in (w.motions, w.aids):
         np.testing.assert_array_equal(factors.whitened, factors.residual)
