@@ -88,8 +88,12 @@ class IteratedEkf(Row, solver=KalmanEstimator, model=InertialModel, iteration=pi
 
 
 @register("inekf", aliases=("invariant-ekf",))
-class InvariantEkf(Row, solver=InvariantKalmanEstimator, model=InertialModel):
+class InvariantEkf(Row, solver=piece(InvariantKalmanEstimator, defaults={"error": "right"}), model=InertialModel):
     """Invariant 15-state EKF on SE_2(3) with biases; finds a heading that is far off.
+
+    Its error is the right-invariant one: to it a velocity or a heading that is measured in body axes is an invariant
+    measurement. On voyages whose IMU fails (``training-imu-faults``, seeds 56000 to 56089) it has 1.10 times the error
+    of ``ekf``, with the left-invariant one 1.16.
 
     Source: A. Barrau and S. Bonnabel, *The invariant extended Kalman filter as a stable observer*, IEEE TAC 62(4),
     2017.
@@ -98,9 +102,11 @@ class InvariantEkf(Row, solver=InvariantKalmanEstimator, model=InertialModel):
     --------
     2
         Values that the IMU did not measure are replaced (`FlatLineTest`).
+    3
+        The right-invariant error, and not the left-invariant one.
     """
 
-    version = 2
+    version = 3
 
 
 @register("kf", aliases=("linear-kf",))
