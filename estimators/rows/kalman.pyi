@@ -67,13 +67,13 @@ class IteratedEkf(Row, solver=KalmanEstimator, model=InertialModel, iteration=pi
     ) -> None: ...
 
 @register("inekf", aliases=("invariant-ekf",))
-class InvariantEkf(Row, solver=piece(InvariantKalmanEstimator, defaults={"error": "right"}), model=InertialModel):
-    version = 3
+class InvariantEkf(Row, solver=InvariantKalmanEstimator, model=InertialModel):
+    version = 2
     def __init__(
         self,
         *,
         calibrate: bool = True,
-        error: typing.Literal["left", "right"] = "right",
+        error: typing.Literal["left", "right"] = "left",
     ) -> None: ...
 
 @register("kf", aliases=("linear-kf",))

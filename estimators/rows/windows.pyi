@@ -16,11 +16,10 @@ from .adaptive import INNOVATIONS_AS_PRINTED
 __all__ = ["FgoFull", "FgoUnsimplified", "IaeFgo", "IaeFgoFixed", "IaeFgoPaper", "ShipFgo", "ShipFgoFull", "SwFgo"]
 __all__ += ["SwFgoPaper"]
 _WINDOW = piece(WindowEstimator, every_sample=False)
-_GROUP_WINDOW = piece(WindowEstimator, defaults={"prior": "group"}, every_sample=False)
 
 @register("sw-fgo", aliases=("fgo", "fgo-simplified"))
-class SwFgo(Row, solver=_GROUP_WINDOW, model=InertialModel):
-    version = 3
+class SwFgo(Row, solver=_WINDOW, model=InertialModel):
+    version = 2
     def __init__(
         self,
         *,
@@ -29,14 +28,14 @@ class SwFgo(Row, solver=_GROUP_WINDOW, model=InertialModel):
         tolerance: float = 0.001,
         iterations: int = 10,
         spacing: float = 0.5,
-        prior: typing.Literal["differences", "group"] = "group",
+        prior: typing.Literal["differences", "group"] = "differences",
     ) -> None: ...
 
 @register("fgo-unsimplified")
 class FgoUnsimplified(
-    Row, solver=piece(WindowEstimator, defaults={"window": 5, "prior": "group"}, every_sample=True), model=InertialModel
+    Row, solver=piece(WindowEstimator, defaults={"window": 5}, every_sample=True), model=InertialModel
 ):
-    version = 3
+    version = 2
     slow = True
     def __init__(
         self,
@@ -46,7 +45,7 @@ class FgoUnsimplified(
         tolerance: float = 0.001,
         iterations: int = 10,
         spacing: float = 0.5,
-        prior: typing.Literal["differences", "group"] = "group",
+        prior: typing.Literal["differences", "group"] = "differences",
     ) -> None: ...
 
 @register("fgo-full")
@@ -62,8 +61,8 @@ class FgoFull(Row, solver=FullGraph, model=InertialModel):
     ) -> None: ...
 
 @register("iae-fgo")
-class IaeFgo(Row, solver=_GROUP_WINDOW, model=Suitable, adaptation=piece(InnovationBased, source="innovation")):
-    version = 7
+class IaeFgo(Row, solver=_WINDOW, model=Suitable, adaptation=piece(InnovationBased, source="innovation")):
+    version = 6
     def __init__(
         self,
         *,
@@ -83,7 +82,7 @@ class IaeFgo(Row, solver=_GROUP_WINDOW, model=Suitable, adaptation=piece(Innovat
         tolerance: float = 0.001,
         iterations: int = 10,
         spacing: float = 0.5,
-        prior: typing.Literal["differences", "group"] = "group",
+        prior: typing.Literal["differences", "group"] = "differences",
     ) -> None: ...
 
 @register("iae-fgo-paper")
@@ -112,8 +111,8 @@ class IaeFgoPaper(Row, solver=_WINDOW, model=Suitable, adaptation=INNOVATIONS_AS
     ) -> None: ...
 
 @register("iae-fgo-fixed")
-class IaeFgoFixed(Row, solver=_GROUP_WINDOW, model=Suitable, adaptation=piece(FixedWindow, source="innovation")):
-    version = 7
+class IaeFgoFixed(Row, solver=_WINDOW, model=Suitable, adaptation=piece(FixedWindow, source="innovation")):
+    version = 6
     def __init__(
         self,
         *,
@@ -129,7 +128,7 @@ class IaeFgoFixed(Row, solver=_GROUP_WINDOW, model=Suitable, adaptation=piece(Fi
         tolerance: float = 0.001,
         iterations: int = 10,
         spacing: float = 0.5,
-        prior: typing.Literal["differences", "group"] = "group",
+        prior: typing.Literal["differences", "group"] = "differences",
     ) -> None: ...
 
 @register("sw-fgo-paper")

@@ -37,7 +37,7 @@ def run(estimator: Estimator, recording: Recording) -> list[Estimate]:
 
 def test_the_windows_agree(recording: Recording):
     """To a hundredth of a sigma, in states and blocks; sigmas to a thousandth."""
-    ours = run(make("sw-fgo", window=6, tolerance=1e-9, iterations=20, prior="differences"), recording)
+    ours = run(make("sw-fgo", window=6, tolerance=1e-9, iterations=20), recording)
     theirs = run(ChannelFixedLag(window=6, threshold=0.0, iterations=3), recording)
     for a, b in zip(ours, theirs, strict=True):
         apart = earth.relative_position(b.position, a.position)

@@ -130,7 +130,7 @@ def test_simplified_equals_unsimplified(name: str, duration: float, window: int)
     sigma, other = (np.sqrt(np.diagonal(x, axis1=1, axis2=2)) for x in (P, Q))
 
     assert np.abs(apart / sigma).max() < 1e-3
-    assert np.abs(apart[:, :3]).max() < 2e-4  # m
+    assert np.abs(apart[:, :3]).max() < 1e-4  # m
     assert np.abs(apart[:, 3:6]).max() < 1e-5  # m/s
     assert np.abs(apart[:, 6:9]).max() < 3e-6  # rad
     np.testing.assert_allclose(other, sigma, rtol=3e-4)

@@ -73,16 +73,11 @@ def test_no_window_is_worse_than_the_filter(name: str):
 @pytest.mark.slow
 @pytest.mark.parametrize("name", inertial_windows(slow=True))
 def test_slow_windows_for_a_part_of_the_run(name: str):
-    """A full graph and the un-simplified one: as the sliding window of the same length.
-
-    From so poor a start a window of five epochs depends on where it is linearised, whatever its prior.
-    """
+    """A full graph and the un-simplified one: as the sliding window of the same length."""
     recording = rov(3, 15.0)
-    slow = make(name)
-    same = make("sw-fgo", window=slow.window or 1000, prior=slow.prior)
+    same = make("sw-fgo", window=make(name).window or 1000)
     expected = simnav.score(simnav.run_trial(same, recording), recording)["horizontal_rmse"]
-    tolerance = 0.03 if slow.window is None else 0.15
-    assert scores(name, 3, 15.0)["horizontal_rmse"] == pytest.approx(expected, rel=tolerance)
+    assert scores(name, 3, 15.0)["horizontal_rmse"] == pytest.approx(expected, rel=0.03)
 
 
 @pytest.mark.parametrize("spacing", [0.2, 1.0])
