@@ -7,11 +7,12 @@ rotation (`simnav.geometry.rotation.left_jacobian`). `simnav.estimators.models.g
 from __future__ import annotations
 
 from simnav.compiled import helper, kernel
-from simnav.geometry.rotation import rotated, rotation_coefficients
+from simnav.geometry.rotation import left_jacobian_coefficients, rotated
 from simnav.kernel_types import Matrix, Vector
 from simnav.types import Array
 
 from .inertial_errors import ERROR
+from .marginalisation import keep_prior
 
 __all__ = ["differences_at_mean", "differences_at_node"]
 
@@ -25,33 +26,24 @@ def _turn_columns(M: Array, p0: float, p1: float, p2: float, a: float, b: float)
 
 
 @helper
-def _turn(P: Matrix, p0: float, p1: float, p2: float, out: Matrix) -> None:
-    """``J P J'`` with the left Jacobian J of a rotation."""
-    angle2 = p0 * p0 + p1 * p1 + p2 * p2
-    # `rotated` with the coefficients of the left Jacobian
-    sine, a = rotation_coefficients(angle2)
-    b = 1.0 / 6.0 - angle2 * (1.0 / 120.0 - angle2 / 5040.0) if angle2 < 1e-3 else (1.0 - sine) / angle2
-    n = P.shape[0]
-    for i in range(n):
-        for j in range(n):
-            out[i, j] = P[i, j]
-    _turn_columns(out, p0, p1, p2, a, b)
-    _turn_columns(out.T, p0, p1, p2, a, b)
+def _turn(P: Matrix, p0: float, p1: float, p2: float) -> None:
+    """Overwrite a covariance P with ``J P J'``, where J is the left Jacobian of a rotation."""
+    a, b = left_jacobian_coefficients(p0 * p0 + p1 * p1 + p2 * p2)
+    _turn_columns(P, p0, p1, p2, a, b)
+    _turn_columns(P.T, p0, p1, p2, a, b)
 
 
 @kernel(passed=True)
 def differences_at_node(covariance: Matrix, shift: Vector, linear: Matrix, mean: Vector) -> None:
     """As `simnav.estimators.models.group_prior.at_node`."""
     p = ERROR.attitude
-    _turn(covariance, -shift[p], -shift[p + 1], -shift[p + 2], linear)
-    for i in range(shift.size):
-        mean[i] = shift[i]
+    keep_prior(covariance, shift, linear, mean)
+    _turn(linear, -shift[p], -shift[p + 1], -shift[p + 2])
 
 
 @kernel(passed=True)
 def differences_at_mean(linear: Matrix, mean: Vector, covariance: Matrix, shift: Vector) -> None:
     """As `simnav.estimators.models.group_prior.at_mean`."""
     p = ERROR.attitude
-    _turn(linear, mean[p], mean[p + 1], mean[p + 2], covariance)
-    for i in range(mean.size):
-        shift[i] = mean[i]
+    keep_prior(linear, mean, covariance, shift)
+    _turn(covariance, mean[p], mean[p + 1], mean[p + 2])

@@ -28,25 +28,19 @@ from __future__ import annotations
 from math import cos, sin, sqrt
 
 from simnav.compiled import helper, kernel
-from simnav.geometry.rotation import cross, rotated, rotation_coefficients
+from simnav.geometry.rotation import cross, left_jacobian_coefficients, rotated
 from simnav.kernel_types import Matrix, Vector
 from simnav.types import Array
 
 from .inertial_errors import ERROR
+from .marginalisation import keep_prior
 
 __all__ = ["at_mean", "at_node"]
 
 
 @helper
-def _jacobian_coefficients(angle2: float) -> tuple[float, float]:
-    """The coefficients with which `rotated` applies the left Jacobian of a rotation of the square ``angle2``."""
-    sine, a = rotation_coefficients(angle2)
-    return a, 1.0 / 6.0 - angle2 * (1.0 / 120.0 - angle2 / 5040.0) if angle2 < 1e-3 else (1.0 - sine) / angle2
-
-
-@helper
 def _inverse_coefficients(angle2: float) -> tuple[float, float]:
-    """As `_jacobian_coefficients`, of its inverse."""
+    """As `left_jacobian_coefficients`, of its inverse."""
     if angle2 < 1e-3:
         return -0.5, 1.0 / 12.0 + angle2 / 720.0
     half = 0.5 * sqrt(angle2)
@@ -59,14 +53,6 @@ def _square(shift: Vector) -> float:
     p = ERROR.attitude
     square: float = shift[p] * shift[p] + shift[p + 1] * shift[p + 1] + shift[p + 2] * shift[p + 2]
     return square
-
-
-@helper
-def _copy(covariance: Matrix, mean: Vector, other: Matrix, other_mean: Vector) -> None:
-    for i in range(mean.size):
-        other_mean[i] = mean[i]
-        for j in range(mean.size):
-            other[i, j] = covariance[i, j]
 
 
 @helper
@@ -139,10 +125,10 @@ def at_node(covariance: Matrix, shift: Vector, linear: Matrix, mean: Vector) -> 
     mean : (n,) array
         Overwritten: the mean as a step of the node.
     """
-    _copy(covariance, shift, linear, mean)
+    keep_prior(covariance, shift, linear, mean)
     angle2 = _square(shift)
     if angle2 > 0.0:
-        a, b = _jacobian_coefficients(angle2)
+        a, b = left_jacobian_coefficients(angle2)
         _columns_to_node(linear, shift, a, b)
         _columns_to_node(linear.T, shift, a, b)
         a, b = _inverse_coefficients(angle2)
@@ -152,10 +138,10 @@ def at_node(covariance: Matrix, shift: Vector, linear: Matrix, mean: Vector) -> 
 @kernel(passed=True)
 def at_mean(linear: Matrix, mean: Vector, covariance: Matrix, shift: Vector) -> None:
     """The inverse of `at_node`: the prior whose linearisation at a node is given; the last two are overwritten."""
-    _copy(linear, mean, covariance, shift)
+    keep_prior(linear, mean, covariance, shift)
     angle2 = _square(mean)
     if angle2 > 0.0:
-        a, b = _jacobian_coefficients(angle2)
+        a, b = left_jacobian_coefficients(angle2)
         _turn_motion(mean, a, b, shift)
         a, b = _inverse_coefficients(angle2)
         _columns_to_mean(covariance, shift, a, b)

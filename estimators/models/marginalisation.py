@@ -81,7 +81,7 @@ def marginalise(leaving: int, window: Window, between: IntermediateStates, rows:
     rows : Rows
         Where all of them are.
     reference : Reference
-        How the model refers shifts and covariances to another state.
+        How the model linearises a prior at another state.
     """
     stays, node, of_state = rows.first_node + leaving, window.aids.node, between.node
     prior, step = window.prior, window.nodes.step[stays]

@@ -23,6 +23,7 @@ __all__ = [
     "dcm_from_rotation_vector",
     "dcm_from_rpy",
     "left_jacobian",
+    "left_jacobian_coefficients",
     "multiply",
     "quaternion_from_dcm",
     "quaternion_from_rotation",
@@ -276,6 +277,13 @@ def rotation_coefficients(angle2: float) -> tuple[float, float]:
         return small_rotation_coefficients(angle2)
     angle = sqrt(angle2)
     return sin(angle) / angle, (1.0 - cos(angle)) / angle2
+
+
+@helper
+def left_jacobian_coefficients(angle2: float) -> tuple[float, float]:
+    """The coefficients with which `rotated` applies the left Jacobian of a rotation of the square ``angle2``."""
+    sine, a = rotation_coefficients(angle2)
+    return a, 1.0 / 6.0 - angle2 * (1.0 / 120.0 - angle2 / 5040.0) if angle2 < 1e-3 else (1.0 - sine) / angle2
 
 
 @helper

@@ -1,8 +1,8 @@
-"""The prior of a window on the group SE_2(3), against matrix exponentials and logarithms, and what it is for."""
+"""The prior of a window on the group SE_2(3), against matrix logarithms, and what it is for."""
 
 import numpy as np
 import pytest
-from scipy.linalg import expm, logm
+from scipy.linalg import logm
 
 from simnav.estimator import EstimatorError, make
 from simnav.estimators.models.group_prior import at_mean, at_node
@@ -26,13 +26,6 @@ def logarithm(X: np.ndarray) -> np.ndarray:
     """Position, velocity and rotation of the logarithm of an element, in the order of a state's error."""
     L = logm(X).real
     return np.concatenate([L[:3, 4], L[:3, 3], [L[2, 1], L[0, 2], L[1, 0]]])
-
-
-def exponential(xi: np.ndarray) -> np.ndarray:
-    """The inverse of `logarithm`."""
-    L = np.zeros((5, 5))
-    L[:3, :3], L[:3, 3], L[:3, 4] = skew(xi[6:9]), xi[3:6], xi[:3]
-    return expm(L)
 
 
 def moved(X: np.ndarray, step: np.ndarray) -> np.ndarray:
